@@ -9,7 +9,10 @@ import pytest
 
 from armblocks.errors import InputError
 from armblocks.integration.rosenbrock_tableau import RosenbrockTableau, from_textbook
-from armblocks.simulation.rosenbrock import IMPLICIT_EULER, RODAS5P, ROS23, ROSENBROCK_TABLEAUX
+from armblocks.simulation.methods.rosenbrock import IMPLICIT_EULER, RODAS5P, ROS23
+from armblocks.simulation.tableaux import TABLEAUX
+
+ROSENBROCK_TABLEAUX = [tableau for tableau in TABLEAUX if isinstance(tableau, RosenbrockTableau)]
 
 every_method = pytest.mark.parametrize(
     "tableau", ROSENBROCK_TABLEAUX, ids=[t.name for t in ROSENBROCK_TABLEAUX]

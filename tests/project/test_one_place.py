@@ -8,6 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
 BLOCK = '''"""Blocks that double."""
 
@@ -55,13 +57,119 @@ assert "Doubled" in [kind.type for kind in library()]
 """
 
 
-def test_a_block_with_a_face_is_one_file(tmp_path: Path) -> None:
+JOINT = '''"""The screw joint."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from armblocks.robot.joints.joint import Joint
+
+
+@dataclass(frozen=True, kw_only=True)
+class Screw(Joint):
+    """A turn of q rad about the axis, and a slide of 0.25 m a turn along it."""
+
+    letter: ClassVar[str] = "H"
+    unit: ClassVar[str] = "rad"
+    turn: ClassVar[float] = 1.0
+    slide: ClassVar[float] = 0.25
+'''
+USE_OF_JOINT = """
+import numpy as np
+
+import armblocks as ab
+from armblocks.robot import JOINT_TYPES
+from armblocks.robot.joints.screw import Screw
+
+assert JOINT_TYPES[-1] is Screw
+body = ab.Link(name="nut", joint=Screw(), mass=2.0, centre_of_mass=(0.1, 0.0, 0.0), inertia=(0.1, 0.2, 0.3))
+robot = ab.Robot(name="made", links=[body])
+ab.save_robot(robot, "made.json")
+arm = ab.load_robot("made.json")
+assert type(arm.robot.links[0].joint) is Screw
+pose = arm.fkine([0.4])
+assert np.allclose(pose[:3, 3], [0.0, 0.0, 0.1]) and np.isclose(pose[0, 1], -np.sin(0.4))
+# The weight along the screw, and the inertia of the turn and the slide together.
+assert np.allclose(arm.rne([0.4], [0.0], [0.0]), [2.0 * 9.81 * 0.25])
+assert np.allclose(arm.inertia([0.4]), [[0.3 + 2.0 * 0.1**2 + 2.0 * 0.25**2]])
+"""
+SOLVER = '''"""Ralston's method."""
+
+from armblocks.integration.butcher_tableau import ButcherTableau, hermite_dense
+
+RALSTON = ButcherTableau(
+    name="ralston",
+    title="Ralston",
+    source="Ralston 1962",
+    order=2,
+    dense_order=2,
+    nodes=(0.0, 2 / 3),
+    matrix=((), (2 / 3,)),
+    weights=(1 / 4, 3 / 4),
+    dense=hermite_dense((1 / 4, 3 / 4)),
+)
+'''
+USE_OF_SOLVER = """
+import math
+
+import armblocks as ab
+from armblocks.blocks import Gain, Integrator
+from armblocks.studio.runs.settings import solver_choices
+
+builder = ab.DiagramBuilder("decay")
+x = builder.add("x", Integrator(initial=1.0))
+builder.connect(builder.add("rate", Gain(gain=-1.0), x), x["u"])
+end = [ab.simulate(builder.build(), stop_time=1.0, solver="Ralston", step=h)["x"][-1] for h in (0.02, 0.01)]
+assert 3.9 < (end[0] - math.exp(-1.0)) / (end[1] - math.exp(-1.0)) < 4.1
+assert "ralston" in [choice.name for choice in solver_choices()]
+"""
+FORMAT = '''"""D-H tables as lines ``theta d a alpha``."""
+
+from armblocks.formats.robot_format import RobotFormat
+from armblocks.robot import Robot, serial_chain, standard_dh
+
+
+def _read(data, name):
+    rows = [line.split() for line in data.decode().splitlines()]
+    links = [
+        standard_dh(f"link{k}", d=float(d), a=float(a), alpha=float(alpha))
+        for k, (_, d, a, alpha) in enumerate(rows, 1)
+    ]
+    return {"arm": Robot(name="arm", links=serial_chain(links))}
+
+
+TABLE = RobotFormat(name="D-H table", suffixes=(".dh",), most_bytes=10_000, read=_read)
+'''
+USE_OF_FORMAT = """
+from pathlib import Path
+
+import armblocks as ab
+from armblocks.studio.documents.project_folder import READABLE
+
+Path("made.dh").write_text("0 0.3 0.5 0\\n0 0 0.4 0\\n")
+arm = ab.load_robot("made.dh")
+assert [round(float(v), 12) for v in arm.fkine([0.0, 0.0])[:3, 3]] == [0.9, 0.0, 0.3]
+assert ".dh" in READABLE
+"""
+
+
+@pytest.mark.parametrize(
+    ("place", "file", "use"),
+    [
+        ("blocks/maths/doubled.py", BLOCK, USE),
+        ("robot/joints/screw.py", JOINT, USE_OF_JOINT),
+        ("simulation/methods/ralston.py", SOLVER, USE_OF_SOLVER),
+        ("formats/robot_formats/dh_table.py", FORMAT, USE_OF_FORMAT),
+    ],
+    ids=["a block with a face", "a joint type", "a solver", "a file format"],
+)
+def test_an_addition_is_one_file(place: str, file: str, use: str, tmp_path: Path) -> None:
     copy = tmp_path / "armblocks"
     shutil.copytree(ROOT / "src" / "armblocks", copy, ignore=shutil.ignore_patterns("__pycache__", "web"))
     shutil.copytree(ROOT / "robots", copy / "shipped" / "robots")
-    (copy / "blocks" / "maths" / "doubled.py").write_text(BLOCK, encoding="utf-8")
+    (copy / place).write_text(file, encoding="utf-8")
     run = subprocess.run(
-        [sys.executable, "-c", USE],
+        [sys.executable, "-c", use],
         cwd=tmp_path,
         env={**os.environ, "PYTHONPATH": str(tmp_path)},
         capture_output=True,

@@ -27,8 +27,8 @@ from armblocks.equations import SimulationOptions
 from armblocks.errors import SimulationError
 from armblocks.integration.system import compile_system
 from armblocks.simulation import RunState, simulate
-from armblocks.simulation.rosenbrock import RODAS5P
-from armblocks.simulation.tableaux import RK45
+from armblocks.simulation.methods.rosenbrock import RODAS5P
+from armblocks.simulation.methods.runge_kutta import RK45
 
 ROBERTSON = compile_system(robertson())
 VAN_DER_POL = compile_system(van_der_pol(1000.0))

@@ -5,7 +5,6 @@ import { ask, refuse } from '../store'
 import './robot.css'
 
 const MOST_BYTES = 5 * 2 ** 20
-const KINDS = ['.m', '.json']
 
 /** Files dropped anywhere on the page: robot scripts, robots, diagrams. */
 export function DropZone() {
@@ -49,14 +48,6 @@ export function DropZone() {
 
 /** Send a file to the server, which reads it as data: nothing of it is run. */
 export async function open(file: File): Promise<void> {
-  if (!KINDS.some((kind) => file.name.toLowerCase().endsWith(kind))) {
-    refuse({
-      what: 'this file type cannot be opened',
-      where: file.name,
-      fix: 'drop a robot script (.m), a robot or a diagram (.json)',
-    })
-    return
-  }
   if (file.size > MOST_BYTES) {
     refuse({
       what: `the file has ${(file.size / 2 ** 20).toFixed(1)} MiB, and 5 MiB can be dropped`,

@@ -5,8 +5,6 @@ import Gain``. A new block is one class in a file of its family's folder, where 
 checkers and editors read the names from ``__init__.pyi``, which ``scripts/block_names.py`` writes.
 """
 
-import importlib
-import pkgutil
 from collections.abc import Iterator
 
 from armblocks.diagram import Block, BlockLibrary
@@ -20,6 +18,7 @@ from armblocks.diagram.conditional import (
 )
 from armblocks.diagram.structure import Inport, Outport, Subsystem
 from armblocks.diagram.virtual_wiring import BusAssignment, BusCreator, BusSelector, From, Goto
+from armblocks.package_folder import classes_in
 
 FAMILIES = (
     "sources",
@@ -58,14 +57,7 @@ _KNOWN_TO_THE_DIAGRAM: dict[str, tuple[type[Block], ...]] = {
 def _kinds_of(family: str) -> Iterator[type[Block]]:
     """The block types of one family. A base class that several types share has no title."""
     yield from _KNOWN_TO_THE_DIAGRAM.get(family, ())
-    folder = importlib.import_module(f"{__name__}.{family}")
-    for file in pkgutil.iter_modules(folder.__path__, f"{folder.__name__}."):
-        classes = [
-            value for value in vars(importlib.import_module(file.name)).values() if isinstance(value, type)
-        ]
-        for value in classes:
-            if value.__module__ == file.name and issubclass(value, Block) and "title" in vars(value):
-                yield value
+    yield from (kind for kind in classes_in(f"{__name__}.{family}", Block) if "title" in vars(kind))
 
 
 BLOCKS = BlockLibrary(

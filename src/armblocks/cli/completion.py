@@ -37,7 +37,9 @@ def _beginning(typed: str, names: tuple[str, ...]) -> list[str]:
 
 
 def _files(typed: str) -> list[str]:
-    """Folders, and files with a suffix of robots or diagrams, in the typed folder."""
+    """Folders, and files with a suffix of robots (diagrams have that of JSON), in the typed folder."""
+    from armblocks.formats import ROBOT_SUFFIXES
+
     folder, slash, beginning = typed.rpartition("/")
     try:
         entries = sorted(Path(f"{folder}/" if slash else ".").iterdir())
@@ -48,7 +50,7 @@ def _files(typed: str) -> list[str]:
         for entry in entries
         if entry.name.startswith(beginning)
         and not entry.name.startswith(".")
-        and (entry.is_dir() or entry.suffix in (".json", ".m"))
+        and (entry.is_dir() or entry.suffix.lower() in ROBOT_SUFFIXES)
     ]
 
 

@@ -18,8 +18,9 @@ if TYPE_CHECKING:
     from armblocks.formats.diagram_python import diagram_to_python
     from armblocks.formats.document_kinds import DocumentKind, kind_of_data, kind_of_document
     from armblocks.formats.matlab_script import Script, read_script
-    from armblocks.formats.robot_files import ROBOT_FORMATS, load_robot, read_robots
+    from armblocks.formats.robot_files import load_robot, read_robots
     from armblocks.formats.robot_format import RobotFormat
+    from armblocks.formats.robot_formats import ROBOT_FORMATS, ROBOT_SUFFIXES
     from armblocks.formats.robot_json import read_robot, write_robot
     from armblocks.formats.robot_references import ResolveRobot
     from armblocks.formats.shipped import list_examples, list_libraries, list_robots
@@ -29,7 +30,8 @@ else:
         __name__,
         {
             "DocumentKind": "armblocks.formats.document_kinds",
-            "ROBOT_FORMATS": "armblocks.formats.robot_files",
+            "ROBOT_FORMATS": "armblocks.formats.robot_formats",
+            "ROBOT_SUFFIXES": "armblocks.formats.robot_formats",
             "ResolveRobot": "armblocks.formats.robot_references",
             "RobotFormat": "armblocks.formats.robot_format",
             "Script": "armblocks.formats.matlab_script",
@@ -58,6 +60,7 @@ else:
 
 __all__ = [
     "ROBOT_FORMATS",
+    "ROBOT_SUFFIXES",
     "DocumentKind",
     "ResolveRobot",
     "RobotFormat",

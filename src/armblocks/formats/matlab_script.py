@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.errors import ArmblocksWarning
-from armblocks.formats.robot_format import RobotFormat
 from armblocks.robot import FrictionModel, Robot
 
 
@@ -71,10 +70,3 @@ def read_script(
         elif isinstance(value, np.ndarray | str):
             variables[variable] = value
     return Script(robots=robots, variables=variables)
-
-
-def _read(data: bytes, name: str) -> Mapping[str, Robot]:
-    return read_script(data, name).robots
-
-
-MATLAB_SCRIPT = RobotFormat(name="MATLAB robot script", suffixes=(".m",), most_bytes=2**20, read=_read)

@@ -10,14 +10,10 @@ from pathlib import Path
 
 from armblocks.errors import FormatError, UnknownNameError
 from armblocks.files import read_bounded
-from armblocks.formats.matlab_script import MATLAB_SCRIPT
 from armblocks.formats.robot_format import RobotFormat
-from armblocks.formats.robot_json import ROBOT_JSON
+from armblocks.formats.robot_formats import ROBOT_FORMATS, ROBOT_SUFFIXES
 from armblocks.formats.shipped import ROBOT_FILE, list_robots, shipped_folder
 from armblocks.robot import FrictionModel, Robot, warn_of_doubts, warn_of_inertias
-
-ROBOT_FORMATS: tuple[RobotFormat, ...] = (ROBOT_JSON, MATLAB_SCRIPT)
-"""Every format of robot files. A new one is one file with a ``RobotFormat``, and its name here."""
 
 
 def load_robot(
@@ -61,8 +57,7 @@ def shipped_robot(name: str) -> Robot:
 
 def is_path(name_or_path: str) -> bool:
     """Whether a path is meant, and not the name of something shipped."""
-    suffixes = tuple(suffix for format in ROBOT_FORMATS for suffix in format.suffixes)
-    return "/" in name_or_path or "\\" in name_or_path or name_or_path.lower().endswith(suffixes)
+    return "/" in name_or_path or "\\" in name_or_path or name_or_path.lower().endswith(ROBOT_SUFFIXES)
 
 
 def _read_file(path: Path) -> Mapping[str, Robot]:
@@ -70,7 +65,7 @@ def _read_file(path: Path) -> Mapping[str, Robot]:
         raise FormatError(
             "this is a folder",
             where=str(path),
-            allowed="a robot file: " + ", ".join(suffix for f in ROBOT_FORMATS for suffix in f.suffixes),
+            allowed="a robot file: " + ", ".join(ROBOT_SUFFIXES),
             fix=f"give the path of a file in it, such as {path.name}/{ROBOT_FILE}",
         )
     format = _format(str(path))

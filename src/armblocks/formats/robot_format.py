@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from armblocks.robot import Robot
+if TYPE_CHECKING:
+    from armblocks.robot import Robot
 
 
 @dataclass(frozen=True, kw_only=True)

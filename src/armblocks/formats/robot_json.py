@@ -12,13 +12,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
 from typing import cast
 
 from armblocks.errors import ArmblocksError, FormatError, RobotError
 from armblocks.formats.canonical_json import canonical_bytes
 from armblocks.formats.json_document import Node, closed_members, read_document
-from armblocks.formats.robot_format import RobotFormat
 from armblocks.formats.shapes_json import shape_from, shape_to
 from armblocks.robot import (
     JOINT_TYPES,
@@ -364,11 +362,3 @@ def _angle_to(angle: float, unit: str = "deg") -> float | str:
     if angle == 0 or len(text) > 8 or math.radians(float(text)) != angle:
         return angle
     return f"{text} {unit}"
-
-
-def _read(data: bytes, name: str) -> Mapping[str, Robot]:
-    robot = read_robot(data, name)
-    return {robot.name: robot}
-
-
-ROBOT_JSON = RobotFormat(name="armblocks robot", suffixes=(".json",), most_bytes=MOST_BYTES, read=_read)

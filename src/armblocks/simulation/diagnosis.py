@@ -14,7 +14,7 @@ from armblocks.integration.guard_functions import CLOSE, CROWD, MOST_AT_ONCE, MO
 from armblocks.integration.native_integrator import Integration
 from armblocks.integration.system import CompiledSystem
 from armblocks.integration.workspace import Status
-from armblocks.simulation.rosenbrock import ROS5
+from armblocks.simulation.methods.rosenbrock import ROS5
 from armblocks.simulation.run_data import element_names
 from armblocks.simulation.tableaux import STIFF
 

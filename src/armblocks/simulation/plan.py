@@ -15,7 +15,8 @@ from armblocks.equations import SimulationOptions
 from armblocks.errors import InputError, UnknownNameError
 from armblocks.integration.rosenbrock_tableau import Tableau
 from armblocks.integration.system import CompiledSystem
-from armblocks.simulation.tableaux import DEFAULT, EULER, RK4, STIFF, TABLEAUX, find_tableau
+from armblocks.simulation.methods.runge_kutta import EULER, RK4
+from armblocks.simulation.tableaux import DEFAULT, STIFF, TABLEAUX, find_tableau
 
 Array = NDArray[np.float64]
 

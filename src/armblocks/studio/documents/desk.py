@@ -206,11 +206,11 @@ class DocumentDesk:
 def _dropped_data(request: say.Drop) -> bytes:
     where = request.name[:80]
     suffix = PurePath(request.name).suffix.lower()
-    if suffix not in (".m", ".json"):
+    if suffix not in formats.ROBOT_SUFFIXES:
         raise FormatError(
             f"'{suffix or request.name[:40]}' is no kind of file that can be dropped here",
             where=where,
-            allowed=".m (a robot script of the toolbox) or .json (a robot or a diagram)",
+            allowed=", ".join(f"{' '.join(form.suffixes)} ({form.name})" for form in formats.ROBOT_FORMATS),
             fix="save it as one of these",
         )
     try:

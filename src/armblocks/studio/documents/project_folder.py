@@ -14,9 +14,10 @@ from typing import Any, Literal
 
 from armblocks.errors import FormatError, UnknownNameError
 from armblocks.files import read_bounded, write_atomically
+from armblocks.formats.robot_formats import ROBOT_SUFFIXES
 from armblocks.formats.shipped import shipped_folder
 
-READABLE = (".json", ".m")
+READABLE = ROBOT_SUFFIXES
 """Suffixes of files that can be opened: diagrams, robots and scripts."""
 WRITABLE = (".json",)
 MOST_BYTES = 16 * 2**20

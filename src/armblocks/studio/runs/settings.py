@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 from armblocks.equations import SimulationOptions
-from armblocks.simulation.rosenbrock import ROSENBROCK_TABLEAUX
+from armblocks.integration.rosenbrock_tableau import RosenbrockTableau
 from armblocks.simulation.tableaux import TABLEAUX
 from armblocks.studio.protocol.messages.studio import SettingRule, SolverChoice
 
@@ -51,7 +51,7 @@ def solver_choices() -> list[SolverChoice]:
     automatic = SolverChoice(
         name="auto", title="chosen by armblocks, while it runs", adaptive=True, stiff=False
     )
-    stiff = {tableau.name for tableau in ROSENBROCK_TABLEAUX}
+    stiff = {tableau.name for tableau in TABLEAUX if isinstance(tableau, RosenbrockTableau)}
     return [
         automatic,
         *(

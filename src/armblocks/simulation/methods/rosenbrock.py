@@ -180,6 +180,3 @@ ROS5 = replace(
     error=None,
     error_order=0,
 )
-
-ROSENBROCK_TABLEAUX = (IMPLICIT_EULER, ROS5, ROS23, RODAS5P)
-"""All of them, the fixed-step ones first, each kind by rising order."""

@@ -1,0 +1,21 @@
+"""The project's own format of robots."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from armblocks.formats.robot_format import RobotFormat
+
+if TYPE_CHECKING:
+    from armblocks.robot import Robot
+
+
+def _read(data: bytes, name: str) -> Mapping[str, Robot]:
+    from armblocks.formats.robot_json import read_robot
+
+    robot = read_robot(data, name)
+    return {robot.name: robot}
+
+
+ROBOT_JSON = RobotFormat(name="armblocks robot", suffixes=(".json",), most_bytes=16 * 2**20, read=_read)

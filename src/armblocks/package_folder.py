@@ -1,0 +1,37 @@
+"""What the modules in the folder of a package define: a new file there needs no list to be known."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from collections.abc import Iterator
+from types import ModuleType
+from typing import TypeVar
+
+Kind = TypeVar("Kind")
+
+
+def modules_in(package: str) -> Iterator[ModuleType]:
+    """Import the modules of a package, in alphabetical order; subpackages are not searched."""
+    folder = importlib.import_module(package)
+    for file in pkgutil.iter_modules(folder.__path__, f"{package}."):
+        if not file.ispkg:
+            yield importlib.import_module(file.name)
+
+
+def values_in(package: str, kind: type[Kind] | tuple[type[Kind], ...]) -> list[Kind]:
+    """The values of a kind that the modules of a package have, each once."""
+    found: dict[int, Kind] = {}
+    for module in modules_in(package):
+        found |= {id(value): value for value in vars(module).values() if isinstance(value, kind)}
+    return list(found.values())
+
+
+def classes_in(package: str, base: type[Kind]) -> list[type[Kind]]:
+    """The subclasses of a class that the modules of a package define."""
+    return [
+        value
+        for module in modules_in(package)
+        for value in vars(module).values()
+        if isinstance(value, type) and value.__module__ == module.__name__ and issubclass(value, base)
+    ]

@@ -1,0 +1,1 @@
+"""The integrators as data, a file for each kind. Every table in a file of this folder is a solver."""
