@@ -504,6 +504,8 @@ def failure(recipe: Recipe, message: str) -> dict[str, list[str]]:
     except (UnsupportedError, EndlessEventsError, np.linalg.LinAlgError) as error:
         raise InconclusiveError(f"{message}; reference: {error}") from None
     for name, values in found.items():
+        if name.endswith("/angle") and not found.get(name[:-5] + "r", np.ones(1)).all():
+            raise InconclusiveError(f"'{name}' is the angle of the origin, which has no derivative")
         if not np.isfinite(values).all():
             raise InconclusiveError(f"'{name}' is not finite in the reference either")
         beyond = rows_beyond(values, finer[name], 1e-2)
