@@ -1,4 +1,4 @@
-"""What is known of a diagram before anything is traced: shapes, clocks, and the order of evaluation."""
+"""Analysis of a diagram before tracing: shapes, clocks, and the order of evaluation."""
 
 from __future__ import annotations
 
@@ -19,8 +19,7 @@ from armblocks.errors import ArmblocksError, DiagramError
 
 @dataclass(frozen=True)
 class Model:
-    """Everything about a diagram that does not need symbols: shapes, clocks, and in which order it is worked
-    out while the time flows and at a tick."""
+    """The results of the analysis: shapes, clocks, and the order of evaluation, in the flow and at ticks."""
 
     shapes: DiagramShapes
     sampling: Sampling
@@ -31,7 +30,7 @@ class Model:
 
 
 def diagram_model(diagram: Diagram) -> Model:
-    """Look at the flat form of a diagram.
+    """Analyse the flat form of a diagram.
 
     Raises ``DiagramError`` for unconnected inputs, for shapes and sample times that do not fit, and for
     blocks whose parameters allow no equations (a robot without mass), ``AlgebraicLoopError`` for loops that
@@ -48,7 +47,7 @@ def diagram_model(diagram: Diagram) -> Model:
     moving = moving_blocks(diagram, equations)
     for name in free:
         block, inputs = diagram.blocks[name], shapes.inputs[name]
-        # Nothing to locate where the answers change at instants only.
+        # Conditions that change at instants only need no events.
         still = name not in moving and name not in diagram.gates
         if still and block.conditions(inputs) and not equations[name].states:
             equations[name] = _equations(diagram, name, shapes, settled=not block.modes(inputs))

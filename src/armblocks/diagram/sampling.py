@@ -1,4 +1,4 @@
-"""Sample times: what a sampled block says of its own, and how the unsaid ones follow from the wires."""
+"""Sample times: those that blocks declare, and those that are inherited through wires."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from armblocks.equations.clock_ratios import exact_clocks
 from armblocks.errors import DiagramError, InputError
 
 INHERITED = -1.0
-"""The sample time of a block that takes that of its inputs, as in Simulink."""
+"""The sample time of a block that inherits the sample time of its inputs, as in Simulink."""
 
 Source = SampleClock | None
-"""Where a signal changes: at the ticks of a clock, or (``None``) all the time."""
+"""When a signal changes: at the ticks of a clock, or (``None``) continuously."""
 
 
 def sample_time_parameter(default: float = INHERITED) -> Any:
@@ -34,14 +34,14 @@ def sample_time_parameter(default: float = INHERITED) -> Any:
         dimensions=(0, 1),
         tunable=False,
         unit="s",
-        doc="the period, or (period, offset); -1 takes that of the inputs",
+        doc="the period, or (period, offset); -1 inherits that of the inputs",
     )
 
 
 def own_clock(block: Block) -> SampleClock | None:
-    """The clock that a sampled block states; ``None`` where it takes that of its inputs.
+    """The clock that a sampled block declares; ``None`` if it inherits that of its inputs.
 
-    Raises ``InputError`` for a sample time that is none.
+    Raises ``InputError`` for an invalid sample time.
     """
     given = np.atleast_1d(np.asarray(block.parameter_value("sample_time"), dtype=np.float64))
     if given.tolist() == [INHERITED]:
@@ -59,7 +59,7 @@ def own_clock(block: Block) -> SampleClock | None:
 
 @dataclass(frozen=True)
 class Sampling:
-    """The clocks of a diagram, fastest first, and which one each sampled block obeys."""
+    """The clocks of a diagram, fastest first, and the number of the clock of each sampled block."""
 
     clocks: tuple[SampleClock, ...]
     clock_of: Mapping[str, int]
@@ -156,7 +156,7 @@ def check_triggered(diagram: Diagram, equations: Mapping[str, BlockEquations]) -
 
 
 def _flows(block: BlockEquations) -> bool:
-    """Whether the outputs of a block move by themselves: with the time or with a continuous state."""
+    """Whether a block has outputs that change continuously by themselves: with the time or a state."""
     return bool(block.states or block.delays) or any(group.timed for group in block.groups)
 
 
@@ -177,7 +177,7 @@ def _moving_outputs(block: Block, equations: BlockEquations, moving: Collection[
 
 
 def _on_loops(following: Mapping[str, Iterable[str]]) -> set[str]:
-    """The blocks that feed themselves through others."""
+    """The blocks on feedback loops."""
     places = {name: place for place, name in enumerate(following)}
     names = list(following)
     needs = [[places[entry] for entry in entries] for entries in following.values()]
@@ -189,7 +189,7 @@ def _on_loops(following: Mapping[str, Iterable[str]]) -> set[str]:
 def _reach(
     begins: Mapping[str, Source], following: Mapping[str, Iterable[str]]
 ) -> Mapping[str, set[tuple[str, Source]]]:
-    """Which of the blocks that begin something reach each block, not passing through another such one."""
+    """For each block the sources of its sample time, without those behind another source."""
     reach: dict[str, set[tuple[str, Source]]] = {name: set() for name in following}
     queue: deque[str] = deque()
     for name, source in begins.items():

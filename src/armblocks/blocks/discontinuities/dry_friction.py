@@ -1,4 +1,4 @@
-"""Friction, play and rest: parts that stick, slip and turn back at exactly located events."""
+"""Friction and backlash, with exactly located events for sticking, slipping and reversal."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class CoulombFriction(Block):
     title: ClassVar[str] = "Coulomb and Viscous Friction"
     sign: ClassVar[FaceSign] = graph((0, 0), (0.5, 0.3), (0.5, 0.7), (1, 1))
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="Friction of a speed that swings: it jumps where the speed changes its sign.",
+        shows="Friction for a sinusoidal speed: it jumps when the speed changes its sign.",
         parameters={"gain": 0.5},
         inputs={"u": made("SineWave")},
     )
@@ -76,7 +76,7 @@ class CoulombFriction(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Backlash(Block):
-    """Play between two parts: y rests while u moves within the play, and follows at its ends.
+    """Backlash between two parts: y is constant while u moves within the play, and follows u at its ends.
 
     y' = u' while y = u - width/2 and u' > 0, or y = u + width/2 and u' < 0; else y' = 0. Where u jumps beyond
     the play, y jumps with it.
@@ -127,7 +127,7 @@ class Backlash(Block):
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         ahead = u["u"] - x["rest"]
-        # At rest the turning of u is nothing, and while driven the ends of the play are.
+        # At rest, reversals of u have no effect; while driven, the ends of the play have none.
         free = x["mode"] == 0.0
         return {
             "upper": if_else(free, ahead - p["width"] / 2.0 - JUST, -1.0),
@@ -144,7 +144,7 @@ class Backlash(Block):
         # Where u turns at an end of the play, rounding must not drive the output the other way again.
         above, below = if_else(u["u'"] < 0.0, band, 0.0), if_else(u["u'"] > 0.0, -band, 0.0)
         by_place = if_else(ahead - half > above, 1.0, if_else(ahead + half < below, -1.0, 0.0))
-        # A driven part stops where u turns, or has jumped back; it is driven the other way if u has gone on.
+        # A driven output stops when u reverses or jumps back; beyond the other end it is driven back.
         released = logic_or(u["u'"] < 0.0, ahead < half - band)
         released_down = logic_or(u["u'"] > 0.0, ahead > band - half)
         upwards = if_else(released, fmin(by_place, 0.0), 1.0)
@@ -211,7 +211,7 @@ class StickSlipFriction(Block):
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         sliding = x["mode"] * p["coulomb"] + p["viscous"] * x["v"]
-        # Where the force jumps, friction never holds more than it can.
+        # Also after a jump of the force, static friction is not exceeded.
         breaking = logic_and(same_instant(t, x["instant"]), fabs(u["F"]) > p["static"])
         holding = if_else(breaking, sign(u["F"]) * p["coulomb"], u["F"])
         return {"x": x["x"], "v": x["v"], "friction": if_else(x["mode"] == 0.0, holding, sliding)}
@@ -248,5 +248,5 @@ class StickSlipFriction(Block):
         }
 
     def _breaking(self, u: Signals, p: Signals) -> SX:
-        """Whither the force moves a mass at rest."""
+        """The direction in which the force moves a mass at rest; 0 if friction holds it."""
         return if_else(fabs(u["F"]) > p["static"], sign(u["F"]), 0.0)

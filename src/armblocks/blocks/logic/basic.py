@@ -1,4 +1,4 @@
-"""Logic: signals that are 1 where something holds and 0 where it does not.
+"""Logic blocks: their outputs are 1 for true and 0 for false.
 
 An input that is not zero counts as true. The instants at which the answer of a comparison, or the truth of
 an input, changes between two events of other blocks are events and are located exactly.
@@ -51,7 +51,7 @@ _GATES: Mapping[str, tuple[Callable[[SX, SX], SX], bool]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class RelationalOperator(Block):
-    """Two signals compared, element by element: y = 1 where u1 (relation) u2 holds, else 0."""
+    """A comparison of two signals, element by element: y = 1 if u1 (relation) u2 is true, else 0."""
 
     title: ClassVar[str] = "Relational Operator"
     example: ClassVar[WorkedExample] = WorkedExample(
@@ -59,7 +59,7 @@ class RelationalOperator(Block):
         inputs={"u1": made("SineWave"), "u2": made("Constant", value=0.5)},
     )
 
-    relation: str = parameter("<=", choices=tuple(_RELATIONS), doc="what is asked")
+    relation: str = parameter("<=", choices=tuple(_RELATIONS), doc="the relation")
     zero_crossing: bool = zero_crossing_parameter()
 
     def face_sign(self) -> FaceSign:
@@ -83,15 +83,15 @@ class RelationalOperator(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class LogicalOperator(Block):
-    """A gate, element by element: y = u1 AND u2 AND … and the like; NOT has one input.
+    """A logic gate, element by element: y = u1 AND u2 AND …; NOT has one input.
 
-    XOR is true where an odd count of inputs is; NAND, NOR and NXOR are the opposites. An input is true where
-    it is not 0.
+    XOR is true if an odd number of inputs is true; NAND, NOR and NXOR are the negations of AND, OR and XOR.
+    An input is true if it is not 0.
     """
 
     title: ClassVar[str] = "Logical Operator"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="1 while both pulses are there.",
+        shows="1 while both pulses are 1.",
         inputs={
             "u1": made("PulseGenerator", period=4.0).named("slow"),
             "u2": made("PulseGenerator", period=1.0).named("fast"),
@@ -99,7 +99,7 @@ class LogicalOperator(Block):
     )
 
     operator: str = parameter("AND", choices=(*_GATES, "NOT"), doc="the gate")
-    inputs: int = parameter(2, minimum=1, doc="how many inputs; NOT always has one")
+    inputs: int = parameter(2, minimum=1, doc="number of inputs; NOT always has one")
     zero_crossing: bool = zero_crossing_parameter()
 
     def face_sign(self) -> FaceSign:
@@ -128,7 +128,7 @@ class LogicalOperator(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class CompareToConstant(Block):
-    """A signal compared with a number, element by element: y = 1 where u (relation) constant, else 0."""
+    """A comparison with a constant, element by element: y = 1 if u (relation) constant is true, else 0."""
 
     title: ClassVar[str] = "Compare To Constant"
     spreads: ClassVar[tuple[str, ...]] = ("constant",)
@@ -137,7 +137,7 @@ class CompareToConstant(Block):
         parameters={"relation": ">", "constant": 0.5},
     )
 
-    relation: str = parameter("<=", choices=tuple(_RELATIONS), doc="what is asked")
+    relation: str = parameter("<=", choices=tuple(_RELATIONS), doc="the relation")
     zero_crossing: bool = zero_crossing_parameter()
     constant: ArrayLike = parameter(3.0, kind=ParameterKind.ARRAY, doc="the right side")
 
@@ -162,14 +162,14 @@ class CompareToConstant(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class CompareToZero(Block):
-    """A signal compared with zero, element by element: y = 1 where u (relation) 0 holds, else 0."""
+    """A comparison with zero, element by element: y = 1 if u (relation) 0 is true, else 0."""
 
     title: ClassVar[str] = "Compare To Zero"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="1 while the sine is not above 0.",
     )
 
-    relation: str = parameter("<=", choices=tuple(_RELATIONS), doc="what is asked")
+    relation: str = parameter("<=", choices=tuple(_RELATIONS), doc="the relation")
     zero_crossing: bool = zero_crossing_parameter()
 
     def face_sign(self) -> FaceSign:
@@ -193,7 +193,7 @@ class CompareToZero(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class IntervalTest(Block):
-    """Whether a signal lies in an interval: y = 1 where lower <= u <= upper, else 0.
+    """A test of a signal against a constant interval: y = 1 if lower <= u <= upper, else 0.
 
     Each end belongs to the interval unless ``lower_closed`` or ``upper_closed`` is false.
     """
@@ -211,7 +211,7 @@ class IntervalTest(Block):
     zero_crossing: bool = zero_crossing_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "what is tested"),)
+        return (Port("u", "the tested signal"),)
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "1 or 0"),)
@@ -234,7 +234,7 @@ class IntervalTest(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class IntervalTestDynamic(Block):
-    """Whether a signal lies in an interval that moves: y = 1 where lower <= u <= upper, else 0."""
+    """A test of a signal against an interval with variable ends: y = 1 if lower <= u <= upper, else 0."""
 
     title: ClassVar[str] = "Interval Test Dynamic"
     sign: ClassVar[FaceSign] = graph((0, 0), (0.3, 0), (0.3, 1), (0.7, 1), (0.7, 0), (1, 0))
@@ -252,7 +252,11 @@ class IntervalTestDynamic(Block):
     zero_crossing: bool = zero_crossing_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("upper", "the upper end"), Port("u", "what is tested"), Port("lower", "the lower end"))
+        return (
+            Port("upper", "the upper end"),
+            Port("u", "the tested signal"),
+            Port("lower", "the lower end"),
+        )
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "1 or 0"),)
@@ -272,7 +276,7 @@ class IntervalTestDynamic(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class CombinatorialLogic(Block):
-    """A truth table: y = the row of the table that the conditions point at, the first the highest digit.
+    """A truth table: y = the row with the binary number of the conditions, the first one the highest digit.
 
     For conditions (u1, …, um) the row is 1 + u1 2^(m-1) + … + um, of 2^m rows. A table of one column gives
     a scalar. The default is AND of two.
@@ -280,7 +284,7 @@ class CombinatorialLogic(Block):
 
     title: ClassVar[str] = "Combinatorial Logic"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The truth table of exclusive or: 1 while just one of the two pulses is there.",
+        shows="The truth table of exclusive or: 1 while exactly one of the two pulses is 1.",
         parameters={"table": ((0.0,), (1.0,), (1.0,), (0.0,))},
         inputs={
             "u": made("Mux").by(
@@ -328,7 +332,7 @@ class CombinatorialLogic(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class TruthTable(Block):
-    """A decision table: y = the actions of the first decision whose conditions all hold.
+    """A decision table: y = the actions of the first decision whose conditions are all met.
 
     Each row of ``decisions`` says of every condition whether it has to be true (1), false (0) or may be
     either (-1), and the same row of ``actions`` what comes out then. Every combination must be decided; a
@@ -337,7 +341,7 @@ class TruthTable(Block):
 
     title: ClassVar[str] = "Truth Table"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="2 where the slow pulse is there, else 1 where the fast one is, else 0.",
+        shows="2 while the slow pulse is 1, else 1 while the fast one is 1, else 0.",
         parameters={
             "decisions": ((1.0, -1.0), (0.0, 1.0), (-1.0, -1.0)),
             "actions": ((2.0,), (1.0,), (0.0,)),
@@ -358,7 +362,9 @@ class TruthTable(Block):
         maximum=1.0,
         doc="one row for each decision: 1 true, 0 false, -1 either",
     )
-    actions: ArrayLike = parameter(((1.0,), (0.0,)), dimensions=(2,), doc="what comes out, one row for each")
+    actions: ArrayLike = parameter(
+        ((1.0,), (0.0,)), dimensions=(2,), doc="the outputs, one row for each decision"
+    )
     zero_crossing: bool = zero_crossing_parameter()
 
     def check(self) -> None:
@@ -411,7 +417,7 @@ class TruthTable(Block):
 
 
 def _truth_conditions(inputs: Shapes) -> tuple[Condition, ...]:
-    """On which side of 0 each input is: it is true on both, and false at 0."""
+    """Whether each input is above 0 and whether it is below; either makes it true."""
     return tuple(
         Condition(f"{name} {side}", shape, f"1 where {name} is {side} 0", closed=False)
         for name, shape in inputs.items()
@@ -425,12 +431,12 @@ def _truth_values(u: Signals) -> Signals:
 
 
 def _truth(x: Signals, name: str) -> SX:
-    """1 where an input is true, else 0, by its conditions."""
+    """1 if an input is true, else 0; from its conditions."""
     return logic_or(x[f"{name} above"], x[f"{name} below"])
 
 
 def _sides(relation: str, shape: Shape) -> tuple[Condition, ...]:
-    """What a relation asks of left minus right; equality takes two questions."""
+    """The conditions of a relation on the difference left minus right; equality needs two."""
     above = Condition("above", shape, "1 where the left side is greater", closed=False)
     below = Condition("below", shape, "1 where the left side is less", closed=False)
     if relation in (">", "<="):
@@ -444,7 +450,7 @@ def _side_values(relation: str, difference: SX) -> Signals:
 
 
 def _related(relation: str, x: Signals) -> SX:
-    """The answer by the sides."""
+    """The truth of a relation, from its conditions."""
     if relation in ("==", "~="):
         different = logic_or(x["above"], x["below"])
         return logic_not(different) if relation == "==" else different

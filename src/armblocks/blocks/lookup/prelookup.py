@@ -1,4 +1,4 @@
-"""Lookup in two steps, where a position is found once for several tables; and reading entries by index."""
+"""Table lookup in two steps, with one search for several tables, and direct access by index."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from armblocks.errors import InputError
 
 @dataclass(frozen=True, kw_only=True)
 class Prelookup(BlockWithAxes):
-    """Where a position lies between break points: u = b(k) + f (b(k+1) - b(k)), index k from 0, fraction f.
+    """The interval of a position and the fraction in it: u = b(k) + f (b(k+1) - b(k)), k from 0.
 
     Several Interpolation Using Prelookup blocks can share it. The index never passes the last interval, so
     that f is 1 at the last break point; beyond the ends ``clip`` holds f at 0 or 1, ``linear`` lets it go on.
@@ -39,14 +39,14 @@ class Prelookup(BlockWithAxes):
 
     title: ClassVar[str] = "Prelookup"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="In which interval of the positions the input lies, and which part of it has been passed.",
+        shows="The index of the interval that contains the input, and the fraction of it that is passed.",
         parameters={"positions": (0.0, 2.0, 5.0, 10.0)},
         inputs={"u": made("Ramp")},
         shown=("k", "f"),
     )
 
     positions: ArrayLike = parameter((0.0, 1.0), dimensions=(1,), tunable=False, doc="positions (n,)")
-    extrapolation: str = parameter("clip", choices=EXTRAPOLATIONS, doc="what to do beyond the ends")
+    extrapolation: str = parameter("clip", choices=EXTRAPOLATIONS, doc="extrapolation beyond the ends")
     zero_crossing: bool = zero_crossing_parameter()
 
     def check(self) -> None:
@@ -108,7 +108,7 @@ class InterpolationUsingPrelookup(Block):
 
     title: ClassVar[str] = "Interpolation Using Prelookup"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The curve whose interval and fraction a Prelookup has found.",
+        shows="The curve, with the interval and the fraction from a Prelookup.",
         parameters={"table": (0.0, 3.0, 1.0, 2.0)},
         inputs={
             "k1": made("Prelookup", positions=(0.0, 2.0, 5.0, 10.0))
@@ -119,7 +119,9 @@ class InterpolationUsingPrelookup(Block):
         },
     )
 
-    table: ArrayLike = parameter((0.0, 1.0), dimensions=(1, 2, 3, 4), doc="values, two or more an axis")
+    table: ArrayLike = parameter(
+        (0.0, 1.0), dimensions=(1, 2, 3, 4), doc="values, two or more along each axis"
+    )
 
     def check(self) -> None:
         if min(shape_of(self.table)) < 2:
@@ -155,7 +157,7 @@ class InterpolationUsingPrelookup(Block):
 
 
 def _corners(k: SX, f: SX, n: int) -> list[tuple[SX, SX]]:
-    """Index and weight of the two entries that count for an index and a fraction."""
+    """Index and weight of the two entries for an index and a fraction."""
     place = fmin(fmax(floor(k), 0.0), float(n - 2))
     return [(place, 1.0 - f), (place + 1.0, f)]
 

@@ -1,4 +1,4 @@
-"""Blocks that calculate: their outputs follow from their inputs at the same instant."""
+"""Mathematical operations: the outputs are functions of the inputs at the same time."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from armblocks.rounded_functions import log
 
 @dataclass(frozen=True, kw_only=True)
 class Gain(Block):
-    """Every element times a number of its own, or all times one: y = gain * u."""
+    """The input times a gain, element by element: y = gain * u."""
 
     title: ClassVar[str] = "Gain"
     outline: ClassVar[Outline] = Outline.TRIANGLE
@@ -47,10 +47,12 @@ class Gain(Block):
         inputs={"u": made("SineWave")},
     )
 
-    gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the factor")
+    gain: ArrayLike = parameter(
+        1.0, kind=ParameterKind.ARRAY, doc="the gain, a scalar or one for each element"
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "what is multiplied"),)
+        return (Port("u", "the input"),)
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the product"),)
@@ -94,7 +96,7 @@ class Sum(Block):
 
     title: ClassVar[str] = "Sum"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="What is left of a step when a sine is taken away.",
+        shows="A step minus a sine.",
         parameters={"signs": "+-"},
         inputs={"u1": made("Step"), "u2": made("SineWave")},
     )
@@ -137,7 +139,7 @@ class Product(Block):
     title: ClassVar[str] = "Product"
     card_size: ClassVar[tuple[float, float]] = (46.0, 46.0)
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A fast sine times a slow one: its amplitude swells and fades.",
+        shows="A fast sine times a slow one: its amplitude rises and falls.",
         inputs={
             "u1": made("SineWave", frequency=8.0).named("fast"),
             "u2": made("SineWave", frequency=0.6).named("slow"),
@@ -247,7 +249,7 @@ _TRIGONOMETRY: Mapping[str, Callable[[SX], SX]] = {
 class MathFunction(BlockWithSteps):
     """An elementary function of every element: y = f(u), with f one of abs, exp, log, sqrt, square, …
 
-    Where ``floor``, ``ceil``, ``sign`` or ``abs`` switches is an event.
+    ``floor``, ``ceil``, ``sign`` and ``abs`` switch at located events.
     """
 
     title: ClassVar[str] = "Math Function"
@@ -296,7 +298,7 @@ class Trigonometry(Block):
 
     title: ClassVar[str] = "Trigonometric Function"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The sine of an angle that grows evenly.",
+        shows="The sine of an angle that rises at a constant rate.",
         inputs={"u": made("Ramp")},
     )
 
@@ -365,15 +367,15 @@ class Power(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class MinMax(Block):
-    """The least or the greatest of the inputs, element by element: y = min(u1, u2, …) or max."""
+    """The minimum or maximum of the inputs, element by element: y = min(u1, u2, …) or max(u1, u2, …)."""
 
     title: ClassVar[str] = "MinMax"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The lesser of two sines, at every moment.",
+        shows="The smaller of two sines at each time.",
     )
 
-    function: str = parameter("min", choices=("min", "max"), doc="which one")
-    inputs: int = parameter(2, minimum=1, doc="how many inputs")
+    function: str = parameter("min", choices=("min", "max"), doc="minimum or maximum")
+    inputs: int = parameter(2, minimum=1, doc="number of inputs")
     zero_crossing: bool = zero_crossing_parameter()
 
     def face_sign(self) -> FaceSign:
@@ -383,7 +385,7 @@ class MinMax(Block):
         return numbered_ports("u", self.inputs, "candidate")
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the least or the greatest"),)
+        return (Port("y", "the minimum or maximum"),)
 
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": common_unit(inputs)}
@@ -407,7 +409,7 @@ class MinMax(Block):
         return range(2, self.inputs + 1)
 
     def _best(self, x: Signals, values: list[SX], count: int) -> SX:
-        """The best of the first ``count`` inputs, as the conditions tell."""
+        """The minimum or maximum of the first ``count`` inputs, from the conditions."""
         best = values[0]
         for k in range(2, count + 1):
             best = if_else(x[f"beyond{k}"], values[k - 1], best)

@@ -82,7 +82,7 @@ class Extremum(Block):
         inputs={"u": THREE_PHASES},
     )
 
-    function: str = parameter("min", choices=("min", "max"), doc="which one")
+    function: str = parameter("min", choices=("min", "max"), doc="minimum or maximum")
     zero_crossing: bool = zero_crossing_parameter()
 
     def face_sign(self) -> FaceSign:

@@ -40,7 +40,7 @@ class MinMaxRunningResettable(Block):
         },
     )
 
-    function: str = parameter("min", choices=("min", "max"), doc="which one")
+    function: str = parameter("min", choices=("min", "max"), doc="minimum or maximum")
     initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="value at the start and after a reset")
     sample_time: ArrayLike = sample_time_parameter()
 

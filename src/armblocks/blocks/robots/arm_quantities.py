@@ -51,7 +51,7 @@ class JacobianInverse(Block):
         shown=("Ji",),
     )
 
-    method: str = parameter("inverse", choices=("inverse", "transpose", "pseudo", "damped"), doc="which one")
+    method: str = parameter("inverse", choices=("inverse", "transpose", "pseudo", "damped"), doc="method")
     damping: float = parameter(0.1, above=0.0, doc="damping factor of 'damped'")
 
     def input_ports(self) -> tuple[Port, ...]:
