@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from armblocks.robot import Robot
 from robots_for_tests import LAW_ROBOTS, build_kr180, build_puma560
@@ -23,6 +24,10 @@ FULL_EFFORT = (
 """Folders and files of tests that compile as users do: their laws are about the compiled code."""
 ALLOCATIONS_BEFORE_COLLECTION = 10_000
 """With Python's own 700, the collector takes a tenth of the tests' time: diagrams are many small objects."""
+
+# The same examples in every run, however long one takes on a busy machine.
+settings.register_profile("seeded", derandomize=True, deadline=None, database=None)
+settings.load_profile("seeded")
 
 
 def pytest_sessionstart() -> None:

@@ -134,9 +134,7 @@ def test_a_diagram_without_dead_time_has_the_response_of_its_linear_system() -> 
 
 @pytest.mark.parametrize("order", [0, 11, 2.0, True])
 def test_an_order_is_a_whole_number_from_1_to_10(order: int) -> None:
-    with pytest.raises(
-        InputError, match=r"the delay_order is .*an integer from 1 to 10.*3 is a good start"
-    ):
+    with pytest.raises(InputError, match=r"the delay_order is .*an integer from 1 to 10.*3 is a good start"):
         ab.linearize(loop(), "c", "x", delay_order=order)
 
 
