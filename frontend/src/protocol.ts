@@ -347,7 +347,7 @@ export interface RemoveBlocks {
   notes?: string[];
 }
 /**
- * Take a link out; what hangs on it hangs on its parent then.
+ * Remove a link; its child links are attached to its parent.
  */
 export interface RemoveJoint {
   kind: "remove_joint";

@@ -40,7 +40,7 @@ class AddJoint(RobotEdit):
 
 
 class RemoveJoint(RobotEdit):
-    """Take a link out; what hangs on it hangs on its parent then."""
+    """Remove a link; its child links are attached to its parent."""
 
     kind: Literal["remove_joint"] = "remove_joint"
     link: str
