@@ -7,13 +7,13 @@ file of :mod:`armblocks.studio.protocol.messages`.
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from collections.abc import Iterator
 from typing import Annotated, Any, Generic, TypeVar, Union, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler
 from pydantic_core import CoreSchema
+
+from armblocks.package_folder import modules_in
 
 ReplyT = TypeVar("ReplyT")
 MessageT = TypeVar("MessageT", bound="Message")
@@ -60,9 +60,7 @@ def reply_type(request: type[Request[Any]]) -> Any:
 
 def messages_of(base: type[MessageT]) -> dict[str, type[MessageT]]:
     """The messages of a class by their kind: of all classes below it those that have one."""
-    folder = importlib.import_module("armblocks.studio.protocol.messages")
-    for file in pkgutil.iter_modules(folder.__path__, f"{folder.__name__}."):
-        importlib.import_module(file.name)
+    list(modules_in("armblocks.studio.protocol.messages"))  # imports them
     found = {kind: message for message in _below(base) if (kind := kind_of(message))}
     return dict(sorted(found.items()))
 
