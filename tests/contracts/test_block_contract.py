@@ -265,6 +265,7 @@ WITHOUT_JUMPS = {
     "T2rpy": "of the two sets of angles, where the middle one is 90 degrees",
     "JacobianInverse": "the greatest pivot",
     "InterpolationUsingPrelookup": "its indices change at events of Prelookup",
+    "VariableTransportDelay": "a transit time that is not above 0 ends the run",
 }
 """Blocks without events whose equations compare, and what they compare for."""
 

@@ -73,6 +73,7 @@ class BlockNumbers:
         self.clock: int | None = None
         self.period = 0.0
         self.gate: dict[str, np.ndarray] = {}
+        self.begun = False
         self.states = block.states(shapes)
         self.discrete = block.discrete_states(shapes)
         self.lines = block.delay_lines(shapes)
@@ -212,6 +213,7 @@ class BlockNumbers:
         return "?fire" in self.gate and self.gate["?fire"][0] != 0.0
 
     def restart(self) -> None:
+        self.begun = True
         for name in self.names("start"):
             self.arrays[f"x:{name}"][:] = self.value("start", name)
         for mode in self.remembered:

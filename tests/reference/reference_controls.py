@@ -48,6 +48,8 @@ class _Law:
     on, restarts, fires = True, False, False
     ticking = False
     """Whether the present values are those of a tick."""
+    begun = False
+    """Whether the block was restarted at this instant."""
 
     def begin(self) -> None: ...
     def restart(self) -> None: ...
@@ -113,7 +115,10 @@ class Enable(_Law):
 
 
 class Trigger(_Law):
-    """Fires where the sign of u has changed in the right direction and the subsystem around is on."""
+    """Fires where the sign of u has changed in the right direction and the subsystem around is on.
+
+    It does not fire at an instant at which the subsystem around starts anew.
+    """
 
     memory = ("seen", "last")
     sides = ("side",)
@@ -125,10 +130,11 @@ class Trigger(_Law):
         side, seen = self.arrays["x:side"][0], self.arrays["x:seen"][0]
         rises, falls = side == 1.0 and seen == 0.0, side == 0.0 and seen == 1.0
         fires = {"rising": rises, "falling": falls, "either": rises or falls}[self.block.edge]
-        fires = fires and bool(self.u("outer"))
+        anew = bool(self.u("anew", 0.0))
+        fires = fires and bool(self.u("outer")) and not anew and not self.begun
         found = {
             "fire": float(fires),
-            "restart": float(fires or bool(self.u("anew", 0.0))),
+            "restart": float(fires or anew),
             "elapsed": self.arrays["t"][0] - self.arrays["x:last"][0],
         }
         return np.array([found[port]])
@@ -138,14 +144,18 @@ class Trigger(_Law):
         if t <= 0.0:
             self.arrays["x:seen"][:] = side
             return False
-        if self.value("out", "fire")[0]:
+        if self.value("out", "fire")[0] or self.u("anew", 0.0):
             self.arrays["x:last"][:] = t
+        self.begun = self.begun or bool(self.u("anew", 0.0))
         self.arrays["x:seen"][:] = side
         return bool(side != seen)
 
 
 class Held(_Law):
-    """u while the subsystem works, else the last value before it stopped, or the initial one."""
+    """u while the subsystem works, else the last value before it stopped, or the initial one.
+
+    Where the subsystem around starts anew, the last value is the initial one.
+    """
 
     memory = ("held",)
 
@@ -155,7 +165,8 @@ class Held(_Law):
     def value(self, kind: str, port: str) -> np.ndarray:
         if self.u("works"):
             return self.arrays["u:u"] + 0.0 * self.arrays["x:held"]
-        if kind == "out" and not self.block.fires and self.block.when_off == "reset":
+        reset = kind == "out" and not self.block.fires and self.block.when_off == "reset"
+        if reset or self.u("anew", 0.0):
             return np.zeros_like(self.arrays["x:held"]) + np.ravel(self.block.initial)
         return self.arrays["x:held"]
 
@@ -163,13 +174,18 @@ class Held(_Law):
         return ["held"] if kind == "capture" and not self.block.fires else []
 
     def act(self, t: float) -> bool:
+        if self.u("anew", 0.0):
+            self.arrays["x:held"][:] = np.ravel(self.block.initial)
         if self.block.fires and self.u("works"):
             self.arrays["x:held"][:] = self.arrays["u:u"]
         return False
 
 
 class Merged(_Law):
-    """The first input whose subsystem works, else what it was."""
+    """The first input whose subsystem works, else what it was.
+
+    Where the subsystem around starts anew, that is the initial value.
+    """
 
     memory = ("held",)
 
@@ -180,6 +196,8 @@ class Merged(_Law):
         for number in range(1, self.block.inputs + 1):
             if self.u(f"works{number}"):
                 return self.arrays[f"u:u{number}"] + 0.0 * self.arrays["x:held"]
+        if self.u("anew", 0.0):
+            return np.zeros_like(self.arrays["x:held"]) + np.ravel(self.block.initial)
         return self.arrays["x:held"]
 
     def act(self, t: float) -> bool:

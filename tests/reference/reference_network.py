@@ -74,6 +74,7 @@ class Network:
         self.t = 0.0
         for block in self.blocks.values():
             block.restart()
+            block.begun = False
             for name in block.names("held") if block.block.sampled else ():
                 block.outputs[name][:] = block.value("held", name)
             for name in block.names("guess"):
@@ -314,7 +315,7 @@ class Network:
         found: dict[tuple[str, str], np.ndarray] = {}
         for (name, guard), before in self.signs.items():
             block = self.blocks[name]
-            if not block.on:
+            if not block.on or block.begun:
                 continue
             self._feed_all(block)
             now = np.sign(block.value("guard", guard))
@@ -358,7 +359,6 @@ class Network:
                 break
             for block in again:
                 block.restart()
-                self._begin_signs(block)
         new: list[tuple[np.ndarray, np.ndarray]] = []
         for block in self.blocks.values():
             if block.clock in self.ticking and block.on:
@@ -452,15 +452,18 @@ class Network:
         self._feed_all(block)
         for name, guard in self.signs:
             if name == block.name:
-                self.signs[name, guard] = np.sign(block.value("guard", guard))
+                self.signs[name, guard] = np.sign(block.value("guard", guard)) * block.on
 
     def end_instant(self) -> None:
-        """Guards of a subsystem that was switched on are watched from now on."""
+        """Guards of a subsystem that was restarted or switched on are watched from now on."""
         self._remember()
         for name in {name for name, _ in self.signs}:
-            if self.blocks[name].on and not self.was_on[name]:
-                self._begin_signs(self.blocks[name])
+            block = self.blocks[name]
+            if block.begun or (block.on and not self.was_on[name]):
+                self._begin_signs(block)
         self.was_on = {name: self.blocks[name].on for name in self.was_on}
+        for block in self.blocks.values():
+            block.begun = False
 
     @property
     def delays(self) -> bool:

@@ -37,7 +37,7 @@ from armblocks.blocks import (
 )
 from armblocks.diagram import Diagram, DiagramBuilder, trace_diagram
 from armblocks.equations import SimulationOptions
-from armblocks.errors import DiagramError
+from armblocks.errors import DiagramError, SimulationError
 from armblocks.integration.native_integrator import FIRST_ROOM
 from armblocks.integration.system import compile_system
 from armblocks.simulation import RunState, SimulationResult, simulate
@@ -250,6 +250,15 @@ def test_a_pipe_in_which_the_flow_slows_down(run: Run) -> None:
     # the kink of T at 0 comes out unannounced: RK4 steps over it
     close(result["pipe/delay"], result.time - entered, 1e-6)
     close(result["pipe/y"], np.where(entered < 0.0, 0.0, np.sin(entered)), 1e-6)
+
+
+@pytest.mark.parametrize("start", (0.0, -1.0))
+def test_a_transit_time_that_is_not_above_0_ends_the_run(start: float) -> None:
+    builder = DiagramBuilder("d")
+    T = builder.add("T", Ramp(slope=0.5, initial=start))
+    builder.add("pipe", VariableTransportDelay(), builder.add("sine", SineWave()), T)
+    with pytest.raises(SimulationError, match="the derivative of state 'pipe/delay' is not finite at 0 s"):
+        native()(builder.build(), 1.0)
 
 
 def test_a_long_run_forgets_what_is_out_of_reach() -> None:

@@ -8,6 +8,7 @@ sampled block does at a tick. The equations of the block are unchanged; only the
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
@@ -20,9 +21,9 @@ from armblocks.diagram.port import Condition, DelayLine, Guard, Port, State, nam
 ON, RESTART, FIRE, ELAPSED = "?on", "?restart", "?fire", "?elapsed"
 """Hidden inputs: whether the block is active; whether its states are reset now; whether the trigger fires
 now; and the time since it fired before, s."""
-_DONE, _WORKS, _TURNED = "?done", "?works", "?turned"
-"""Kept and guarded beside the block's own: whether this tick has restarted it; whether its modes have settled
-since the control is on; and the guard of the control itself."""
+_DONE, _BEGUN, _WORKS, _TURNED = "?done", "?begun", "?works", "?turned"
+"""Kept and guarded beside the block's own: whether this tick has restarted it; whether this instant has;
+whether its modes have settled since the control is on; and the guard of the control itself."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +46,9 @@ class ConditionalBlock(Block):
         """No check: the inner block is already checked."""
 
     def _plain(self, values: Mapping[str, SX]) -> dict[str, SX]:
-        return {name: value for name, value in values.items() if name not in (*self.hidden, _DONE, _WORKS)}
+        return {
+            name: value for name, value in values.items() if name not in (*self.hidden, _DONE, _BEGUN, _WORKS)
+        }
 
     def _shapes(self, shapes: Shapes) -> Shapes:
         return {name: shape for name, shape in shapes.items() if name not in self.hidden}
@@ -94,9 +97,13 @@ class ConditionalBlock(Block):
         return self.block.states(self._shapes(inputs))
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        noted = (State(_DONE, (), "whether this tick has reset the block"),)
-        own = self.block.discrete_states(self._shapes(inputs))
-        return (*own, *noted) if self._notes_restarts else own
+        shapes = self._shapes(inputs)
+        found = list(self.block.discrete_states(shapes))
+        if self._notes_restarts:
+            found.append(State(_DONE, (), "whether this tick has reset the block"))
+        if self._restarted and self.block.all_guards(shapes):
+            found.append(State(_BEGUN, (), "1 from a restart to the end of its instant", momentary=True))
+        return tuple(found)
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
         own = self.block.all_modes(self._shapes(inputs))
@@ -108,6 +115,8 @@ class ConditionalBlock(Block):
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         own = self.block.all_guards(self._shapes(inputs))
+        if self._restarted:
+            own = tuple(dataclasses.replace(guard, silenced_by=_BEGUN) for guard in own)
         settles = self.block.modes(self._shapes(inputs)) and ON in self.hidden
         return (*own, Guard(_TURNED, (), "the control")) if settles else own
 
@@ -182,6 +191,8 @@ class ConditionalBlock(Block):
             starts = self._starts(x, p)
             for name, value in {**starts, **self._first_modes(t, {**x, **starts}, u, p)}.items():
                 after[name] = if_else(again, value, after.get(name, x[name]))
+        if _BEGUN in x:
+            after[_BEGUN] = if_else(u[RESTART] != 0.0, 1.0, x[_BEGUN])
         if _WORKS in x:
             begins = logic_and(u[ON] != 0.0, x[_WORKS] == 0.0)
             now = {**x, **after}

@@ -22,15 +22,21 @@ from armblocks.diagram.shape_rules import broadcast
 JUST = 1e-300
 """An offset below any signal resolution: it assigns zero itself to one side."""
 _STATES = ("held", "reset")
+_ANEW = Port("anew", "whether the enclosing subsystem is reset", "", ())
 _EDGES = ("rising", "falling", "either")
 
 
 def _inside(block: EnableControl | TriggerControl) -> tuple[Port, ...]:
     ports = (
         (block.outer, Port("outer", "whether the enclosing subsystem is active", "", ())),
-        (block.anew, Port("anew", "whether the enclosing subsystem is reset", "", ())),
+        (block.anew, _ANEW),
     )
     return tuple(port for there, port in ports if there)
+
+
+def _held(block: HeldOutput | MergedOutput, x: Signals, u: Signals, p: Signals) -> SX:
+    """The value that an output keeps; a reset of the enclosing subsystem sets it to the initial one."""
+    return if_else(u["anew"], p["initial"], x["held"]) if block.anew else x["held"]
 
 
 def _outer(u: Signals) -> SX:
@@ -114,7 +120,11 @@ class EnableControl(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class TriggerControl(Block):
-    """Whether a trigger fires at this time, and the time since it fired before."""
+    """Whether a trigger fires at this time, and the time since it fired before.
+
+    It does not fire at an instant at which the enclosing subsystem is reset: ``begun`` is 1 from then to its
+    end.
+    """
 
     title: ClassVar[str] = "Trigger"
 
@@ -131,13 +141,14 @@ class TriggerControl(Block):
             Port(
                 "restart", "1 where states are reset, by this trigger or by the enclosing subsystem", "", ()
             ),
-            Port("elapsed", "time since it fired before, or since the start", "s", ()),
+            Port("elapsed", "time since it fired before, or since the start or a reset", "s", ()),
         )
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         return (
             State("seen", (), "sign of u at the last action; -1 before the first"),
-            State("last", (), "time at which it fired last", "s"),
+            State("last", (), "time at which it fired last, or at which it was reset", "s"),
+            *((State("begun", (), "1 from a reset to the end of its instant", momentary=True),) * self.anew),
         )
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
@@ -152,11 +163,15 @@ class TriggerControl(Block):
     def initial_states(self, p: Signals) -> Signals:
         return {"seen": SX(-1.0), "last": SX(0.0)}
 
+    def _begins(self, x: Signals, u: Signals) -> SX:
+        """Whether the enclosing subsystem is or was reset at this instant."""
+        return logic_or(u["anew"], x["begun"]) if self.anew else SX(0.0)
+
     def _fires(self, x: Signals, u: Signals) -> SX:
         rises = logic_and(x["side"] == 1.0, x["seen"] == 0.0)
         falls = logic_and(x["side"] == 0.0, x["seen"] == 1.0)
         fires = {"rising": rises, "falling": falls, "either": logic_or(rises, falls)}[self.edge]
-        return logic_and(fires, _outer(u))
+        return logic_and(logic_and(fires, _outer(u)), logic_not(self._begins(x, u)))
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         fires = self._fires(x, u)
@@ -173,19 +188,25 @@ class TriggerControl(Block):
         side = if_else(e["side"] == 0.0, x["side"], if_else(e["side"] > 0.0, 1.0, 0.0))
         acts = e["acts"] != 0.0
         seen = if_else(acts, x["side"], x["seen"])
-        return {
+        starts = logic_or(logic_and(acts, self._fires(x, u)), u.get("anew", SX(0.0)))
+        after = {
             "side": side,
             "seen": if_else(logic_or(x["seen"] < 0.0, t <= 0.0), _side(u["u"]), seen),
-            "last": if_else(logic_and(acts, self._fires(x, u)), t, x["last"]),
+            "last": if_else(starts, t, x["last"]),
         }
+        return {**after, "begun": self._begins(x, u)} if self.anew else after
 
 
 @dataclass(frozen=True, kw_only=True)
 class HeldOutput(Block):
-    """An output of a conditional subsystem: y = u while active, else its previous value or ``initial``."""
+    """An output of a conditional subsystem: y = u while active, else its previous value or ``initial``.
+
+    A reset of the enclosing subsystem sets the previous value to ``initial``, as at the start of a run.
+    """
 
     title: ClassVar[str] = "Out"
 
+    anew: bool = parameter(False, doc="whether it is inside a subsystem whose states can be reset")
     fires: bool = parameter(False, doc="whether works is 1 at single times only")
     when_off: str = parameter("held", choices=_STATES, doc="whether y is held or reset to initial")
     initial: ArrayLike = parameter(
@@ -193,7 +214,11 @@ class HeldOutput(Block):
     )
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "what leaves"), Port("works", "1 while or when the subsystem is active", "", ()))
+        return (
+            Port("u", "what leaves"),
+            Port("works", "1 while or when the subsystem is active", "", ()),
+            *((_ANEW,) * self.anew),
+        )
 
     def bus_inputs(self) -> tuple[str, ...]:
         return ("u",)
@@ -217,22 +242,29 @@ class HeldOutput(Block):
         return {"held": p["initial"]}
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        otherwise = x["held"] if self.fires or self.when_off == "held" else p["initial"]
-        return {"y": if_else(u["works"], u["u"], otherwise)}
+        held = self.fires or self.when_off == "held"
+        return {"y": if_else(u["works"], u["u"], _held(self, x, u, p) if held else p["initial"])}
 
     def captures(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {} if self.fires else {"held": if_else(u["works"], u["u"], x["held"])}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        return {"held": if_else(u["works"], u["u"], x["held"])} if self.fires else {}
+        held = _held(self, x, u, p)
+        if self.fires:
+            return {"held": if_else(u["works"], u["u"], held)}
+        return {"held": held} if self.anew else {}
 
 
 @dataclass(frozen=True, kw_only=True)
 class MergedOutput(Block):
-    """Merged outputs of conditional subsystems: y is the output of the one that is or was active last."""
+    """Merged outputs of conditional subsystems: y is the output of the one that is or was active last.
+
+    A reset of the enclosing subsystem sets y to ``initial``, as at the start of a run.
+    """
 
     title: ClassVar[str] = "Merge"
 
+    anew: bool = parameter(False, doc="whether it is inside a subsystem whose states can be reset")
     inputs: int = parameter(2, minimum=1, doc="number of inputs")
     initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="y before any of them has been active")
 
@@ -244,6 +276,7 @@ class MergedOutput(Block):
                 Port(f"works{number}", "1 while or when its subsystem is active", "", ())
                 for number in numbers
             ),
+            *((_ANEW,) * self.anew),
         )
 
     def bus_inputs(self) -> tuple[str, ...]:
@@ -253,7 +286,7 @@ class MergedOutput(Block):
         return (Port("y", "the output of the subsystem that was active last"),)
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
-        wide = {name: shape for name, shape in inputs.items() if name.startswith("u")}
+        wide = {name: inputs[name] for name in self.bus_inputs()}
         return {"y": broadcast({**wide, "initial": shape_of(self.initial)})}
 
     def assumed_output_shapes(self) -> Shapes:
@@ -265,17 +298,17 @@ class MergedOutput(Block):
     def initial_states(self, p: Signals) -> Signals:
         return {"held": p["initial"]}
 
-    def _chosen(self, x: Signals, u: Signals) -> SX:
-        chosen = x["held"]
+    def _chosen(self, x: Signals, u: Signals, p: Signals) -> SX:
+        chosen = _held(self, x, u, p)
         for number in range(self.inputs, 0, -1):
             chosen = if_else(u[f"works{number}"], u[f"u{number}"], chosen)
         return chosen
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": self._chosen(x, u)}
+        return {"y": self._chosen(x, u, p)}
 
     def captures(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"held": self._chosen(x, u)}
+        return {"held": self._chosen(x, u, p)}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        return {"held": self._chosen(x, u)}
+        return {"held": self._chosen(x, u, p)}

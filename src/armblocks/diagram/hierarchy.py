@@ -196,7 +196,11 @@ class _Flattening:
                 self._control(level)
         for path, block in list(self.blocks.items()):
             if isinstance(block, Merge):
-                self.blocks[path] = MergedOutput(inputs=block.inputs, initial=block.initial)
+                outer = self.gates[self.level_of[path]]
+                self.blocks[path] = MergedOutput(
+                    anew=RESTART in outer, inputs=block.inputs, initial=block.initial
+                )
+                self._take_reset(path, outer)
                 self.controls.add(path)
         self.spread: dict[str, SpreadBlock] = {}
         self.elements: dict[PortRef, tuple[SpreadBlock, str]] = {}
@@ -292,7 +296,7 @@ class _Flattening:
                 self.gates[level] = {**outer, RESTART: PortRef(control, "restart")}
                 return
         self.gates[level] = gate
-        self._hold(level, works, fires=FIRE in gate)
+        self._hold(level, works, outer, fires=FIRE in gate)
 
     def _enable(self, level: str, port: str, outer: Gate, *, restarts: bool) -> str:
         block = EnableControl(outer=ON in outer, anew=RESTART in outer, restarts=restarts)
@@ -308,18 +312,26 @@ class _Flattening:
         self.level_of[path] = level
         self.controls.add(path)
         self.drivers[PortRef(path, "u")] = self.drivers[PortRef(level, port)]
-        for end, hidden in (("outer", ON), ("anew", RESTART)):
-            if hidden in outer:
-                self.drivers[PortRef(path, end)] = outer[hidden]
+        if ON in outer:
+            self.drivers[PortRef(path, "outer")] = outer[ON]
+        self._take_reset(path, outer)
         return path
 
-    def _hold(self, level: str, works: PortRef, *, fires: bool) -> None:
+    def _take_reset(self, path: str, outer: Gate) -> None:
+        """A control is told of the resets of the subsystem around it."""
+        if RESTART in outer:
+            self.drivers[PortRef(path, "anew")] = outer[RESTART]
+
+    def _hold(self, level: str, works: PortRef, outer: Gate, *, fires: bool) -> None:
         """Outputs that hold their values while the subsystem is inactive."""
         for name, block in self.levels[level].blocks.items():
             if isinstance(block, Outport):
                 path = joined(level, name)
-                self.blocks[path] = HeldOutput(fires=fires, when_off=block.when_off, initial=block.initial)
+                self.blocks[path] = HeldOutput(
+                    anew=RESTART in outer, fires=fires, when_off=block.when_off, initial=block.initial
+                )
                 self.drivers[PortRef(path, "works")] = works
+                self._take_reset(path, outer)
                 self.controls.add(path)
 
     def _merge(self, path: str, block: MergedOutput) -> None:

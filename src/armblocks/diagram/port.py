@@ -32,6 +32,7 @@ class State:
     consistent before any event (an edge, a trigger, a reset) acts on the signals. ``remembers``: such a
     function may also read the value that the mode had before (a hysteresis): that before the instant, or
     before the latest event at it. A discrete state that ``remembers`` is captured at the same times.
+    ``momentary``: a discrete state that is 0 again at the end of every instant.
     """
 
     name: str
@@ -40,6 +41,7 @@ class State:
     unit: str = ""
     follows: bool = False
     remembers: bool = False
+    momentary: bool = False
 
     @property
     def before(self) -> str:
@@ -58,7 +60,9 @@ class Guard:
 
     ``direction``: +1 for upward crossings, -1 for downward, 0 for both. ``action``: effect on the run where
     it is positive: ``stop`` ends the run, ``fail`` is an error, ``warn`` is reported at the end. ``locates``:
-    whether its zero only locates a change of a mode that follows the signals.
+    whether its zero only locates a change of a mode that follows the signals. ``silenced_by``: the momentary
+    state that keeps it from firing where it is not 0; at the end of the instant the guard begins anew, with
+    the sign that it has then.
     """
 
     name: str
@@ -67,6 +71,7 @@ class Guard:
     direction: int = 0
     action: str = ""
     locates: bool = False
+    silenced_by: str = ""
 
 
 @dataclass(frozen=True)

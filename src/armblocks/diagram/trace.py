@@ -79,6 +79,7 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
     entries = [(name, guard) for name, guard, value in guards for _ in range(value.numel())]
     modes, followers, contradictions = _contradictions(model, symbols, flow)
     remembered, recaptured = _remembered(model, symbols), _recaptured(model, symbols)
+    momentary = _momentary(model, symbols)
     ends = {"t": symbols.t, "x": symbols.x, "z": symbols.z, "w": loops.w, "p": symbols.p}
     m, e, p = {"m": symbols.m}, {"e": symbols.e}, {"p": symbols.p}
 
@@ -116,6 +117,8 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
         followers=followers,
         remembered=remembered,
         recaptured=recaptured,
+        momentary=tuple(momentary.values()),
+        silenced=_silenced(entries, momentary),
         locating=tuple(number for number, (_, guard) in enumerate(entries) if guard.locates),
         contradictions=function("contradictions", ends, c=contradictions) if modes else None,
         reset=function("reset", ends | e, **_reset(model, symbols, flow)),
@@ -288,6 +291,28 @@ def _recaptured(model: Model, symbols: Symbols) -> tuple[int, ...]:
         for state in equations.discrete
         if state.remembers and (SlotKind.CAPTURE, state.name) in equations.group_of
         for place in _places(ranges[f"{name}/{state.name}"])
+    )
+
+
+def _momentary(model: Model, symbols: Symbols) -> dict[tuple[str, str], int]:
+    """The places in ``z`` of the discrete states that are 0 again at the end of an instant."""
+    ranges = signature(*symbols.discrete_slots).ranges
+    return {
+        (name, state.name): ranges[f"{name}/{state.name}"].start
+        for name, equations in model.flow.equations.items()
+        for state in equations.discrete
+        if state.momentary
+    }
+
+
+def _silenced(
+    guards: Sequence[tuple[str, Guard]], momentary: Mapping[tuple[str, str], int]
+) -> tuple[tuple[int, int], ...]:
+    """The guards that a momentary state silences, each with its place in ``z``."""
+    return tuple(
+        (number, momentary[name, guard.silenced_by])
+        for number, (name, guard) in enumerate(guards)
+        if guard.silenced_by
     )
 
 

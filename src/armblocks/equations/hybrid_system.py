@@ -137,6 +137,11 @@ class HybridSystem:
     latest event at it), and that value."""
     recaptured: tuple[int, ...] = ()
     """The indices in ``z`` of captured values of such modes, which are captured again at events."""
+    momentary: tuple[int, ...] = ()
+    """The indices in ``z`` of what is 0 again at the end of every instant."""
+    silenced: tuple[tuple[int, int], ...] = ()
+    """Guards, each with the index in ``z`` of a momentary value. Where it is not 0, the guard does not fire,
+    and begins anew at the end of the instant, with the sign that it has then."""
     locating: tuple[int, ...] = ()
     """The guards whose zeros only locate changes of such modes."""
     tangents: tuple[int, int, int] | None = None

@@ -146,6 +146,7 @@ class Events:
             self._take_fired_signs()
         self._remember_modes()
         r.call(functions.take_signs, f.reals, no)
+        self._end_moment()
         places, slopes = f.places, f.vector(f.places.guard_slopes)
         f.copy(places.guards, places.guards_before, self.guards)
         for i in r.each(self.guards):
@@ -200,6 +201,16 @@ class Events:
         of_before = f.r.integers("mode.before", before)
         for i in f.r.each(len(modes)):
             z[of_before[i]] = z[of_modes[i]]
+
+    def _end_moment(self) -> None:
+        """Guards that were silenced begin anew, and what holds for this instant alone is over."""
+        f, r = self.frame, self.frame.r
+        if self.functions.begin_anew:
+            r.call(self.functions.begin_anew, f.reals)
+        if f.sizes.momentary:
+            z, momentary = f.vector(f.places.z), r.integers("momentary", f.sizes.momentary)
+            for i in r.each(len(f.sizes.momentary)):
+                z[momentary[i]] = 0.0
 
     def _count_quiet_turn(self, time: Real, quiet_turns: IntegerVariable) -> None:
         """Return after too many turns without an event."""

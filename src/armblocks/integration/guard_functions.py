@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from armblocks.integration import system_functions
 from armblocks.integration.workspace import Count, LoopSizes, Scalar, Workspace
 from armblocks.routines.arithmetic import fma, maximum, minimum, select, sign
@@ -40,12 +42,14 @@ class GuardFunctions:
         self.count = len(sizes.directions)
         self.modes = sizes.modes
         self.followers = tuple(int(follows) for follows in sizes.followers)
+        self.silenced = sizes.silenced
         self.locating = tuple(int(number in sizes.locating) for number in range(self.count))
         self.tangents = sizes.tangents
         self.states, self.discrete = sizes.states, sizes.discrete
         self.directions = tuple(float(direction) for direction in sizes.directions)
         self.watch = program.define(self._watch, "watch")
         self.take_signs = program.define(self._take_signs, "take_signs")
+        self.begin_anew = program.define(self._begin_anew, "begin_anew") if sizes.silenced else None
         self.note_events = program.define(self._note_events, "note_events")
         self.dips = program.define(self._dips, "dips")
         self.note_slopes = program.define(self._note_slopes, "note_slopes")
@@ -82,6 +86,11 @@ class GuardFunctions:
             crossed = (now * known < 0.0) & (now * wanted >= 0.0)
             fired[i] = select(crossed, now, 0.0)
             total.value = total.value + crossed.count()
+        z = reals.after(places.z)
+        for guard, place in self._silenced(r):
+            heard = (fired[guard] == 0.0) | (z[place] == 0.0)
+            fired[guard] = select(heard, fired[guard], 0.0)
+            total.value = total.value - (~heard).count()
         for i in r.each(len(self.modes)):
             found = contradictions[i] != 0.0
             total.value = total.value + found.count()
@@ -244,6 +253,22 @@ class GuardFunctions:
             back = select(directed & has_fired, -1.0 * mark, now)
             after = select(has_fired, select(nonzero, now, back), known)
             signs[i] = select(only_fired, after, side)
+
+    def _begin_anew(self, r: Routine, reals: Reals) -> None:
+        """The signs of silenced guards become those of their values, also where these are zero."""
+        places = self.places
+        values, signs, z = (reals.after(place) for place in (places.guards, places.signs, places.z))
+        for guard, place in self._silenced(r):
+            signs[guard] = select(z[place] == 0.0, signs[guard], sign(values[guard]))
+
+    def _silenced(self, r: Routine) -> Iterator[tuple[Integer, Integer]]:
+        """The guards that a momentary value silences, each with its place, in a loop of the routine."""
+        if not self.silenced:
+            return
+        guards, places = zip(*self.silenced)
+        of_guards, of_places = r.integers("silenced.guards", guards), r.integers("silenced.by", places)
+        for i in r.each(len(self.silenced)):
+            yield of_guards[i], of_places[i]
 
     def _note_events(self, r: Routine, t: Real, reals: Reals, counts: Integers, first: Boolean) -> Real:
         """Count the events of an event time, and the consecutive close ones; returns a bound for the next

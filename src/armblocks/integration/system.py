@@ -123,6 +123,8 @@ class CompiledSystem:
             followers=tuple(bool(follows) for follows in description["followers"]),
             remembered=tuple((int(mode), int(before)) for mode, before in description["remembered"]),
             recaptured=tuple(int(place) for place in description["recaptured"]),
+            momentary=tuple(int(place) for place in description["momentary"]),
+            silenced=tuple((int(guard), int(place)) for guard, place in description["silenced"]),
             locating=tuple(int(guard) for guard in description["locating"]),
             tangents=None if description["tangents"] is None else tuple(description["tangents"]),
         )
@@ -305,6 +307,8 @@ def _describe(system: HybridSystem, tapes: Mapping[str, Tape]) -> dict[str, Any]
         "followers": list(system.followers),
         "remembered": [list(places) for places in system.remembered],
         "recaptured": list(system.recaptured),
+        "momentary": list(system.momentary),
+        "silenced": [list(places) for places in system.silenced],
         "locating": list(system.locating),
         "tangents": system.tangents,
         "guard_directions": list(system.guard_directions),

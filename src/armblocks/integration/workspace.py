@@ -139,7 +139,9 @@ class LoopSizes:
     before every instant. ``modes``: the places of the modes in ``z``; ``followers``, for each, whether it
     is a function of the signals alone; ``remembered``, the places in ``z`` of those that also read what they
     were before, each with the place of that; ``recaptured``, the places of the captured values that go with
-    these; ``locating``, the guards that only tell when such modes change.
+    these; ``momentary``, the places of what is 0 again at the end of an instant; ``silenced``, the guards
+    that do not fire where such a place is not 0, each with that place; ``locating``, the guards that only
+    tell when modes change that are a function of the signals.
     ``tangents``: from which entries of ``x``, ``z`` and the guards on they belong to derivatives, if any.
     """
 
@@ -155,6 +157,8 @@ class LoopSizes:
     followers: tuple[bool, ...] = ()
     remembered: tuple[tuple[int, int], ...] = ()
     recaptured: tuple[int, ...] = ()
+    momentary: tuple[int, ...] = ()
+    silenced: tuple[tuple[int, int], ...] = ()
     locating: tuple[int, ...] = ()
     tangents: tuple[int, int, int] | None = None
 

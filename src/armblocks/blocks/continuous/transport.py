@@ -6,11 +6,12 @@ that end at propagated discontinuities, dense output as history).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from casadi import SX, fmax, fmin
+from casadi import SX, fmax, fmin, if_else
 from numpy.typing import ArrayLike
 
 from armblocks.blocks.switching import limits_in_order
@@ -138,7 +139,8 @@ class VariableTransportDelay(Block):
     """A transport delay in a pipe: y(t) = u(t - d), where ``T(t)`` is the transit time at the inlet.
 
     The flow between t - d and t fills the pipe, so the integral of 1/T over that time is 1. Therefore d' = 1
-    - T(t - d) / T(t). (Simulink's Variable Transport Delay; Variable Time Delay takes T itself for d.)
+    - T(t - d) / T(t). (Simulink's Variable Transport Delay; Variable Time Delay takes T itself for d.) A
+    transit time that is not above 0 ends the run with an error.
     """
 
     title: ClassVar[str] = "Variable Transport Delay"
@@ -189,7 +191,7 @@ class VariableTransportDelay(Block):
         return {"y": x["past"], "delay": x["delay"]}
 
     def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"delay": 1.0 - x["transit"] / u["T"]}
+        return {"delay": 1.0 - x["transit"] / if_else(u["T"] > 0.0, u["T"], math.nan)}
 
     def initial_states(self, p: Signals) -> Signals:
         return {"delay": p["initial_delay"]}
