@@ -24,9 +24,10 @@ from armblocks.routines.memory import NumberArray
 from armblocks.routines.routine import Program, Routine
 from armblocks.routines.values import Integer
 
-SHORTEST_BLOCK, SHORTEST_BLOCK_OF_LANES = 8, 256
+SHORTEST_BLOCK, SHORTEST_BLOCK_OF_LANES, FEWEST_OF_LARGE = 8, 256, 24
 """From so many neighbours on, inputs are copied in one go: LLVM compares loads and stores pair by pair. Over
-several lanes, fewer are read faster as whole registers."""
+several lanes, fewer are read faster as whole registers; but from so many unknowns on, the elimination takes
+so much longer that only the time of compilation counts."""
 
 
 def emit_linear_solution(
@@ -44,7 +45,8 @@ def emit_linear_solution(
     symbol = f"linear_solution.{n}.{body.lanes}"
     _define(module, symbol, n, body.lanes)
     space = WorkSpace(body, _Solver.length(n))
-    shortest = SHORTEST_BLOCK if body.lanes == 1 else SHORTEST_BLOCK_OF_LANES
+    few = body.lanes > 1 and n < FEWEST_OF_LARGE
+    shortest = SHORTEST_BLOCK_OF_LANES if few else SHORTEST_BLOCK
     for index, length in _blocks(tape, operands):
         if length >= shortest:
             line(operands[index]).copy(body, space.row(index), length)
