@@ -21,8 +21,8 @@ from armblocks.diagram.hierarchy import (
     diagram_views,
     flat_diagram,
     flatten_hierarchy,
-    levels_of,
 )
+from armblocks.diagram.levels import levels_of
 from armblocks.diagram.library import BlockLibrary
 from armblocks.diagram.mask import ParameterFormula, formula, mask_parameter
 from armblocks.diagram.model import sampling_of

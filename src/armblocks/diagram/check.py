@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from armblocks.diagram.diagram import Diagram
-from armblocks.diagram.hierarchy import check_connected, levels_of
+from armblocks.diagram.levels import check_connected, levels_of
 from armblocks.diagram.model import diagram_model
 from armblocks.diagram.structure import Inport, Outport, ends
 from armblocks.diagram.virtual_wiring import From, Goto

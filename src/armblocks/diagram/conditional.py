@@ -161,6 +161,9 @@ class Merge(Block):
             for number in range(1, self.inputs + 1)
         )
 
+    def bus_inputs(self) -> tuple[str, ...]:
+        return tuple(port.name for port in self.input_ports())
+
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the output of the subsystem that was active last"),)
 

@@ -24,7 +24,7 @@ import numpy as np
 from armblocks.diagram.block import Block
 from armblocks.diagram.diagram import Diagram
 from armblocks.diagram.function_content import UnknownContentError, function_parts
-from armblocks.diagram.hierarchy import levels_of
+from armblocks.diagram.levels import levels_of
 from armblocks.diagram.port import PortRef
 from armblocks.diagram.user_function import UserFunction
 

@@ -9,7 +9,8 @@ from casadi import SX, evalf
 
 from armblocks.diagram.block import Block
 from armblocks.diagram.diagram import Diagram
-from armblocks.diagram.hierarchy import flat_diagram, joined, levels_of
+from armblocks.diagram.hierarchy import flat_diagram
+from armblocks.diagram.levels import joined, levels_of
 from armblocks.diagram.mask import as_symbols, formula_names, formula_symbols
 from armblocks.diagram.parameter import Parameter, Value, shape_of
 from armblocks.diagram.structure import DiagramBlock

@@ -7,7 +7,7 @@ from collections.abc import Collection
 
 from armblocks.diagram import Bus, Diagram, PortRef, flatten_hierarchy, infer_shapes, infer_units
 from armblocks.diagram.check import check_diagram
-from armblocks.diagram.hierarchy import joined, levels_of
+from armblocks.diagram.levels import joined, levels_of
 from armblocks.errors import AlgebraicLoopError, ArmblocksError, DiagramError
 from armblocks.studio.protocol.messages.sheets import Finding, WireKind
 

@@ -1,0 +1,156 @@
+"""Pass: a block that passes signals on unchanged is copied for each signal of a bus.
+
+A Switch between two buses selects each pair of their signals; a Unit Delay delays each signal. The elements
+of a bus are propagated along the connections from Bus Creators; in a loop through a delay they come from the
+bus that enters the loop.
+
+Takes: blocks with ``bus_inputs`` that may receive buses; replacements for all virtual blocks.
+
+Gives: in place of each such block with a bus a copy for every signal, such as ``switch.motor.speed``. All
+copies share the parameters of the original (``Diagram.shares``). The original becomes virtual: each of its
+bus inputs selects the signals for the copies, each output is the bus of the copies' outputs.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+from armblocks.diagram.block import Block
+from armblocks.diagram.bus import Bus, Carried
+from armblocks.diagram.passes.contents import Contents
+from armblocks.diagram.passes.netlist import Netlist, Replacement, Replacements
+from armblocks.diagram.port import PortRef
+from armblocks.diagram.virtual_wiring import BusCreator
+from armblocks.errors import DiagramError
+
+
+def copy_for_buses(net: Netlist) -> Netlist:
+    """The netlist with a copy of every block with a bus for each signal of the bus.
+
+    The replacements of the originals raise ``DiagramError`` where the buses at two inputs differ.
+    """
+    if not any(isinstance(block, BusCreator) for block in net.blocks.values()):
+        return net
+    copied = _copied(net)
+    blocks = {path: block for path, block in net.blocks.items() if path not in copied}
+    drivers, gates = dict(net.drivers), dict(net.gates)
+    shares, origins = dict(net.shares), dict(net.origins)
+    for path, found in copied.items():
+        for element in found.elements:
+            copy = found.copy(element)
+            blocks[copy], shares[copy], origins[copy] = found.block, path, net.origins.get(path, path)
+            if path in net.gates:
+                gates[copy] = net.gates[path]
+            for port, source in found.sources.items():
+                alone = port in found.block.bus_inputs()
+                drivers[PortRef(copy, port)] = PortRef(path, f"{port}.{element}") if alone else source
+    blocks |= {path: found.block for path, found in copied.items()}
+    resolved = net.with_replaced({path: found.replacements() for path, found in copied.items()})
+    return dataclasses.replace(
+        resolved, blocks=blocks, drivers=drivers, gates=gates, shares=shares, origins=origins
+    )
+
+
+def _copied(net: Netlist) -> dict[str, _CopiedBlock]:
+    """All blocks with a bus input that are copied for each signal."""
+    found: dict[str, _CopiedBlock] = {}
+    replaced = dict(net.replaced)
+    contents = Contents(replaced, net.where)
+    waiting = {path: block for path, block in net.blocks.items() if block.bus_inputs()}
+    sources: dict[str, dict[str, PortRef]] = {path: {} for path in waiting}
+    for target, source in net.drivers.items():
+        if target.block in sources:
+            sources[target.block][target.port] = source
+    progress = True
+    while progress and waiting:
+        progress = False
+        for path, block in list(waiting.items()):
+            for port in block.bus_inputs():
+                try:
+                    carried = contents.of(sources[path][port])
+                except DiagramError:
+                    continue  # raised later, if still true when all buses are known
+                if isinstance(carried, Bus):
+                    found[path] = _CopiedBlock(
+                        path=path, block=block, given=port, structure=carried, sources=sources[path]
+                    )
+                    replaced[path] = found[path].replacements()
+                    # Earlier results may refer to the original block.
+                    contents = Contents(replaced, net.where)
+                    del waiting[path]
+                    progress = True
+                    break
+    return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class _CopiedBlock:
+    """A block with bus inputs, and the paths of the signals, in the order of its first bus input."""
+
+    path: str
+    block: Block
+    given: str
+    """The input that determines the elements."""
+    structure: Bus
+    """The bus at this input."""
+    sources: dict[str, PortRef]
+    """The driver of every input."""
+
+    @property
+    def elements(self) -> tuple[str, ...]:
+        """Paths of all signals."""
+        return tuple(path for path, _ in self.structure.leaves())
+
+    def copy(self, element: str) -> str:
+        """The path of the copy for one signal."""
+        return f"{self.path}.{element}"
+
+    def replacements(self) -> Replacements:
+        """The buses of the copies' outputs, and the signals of the bus inputs, ``input.element``."""
+        outputs = self.block.output_ports()
+        found = {port.name: Replacement((), self._joined(port.name)) for port in outputs}
+        for port in self.block.bus_inputs():
+            for element in self.elements:
+                selected = self._selected(port, element)
+                found[f"{port}.{element}"] = Replacement((self.sources[port],), selected)
+        return found
+
+    def _joined(self, port: str) -> Callable[[Sequence[Carried]], Carried]:
+        """The bus at an output: the outputs of the copies, in the structure of the input bus."""
+        bus = _renamed(self.structure, "", lambda element: PortRef(self.copy(element), port))
+        return lambda _: bus
+
+    def _selected(self, port: str, element: str) -> Callable[[Sequence[Carried]], Carried]:
+        return lambda given: self._element(port, given[0], element)
+
+    def _element(self, port: str, carried: Carried, element: str) -> Carried:
+        """The signal at an input of a copy. Raises ``DiagramError`` where the input buses differ."""
+        if isinstance(carried, Bus):
+            there = {path for path, _ in carried.leaves()}
+            found = carried.element(element)
+            if there == set(self.elements) and found is not None:
+                return found
+            said = f"a bus with {_listed(path for path, _ in carried.leaves())}"
+        else:
+            said = f"the single signal '{carried}'"
+        raise DiagramError(
+            f"input '{self.given}' is a bus with {_listed(self.elements)}, but input '{port}' is {said}",
+            where=f"block '{self.path}' ({self.block.title})",
+            allowed="buses with the same names of elements at all of these inputs",
+            fix="make them alike with Bus Creators, or take single signals with Bus Selectors",
+        )
+
+
+def _renamed(bus: Bus, above: str, source: Callable[[str], PortRef]) -> Bus:
+    elements: dict[str, Carried] = {}
+    for name, carried in bus.elements.items():
+        path = f"{above}{name}"
+        inner = isinstance(carried, Bus)
+        elements[name] = _renamed(carried, f"{path}.", source) if inner else source(path)
+    return Bus(elements)
+
+
+def _listed(paths: Iterable[str]) -> str:
+    return ", ".join(paths)

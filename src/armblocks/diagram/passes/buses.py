@@ -1,0 +1,83 @@
+"""Pass: Bus Creators, Bus Selectors and Bus Assignments are replaced by what they carry.
+
+Takes: bus blocks.
+
+Gives: replacements of their outputs: buses, elements of buses, and buses with other elements.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from armblocks.diagram.bus import Bus, Carried
+from armblocks.diagram.passes.netlist import Netlist, Replacement, Replacements
+from armblocks.diagram.port import PortRef
+from armblocks.diagram.virtual_wiring import BusAssignment, BusCreator, BusSelector, listed
+from armblocks.errors import DiagramError, UnknownNameError
+
+
+def resolve_buses(net: Netlist) -> Netlist:
+    """The netlist with replacements for all bus blocks.
+
+    The contents of the replacements raise ``DiagramError`` for a single signal in place of a bus, and
+    ``UnknownNameError`` for an element that the bus does not have.
+    """
+    replaced: dict[str, Replacements] = {}
+    for path, block in net.blocks.items():
+        match block:
+            case BusCreator():
+                contents = {"bus": _creation(block)}
+            case BusSelector():
+                where = net.label(path)
+                names = (port.name for port in block.output_ports())
+                contents = {
+                    name: _selection(where, wanted) for name, wanted in zip(names, listed(block.elements))
+                }
+            case BusAssignment():
+                contents = {"bus": _assignment(net.label(path), listed(block.elements))}
+            case _:
+                continue
+        sources = tuple(net.drivers[PortRef(path, port.name)] for port in block.input_ports())
+        replaced[path] = {port: Replacement(sources, content) for port, content in contents.items()}
+    return net.with_replaced(replaced)
+
+
+_Content = Callable[[Sequence[Carried]], Carried]
+
+
+def _creation(block: BusCreator) -> _Content:
+    names = listed(block.names)
+    return lambda given: Bus(dict(zip(names, given)))
+
+
+def _selection(where: str, wanted: str) -> _Content:
+    return lambda given: _element(_bus(given[0], where), wanted, where)
+
+
+def _assignment(where: str, paths: Sequence[str]) -> _Content:
+    def content(given: Sequence[Carried]) -> Bus:
+        bus = _bus(given[0], where)
+        for path, carried in zip(paths, given[1:]):
+            _element(bus, path, where)
+            bus = bus.replaced(path, carried)
+        return bus
+
+    return content
+
+
+def _bus(carried: Carried, where: str) -> Bus:
+    if isinstance(carried, Bus):
+        return carried
+    raise DiagramError(
+        f"the input 'bus' is the single signal '{carried}'",
+        where=where,
+        allowed="a bus",
+        fix="connect a Bus Creator",
+    )
+
+
+def _element(bus: Bus, element: str, where: str) -> Carried:
+    found = bus.element(element)
+    if found is None:
+        raise UnknownNameError("bus element", element, bus.paths(), where=where)
+    return found

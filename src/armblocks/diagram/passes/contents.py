@@ -1,0 +1,49 @@
+"""What output ports carry: replacements are followed back to the blocks that compute signals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from armblocks.diagram.bus import Carried
+from armblocks.diagram.passes.netlist import Replacements
+from armblocks.diagram.port import PortRef
+from armblocks.errors import DiagramError
+
+
+class Contents:
+    """Finds the signal or bus at output ports; ``carried`` caches the results."""
+
+    def __init__(self, replaced: Mapping[str, Replacements], where: str) -> None:
+        self._replaced = replaced
+        self._where = where
+        self.carried: dict[PortRef, Carried] = {}
+
+    def of(self, ref: PortRef) -> Carried:
+        """The signal or bus at an output port; uses an explicit stack, so that paths may be long.
+
+        Raises ``DiagramError`` where replacements form a cycle, and what their contents raise.
+        """
+        way = {ref: None}
+        while way:
+            last = next(reversed(way))
+            if last in self.carried:
+                del way[last]
+                continue
+            if last.block not in self._replaced:
+                self.carried[last] = last
+                continue
+            entry = self._replaced[last.block][last.port]
+            missing = next((source for source in entry.sources if source not in self.carried), None)
+            if missing is None:
+                self.carried[last] = entry.content([self.carried[source] for source in entry.sources])
+            elif missing in way:
+                loop = [str(port) for port in way][list(way).index(missing) :][::-1]
+                raise DiagramError(
+                    f"connections form a cycle without a block that computes a signal: {' -> '.join(loop)}",
+                    where=self._where,
+                    allowed="each connection starts at a block that computes a signal",
+                    fix="remove one of these connections",
+                )
+            else:
+                way[missing] = None
+        return self.carried[ref]

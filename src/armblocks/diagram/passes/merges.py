@@ -1,0 +1,52 @@
+"""Pass: Merge blocks become blocks that follow the outputs of conditional subsystems.
+
+Takes: Merge blocks whose inputs are held outputs of conditional subsystems.
+
+Gives: ``MergedOutput`` blocks without a gate; their inputs ``works1``, ``works2`` and so on tell which of the
+subsystems are active.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+from armblocks.diagram.block import Block
+from armblocks.diagram.conditional import Merge
+from armblocks.diagram.conditional_equations import RESTART
+from armblocks.diagram.controls import HeldOutput, MergedOutput
+from armblocks.diagram.diagram import Gate
+from armblocks.diagram.passes.netlist import Netlist
+from armblocks.diagram.port import PortRef
+from armblocks.errors import DiagramError
+
+
+def resolve_merges(net: Netlist) -> Netlist:
+    """The netlist without Merge blocks. Raises ``DiagramError`` for an input that is not a held output."""
+    merges = {path: block for path, block in net.remaining().items() if isinstance(block, Merge)}
+    if not merges:
+        return net
+    blocks: dict[str, Block] = dict(net.blocks)
+    drivers, gates = dict(net.drivers), dict(net.gates)
+    for path, block in merges.items():
+        outer: Gate = gates.pop(path, {})
+        anew = RESTART in outer
+        blocks[path] = MergedOutput(anew=anew, inputs=block.inputs, initial=block.initial)
+        if anew:
+            drivers[PortRef(path, "anew")] = outer[RESTART]
+        for number in range(1, block.inputs + 1):
+            drivers[PortRef(path, f"works{number}")] = _works(net, path, f"u{number}")
+    return dataclasses.replace(net, blocks=blocks, drivers=drivers, gates=gates)
+
+
+def _works(net: Netlist, path: str, port: str) -> PortRef:
+    """The signal that tells whether the subsystem of an input is active."""
+    carried = net.at(path, port)
+    if isinstance(carried, PortRef) and isinstance(net.blocks[carried.block], HeldOutput):
+        return net.drivers[PortRef(carried.block, "works")]
+    source = f"'{carried}'" if isinstance(carried, PortRef) else "a bus"
+    raise DiagramError(
+        f"input '{port}' is {source}, which is not an output of a conditional subsystem",
+        where=f"block '{path}' (Merge)",
+        allowed="outputs of enabled, triggered and action subsystems",
+        fix="use a Switch, or put the signal's block into a conditional subsystem",
+    )

@@ -1,0 +1,64 @@
+"""Pass: the names that signals have in the hierarchy, and the shapes that it declares for them.
+
+Takes: what every port carries.
+
+Gives: other names of signals (``Netlist.aliases``): input ports, ports of virtual blocks, elements of buses;
+and the signals at In and Out blocks with a declared shape (``Netlist.stated``).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+from armblocks.diagram.bus import Carried
+from armblocks.diagram.levels import level_of, name_of
+from armblocks.diagram.passes.netlist import Netlist
+from armblocks.diagram.port import PortRef
+from armblocks.diagram.structure import Inport, Outport, stated_shape
+from armblocks.equations import Shape
+
+
+def resolve_names(net: Netlist) -> Netlist:
+    """The netlist with the names and declared shapes of signals.
+
+    Raises ``DiagramError`` for a bus at an In or Out block with a declared shape.
+    """
+    return dataclasses.replace(net, aliases=_aliases(net), stated=_stated(net))
+
+
+def _aliases(net: Netlist) -> dict[str, PortRef]:
+    aliases: dict[str, PortRef] = {}
+
+    def add(name: str, carried: Carried) -> None:
+        if isinstance(carried, PortRef):
+            aliases[name] = carried
+        else:
+            aliases.update({f"{name}.{path}": source for path, source in carried.leaves()})
+
+    for path, block in net.blocks.items():
+        for port in block.input_ports():
+            add(f"{path}/{port.name}", net.at(path, port.name))
+        outputs = block.output_ports()
+        if path not in net.replaced:
+            continue
+        for port in outputs:
+            add(f"{path}/{port.name}", net.carried[PortRef(path, port.name)])
+        if len(outputs) == 1:
+            add(path, net.carried[PortRef(path, outputs[0].name)])
+    for path, block in net.blocks.items():
+        if isinstance(block, Outport):
+            add(path, net.at(path, "u"))
+    return aliases
+
+
+def _stated(net: Netlist) -> dict[PortRef, tuple[PortRef, Shape]]:
+    stated: dict[PortRef, tuple[PortRef, Shape]] = {}
+    for path, block in net.blocks.items():
+        if path not in net.replaced or not isinstance(block, Inport | Outport):
+            continue
+        shape = stated_shape(block)
+        if shape is not None:
+            inside = isinstance(block, Inport)
+            target = PortRef(level_of(path), name_of(path)) if inside else PortRef(path, "u")
+            stated[target] = (net.one_signal(target.block, target.port), shape)
+    return stated

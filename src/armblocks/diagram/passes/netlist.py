@@ -1,0 +1,127 @@
+"""The netlist: all blocks of a hierarchy and the connections of their ports, the form that passes transform.
+
+A netlist begins as a copy of the hierarchy: the blocks of all levels by path, virtual ones included, and the
+connections of all levels. A pass resolves one kind of virtual block: it gives a *replacement* for each output
+port of such a block, which says what the port carries. The last pass removes all replaced blocks.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from armblocks.diagram.block import Block
+from armblocks.diagram.bus import Carried
+from armblocks.diagram.diagram import Diagram, Gate
+from armblocks.diagram.levels import joined
+from armblocks.diagram.port import PortRef, View
+from armblocks.equations import Shape
+from armblocks.errors import DiagramError
+
+
+def _first(given: Sequence[Carried]) -> Carried:
+    return given[0]
+
+
+@dataclass(frozen=True)
+class Replacement:
+    """What an output port of a virtual block carries.
+
+    ``sources`` are output ports; ``content`` computes a signal or bus from what these carry. By default it is
+    that of the first one.
+    """
+
+    sources: tuple[PortRef, ...]
+    content: Callable[[Sequence[Carried]], Carried] = _first
+
+
+Replacements = Mapping[str, Replacement]
+"""The replacements of the output ports of a virtual block."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Netlist:
+    """Blocks by path and their connections, in any state between the hierarchy and the flat diagram.
+
+    Paths are those of the user's hierarchy. A block that a pass adds is named after the block that it comes
+    from, and ``origins`` names that one.
+    """
+
+    top: Diagram
+    levels: Mapping[str, Diagram]
+    """The diagram of every subsystem by its path, with ``""`` for the top."""
+    blocks: Mapping[str, Block]
+    """Every block by path, level by level, and then the blocks that passes have added."""
+    drivers: Mapping[PortRef, PortRef]
+    """The output port that is connected to each input port."""
+    replaced: Mapping[str, Replacements] = field(default_factory=dict[str, Replacements])
+    """The blocks that the last pass removes, by path, with what their output ports carry."""
+    gates: Mapping[str, Gate] = field(default_factory=dict[str, Gate])
+    """Hidden inputs of blocks in conditional subsystems: see ``Diagram.gates``."""
+    shares: Mapping[str, str] = field(default_factory=dict[str, str])
+    """Blocks that share the parameters of another one: see ``Diagram.shares``."""
+    origins: Mapping[str, str] = field(default_factory=dict[str, str])
+    """For every block that a pass has added, the path of the block of the hierarchy that it comes from."""
+    carried: Mapping[PortRef, Carried] = field(default_factory=dict[PortRef, Carried])
+    """The signal or bus at every output port; empty before the pass ``signals``."""
+    views: tuple[tuple[str, View], ...] = ()
+    """The views, each with its block; empty before the pass ``displays``."""
+    aliases: Mapping[str, PortRef] = field(default_factory=dict[str, PortRef])
+    """Other names of signals; empty before the pass ``names``."""
+    stated: Mapping[PortRef, tuple[PortRef, Shape]] = field(
+        default_factory=dict[PortRef, tuple[PortRef, Shape]]
+    )
+    """Signals at ports with a declared shape; empty before the pass ``names``."""
+
+    @property
+    def where(self) -> str:
+        """The diagram, for messages."""
+        return f"diagram '{self.top.name}'"
+
+    def remaining(self) -> dict[str, Block]:
+        """The blocks that are not replaced."""
+        return {path: block for path, block in self.blocks.items() if path not in self.replaced}
+
+    def outputs(self) -> list[PortRef]:
+        """The output ports of all blocks."""
+        return [
+            PortRef(path, port.name) for path, block in self.blocks.items() for port in block.output_ports()
+        ]
+
+    def label(self, path: str) -> str:
+        """A block, for messages."""
+        return f"block '{path}' ({self.blocks[path].title})"
+
+    def with_replaced(self, more: Mapping[str, Replacements]) -> Netlist:
+        """A netlist in which these blocks are replaced, too."""
+        return dataclasses.replace(self, replaced={**self.replaced, **more})
+
+    def at(self, path: str, port: str) -> Carried:
+        """The signal or bus at an input port, after the pass ``signals``."""
+        return self.carried[self.drivers[PortRef(path, port)]]
+
+    def one_signal(self, path: str, port: str) -> PortRef:
+        """The signal at an input port, after the pass ``signals``. Raises ``DiagramError`` for a bus."""
+        carried = self.at(path, port)
+        if isinstance(carried, PortRef):
+            return carried
+        raise DiagramError(
+            f"input '{port}' receives a bus with the elements {', '.join(carried.elements)}",
+            where=self.label(path),
+            allowed="a single signal",
+            fix="put a Bus Selector in between",
+        )
+
+
+def netlist(levels: Mapping[str, Diagram]) -> Netlist:
+    """The netlist of a hierarchy before all passes; ``levels`` has the top first."""
+    blocks: dict[str, Block] = {}
+    drivers: dict[PortRef, PortRef] = {}
+    for level, diagram in levels.items():
+        for name, block in diagram.blocks.items():
+            blocks[joined(level, name)] = block
+        for wire in diagram.connections:
+            source = PortRef(joined(level, wire.source.block), wire.source.port)
+            drivers[PortRef(joined(level, wire.target.block), wire.target.port)] = source
+    return Netlist(top=levels[""], levels=levels, blocks=blocks, drivers=drivers)

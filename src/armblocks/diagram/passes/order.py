@@ -1,0 +1,45 @@
+"""The passes that make a hierarchy flat, in their order.
+
+A pass is a function from a :class:`~armblocks.diagram.passes.netlist.Netlist` to a netlist, in a file of its
+own, whose docstring says what the pass takes and what it gives. A new pass is such a file and a line here.
+Each kind of virtual block is resolved by one pass, which gives replacements for its output ports. A pass that
+reads signals comes after ``resolve_signals``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from armblocks.diagram.diagram import Diagram
+from armblocks.diagram.passes.bus_copies import copy_for_buses
+from armblocks.diagram.passes.buses import resolve_buses
+from armblocks.diagram.passes.conditional_subsystems import resolve_conditional_subsystems
+from armblocks.diagram.passes.displays import resolve_displays
+from armblocks.diagram.passes.merges import resolve_merges
+from armblocks.diagram.passes.names import resolve_names
+from armblocks.diagram.passes.netlist import Netlist, netlist
+from armblocks.diagram.passes.signals import resolve_signals
+from armblocks.diagram.passes.subsystems import resolve_subsystems
+from armblocks.diagram.passes.tags import resolve_tags
+from armblocks.diagram.passes.virtual_blocks import remove_virtual_blocks
+
+PASSES: tuple[Callable[[Netlist], Netlist], ...] = (
+    resolve_conditional_subsystems,
+    resolve_subsystems,
+    resolve_tags,
+    resolve_buses,
+    copy_for_buses,
+    resolve_signals,
+    resolve_merges,
+    resolve_displays,
+    resolve_names,
+    remove_virtual_blocks,
+)
+
+
+def flat_netlist(levels: Mapping[str, Diagram]) -> Netlist:
+    """The netlist of a hierarchy after all passes. Raises ``DiagramError``."""
+    net = netlist(levels)
+    for resolve in PASSES:
+        net = resolve(net)
+    return net

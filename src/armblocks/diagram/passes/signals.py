@@ -1,0 +1,30 @@
+"""Pass: what every port carries.
+
+Takes: replacements for the output ports of all virtual blocks.
+
+Gives: the signal or bus at every output port (``Netlist.carried``); and every input port with a single signal
+driven by the block that computes it. A port with a bus is driven by the virtual block that makes the bus.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+from armblocks.diagram.passes.contents import Contents
+from armblocks.diagram.passes.netlist import Netlist
+from armblocks.diagram.port import PortRef
+
+
+def resolve_signals(net: Netlist) -> Netlist:
+    """The netlist with the contents of all replacements.
+
+    Raises ``DiagramError`` for connections in a cycle without a block that computes a signal, and what the
+    contents of replacements raise.
+    """
+    contents = Contents(net.replaced, net.where)
+    carried = {ref: contents.of(ref) for ref in net.outputs()}
+    drivers: dict[PortRef, PortRef] = {}
+    for target, source in net.drivers.items():
+        found = contents.of(source)
+        drivers[target] = found if isinstance(found, PortRef) else source
+    return dataclasses.replace(net, carried=carried, drivers=drivers)

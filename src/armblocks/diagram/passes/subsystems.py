@@ -1,0 +1,34 @@
+"""Pass: subsystems and their In and Out blocks are replaced by connections.
+
+Takes: subsystems, In and Out blocks; conditional subsystems have held outputs in place of their Out blocks.
+
+Gives: replacements: an In block carries what drives the subsystem's input; an output of a subsystem carries
+what its Out block receives, or the held output.
+"""
+
+from __future__ import annotations
+
+from armblocks.diagram.levels import joined, level_of, name_of
+from armblocks.diagram.passes.netlist import Netlist, Replacement, Replacements
+from armblocks.diagram.port import PortRef
+from armblocks.diagram.structure import DiagramBlock, Inport, Outport
+
+
+def resolve_subsystems(net: Netlist) -> Netlist:
+    """The netlist with replacements for all subsystems and their ends; those of the top level stay."""
+    replaced: dict[str, Replacements] = {}
+    for path, block in net.blocks.items():
+        level = level_of(path)
+        if isinstance(block, DiagramBlock):
+            replaced[path] = {port.name: _output(net, path, port.name) for port in block.output_ports()}
+        elif level and isinstance(block, Inport):
+            replaced[path] = {"y": Replacement((net.drivers[PortRef(level, name_of(path))],))}
+        elif level and isinstance(block, Outport):
+            replaced[path] = {}
+    return net.with_replaced(replaced)
+
+
+def _output(net: Netlist, subsystem: str, port: str) -> Replacement:
+    end = joined(subsystem, port)
+    source = net.drivers[PortRef(end, "u")] if isinstance(net.blocks[end], Outport) else PortRef(end, "y")
+    return Replacement((source,))
