@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
 from armblocks.diagram import Bus, Diagram, PortRef, flatten_hierarchy, infer_shapes, infer_units
 from armblocks.diagram.check import check_diagram
@@ -19,7 +19,7 @@ def check(diagram: Diagram) -> tuple[list[Finding], dict[str, WireKind]]:
     try:
         levels = levels_of(diagram)
     except DiagramError as error:
-        return _findings(error, ()), {}
+        return _findings(error, (), {}), {}
     open_inputs = [
         (joined(path, name), port.name)
         for path, level in levels.items()
@@ -35,7 +35,7 @@ def check(diagram: Diagram) -> tuple[list[Finding], dict[str, WireKind]]:
         wires = _wires(diagram)
         check_diagram(diagram)
     except ArmblocksError as error:
-        return _findings(error, known), {}
+        return _findings(error, known, _origins(diagram)), {}
     return [], wires
 
 
@@ -66,12 +66,25 @@ def _wires(diagram: Diagram) -> dict[str, WireKind]:
     return named
 
 
-def _findings(error: ArmblocksError, known: Collection[str]) -> list[Finding]:
-    """One finding at every block that a message names, so that each can be marked."""
+def _origins(diagram: Diagram) -> Mapping[str, str]:
+    """The user's blocks behind the blocks that flattening adds; empty where it fails."""
+    try:
+        return flatten_hierarchy(diagram).origins
+    except ArmblocksError:
+        return {}
+
+
+def _findings(error: ArmblocksError, known: Collection[str], origins: Mapping[str, str]) -> list[Finding]:
+    """One finding at every block that a message names, so that each can be marked.
+
+    A copy of a block for a signal of a bus, and the control of a conditional subsystem, mark the block of the
+    sheet that they come from.
+    """
     blocks: list[str] = []
     if isinstance(error, AlgebraicLoopError):
         blocks = [ref.rpartition("/")[0] for ref in error.loop]
     elif isinstance(error, DiagramError):
         blocks = _QUOTED.findall(f"{error.where} {error.what}")
-    marked = [name for name in dict.fromkeys(blocks) if name in known] or [""]
+    shown = dict.fromkeys(origins.get(name, name) for name in blocks)
+    marked = [name for name in shown if name in known] or [""]
     return [Finding(severity="error", block=name, port="", what=error.what, fix=error.fix) for name in marked]
