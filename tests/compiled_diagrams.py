@@ -1,4 +1,4 @@
-"""The system of a diagram, compiled once for tests that run the same diagram by several methods."""
+"""Compiled systems of diagrams, cached for tests that run one diagram with several methods."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from armblocks.diagram import Diagram, content_key, trace_diagram
 from armblocks.integration.system import CompiledSystem, compile_system
 
 MOST = 32
-"""Systems that are kept: variants of a test follow one another."""
+"""Number of cached systems; the variants of one test run one after another."""
 _KEPT: dict[str, CompiledSystem] = {}
 
 
 def compiled(diagram: Diagram) -> CompiledSystem:
-    """The system of a diagram: the same one for diagrams of the same content."""
+    """Return the compiled system of a diagram, cached by the content of the diagram."""
     key = content_key(diagram)
     if key is None:
         return compile_system(trace_diagram(diagram))

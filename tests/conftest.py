@@ -21,35 +21,35 @@ FULL_EFFORT = (
     "simulation/test_hybrid_simulation.py",
     "simulation/test_tableaux.py",
 )
-"""Folders and files of tests that compile as users do: their laws are about the compiled code."""
+"""Folders and files of tests that compile with full effort, as users do: they test the compiled code."""
 ALLOCATIONS_BEFORE_COLLECTION = 10_000
-"""With Python's own 700, the collector takes a tenth of the tests' time: diagrams are many small objects."""
+"""With Python's default of 700, garbage collection takes a tenth of the test time."""
 
-# The same examples in every run, however long one takes on a busy machine.
+# The same examples in every run, without a deadline that a busy machine could exceed.
 settings.register_profile("seeded", derandomize=True, deadline=None, database=None)
 settings.load_profile("seeded")
 
 
 def pytest_sessionstart() -> None:
-    """Modules and tests that are collected stay: a search for garbage among them finds none."""
+    """Disable garbage collection while pytest collects: modules and tests stay in memory."""
     gc.disable()
 
 
 def pytest_collection_finish() -> None:
-    """What has been collected is no garbage for the rest of the session."""
+    """Exclude the collected modules and tests from garbage collection for the rest of the session."""
     gc.freeze()
     gc.set_threshold(ALLOCATIONS_BEFORE_COLLECTION)
     gc.enable()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Journeys in a browser come first: they are the longest, and would be waited for at the end."""
+    """Run the browser tests first: they take longest, and at the end the other workers would be idle."""
     items.sort(key=lambda item: "browser" not in getattr(item, "fixturenames", ()))
 
 
 @pytest.fixture(params=LAW_ROBOTS.values(), ids=list(LAW_ROBOTS))
 def robot(request: pytest.FixtureRequest) -> Robot:
-    """Each robot of the law tests in turn: every shipped one, and random trees."""
+    """Every shipped robot, and random trees."""
     return request.param
 
 
@@ -67,10 +67,10 @@ def kr180() -> Robot:
 
 @pytest.fixture(autouse=True, scope="module")
 def effort(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Most tests compile what they then run for milliseconds: they need little effort of the compiler.
+    """Compile with little optimisation: most tests run the compiled code for milliseconds only.
 
-    That the bits are the same is shown by laws of their own. With ``ARMBLOCKS_EFFORT=full`` all tests compile
-    as users do.
+    Other tests show that the effort does not change the results. With ``ARMBLOCKS_EFFORT=full`` all tests
+    compile as users do.
     """
     asked = os.environ.get("ARMBLOCKS_EFFORT", "little")
     full = any(request.path.is_relative_to(TESTS / place) for place in FULL_EFFORT)
@@ -80,8 +80,8 @@ def effort(request: pytest.FixtureRequest) -> Iterator[None]:
 
 
 @pytest.fixture(autouse=True, scope="session")
-def state_of_nobody(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """What the studio keeps for its user lies in a folder of the tests, never in the user's own."""
+def separate_user_state(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """The studio keeps the user's state in a temporary folder, not in the folder of the user."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
         yield

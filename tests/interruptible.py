@@ -1,4 +1,4 @@
-"""Processes that end on Ctrl-C, however the tests themselves were started."""
+"""Processes that end on Ctrl-C, independent of how the tests were started."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from typing import Any
 def start_interruptible(command: Sequence[str], **options: Any) -> subprocess.Popen[str]:
     """Start a process with text pipes in which SIGINT has its default action.
 
-    A program inherits an ignored SIGINT, and keeps it: ``nohup pytest &`` in a script starts the tests so
-    (POSIX.1-2017, Shell Command Language, 2.11), and the processes that they start would not end on Ctrl-C.
+    A child process inherits an ignored SIGINT. A shell script that runs ``nohup pytest &`` starts the tests
+    with SIGINT ignored (POSIX.1-2017, Shell Command Language, 2.11), and their child processes would not end
+    on Ctrl-C.
     """
     before = signal.getsignal(signal.SIGINT)
     if before is signal.SIG_IGN:
@@ -27,7 +28,7 @@ def start_interruptible(command: Sequence[str], **options: Any) -> subprocess.Po
 
 @contextmanager
 def killed_at_the_end(process: subprocess.Popen[str]) -> Iterator[subprocess.Popen[str]]:
-    """Leave no process and no open pipe behind, also where a test fails: they would fail a later one."""
+    """End the process and close its pipes, also after a failed test: otherwise a later test could fail."""
     with process:
         try:
             yield process

@@ -1,4 +1,4 @@
-"""Robots for the law tests: the published ones written out here, and random trees of every joint type."""
+"""Robots for tests of physical laws: published robots, and random trees with every joint type."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from armblocks.spatial import Transform, rotation_about
 
 
 def build_puma560() -> Robot:
-    """Corke's set of 8/95, as the toolbox ships it (d1 = 0.67183)."""
+    """Corke's parameters of 8/95, as the Robotics Toolbox ships them (d1 = 0.67183)."""
     alpha = (pi / 2, 0, -pi / 2, pi / 2, -pi / 2, 0)
     a = (0, 0.4318, 0.0203, 0, 0, 0)
     d = (0.67183, 0, 0.15005, 0.4318, 0, 0)
@@ -76,7 +76,7 @@ def build_puma560() -> Robot:
 
 
 def build_kr180() -> Robot:
-    """The paper's palletising arm, exactly as printed."""
+    """The palletising arm of the paper, with the printed parameters."""
     alpha = (pi / 2, 0, pi / 2, 0)
     a = (0.35, 0, 1.6, 0)
     d = (0.75, 1.25, 0, 2.6)
@@ -139,7 +139,7 @@ def random_transform(random: np.random.Generator) -> Transform:
 
 
 def random_inertia(random: np.random.Generator) -> np.ndarray:
-    """The inertia of a cloud of points: physical by construction."""
+    """Return the inertia of random point masses, which is always physically consistent."""
     points = random.normal(size=(6, 3)) * 0.2
     points -= points.mean(axis=0)
     scatter = points.T @ points / 6
@@ -147,8 +147,8 @@ def random_inertia(random: np.random.Generator) -> np.ndarray:
 
 
 def build_random_tree(seed: int, count: int = 7, *, chain: bool = False) -> Robot:
-    """A tree (or chain) of ``count`` links: revolute, prismatic and fixed joints about any axes, a turned
-    base, a tool, motors, listed in an order that does not follow the tree.
+    """Return a tree or chain of ``count`` links with joints of all types about random axes, a rotated base, a
+    tool and motors. The links are listed in random order.
     """
     random = np.random.default_rng(seed)
     links: list[Link] = []
@@ -202,10 +202,10 @@ RANDOM_ROBOTS: tuple[Robot, ...] = (
 LAW_ROBOTS: dict[str, Robot] = {
     robot.name: robot for robot in (*(shipped_robot(name) for name in list_robots()), *RANDOM_ROBOTS)
 }
-"""Every robot that the laws are checked on: all that are shipped, and random trees."""
+"""Robots for tests of physical laws: all shipped robots, and random trees."""
 
 SOLID_ROBOTS: dict[str, Robot] = {robot.name: robot for robot in RANDOM_ROBOTS}
-"""Those whose inertias are all physical."""
+"""The robots of LAW_ROBOTS whose inertias are all physically consistent."""
 
 
 @cache
@@ -215,13 +215,13 @@ def _function(robot: Robot, name: str) -> tuple[Function, tuple[int, ...]]:
 
 
 def evaluate(robot: Robot, name: str, *values: ArrayLike) -> np.ndarray:
-    """One of TRACES at one state, through CasADi's interpreter; traced once a robot and name."""
+    """Evaluate one function of TRACES with CasADi's interpreter; each is traced once per robot."""
     function, shape = _function(robot, name)
     return np.asarray(function(*(np.asarray(value, dtype=float).ravel() for value in values))).reshape(shape)
 
 
 def random_states(robot: Robot, count: int = 4, seed: int = 7) -> list[tuple[np.ndarray, ...]]:
-    """Joint positions, rates, accelerations or torques: ``count`` triples of (n,)."""
+    """Return ``count`` triples of (n,): joint positions, speeds, and accelerations or torques."""
     random = np.random.default_rng(seed)
     scales = (np.pi, 2.0, 5.0)
     return [tuple(random.uniform(-s, s, robot.n) for s in scales) for _ in range(count)]

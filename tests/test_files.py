@@ -16,10 +16,10 @@ def test_written_bytes_are_read_back(tmp_path: Path) -> None:
     write_atomically(path, b"one")
     write_atomically(path, b"two")
     assert read_bounded(path, 3) == b"two"
-    assert [entry.name for entry in tmp_path.iterdir()] == ["model.json"], "no temporary file stays"
+    assert [entry.name for entry in tmp_path.iterdir()] == ["model.json"], "a temporary file remains"
 
 
-def test_bytes_reach_the_disk_before_the_name_moves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_is_synchronised_before_it_is_renamed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[str] = []
     real_sync, real_replace = os.fsync, Path.replace
 
@@ -39,7 +39,7 @@ def test_bytes_reach_the_disk_before_the_name_moves(tmp_path: Path, monkeypatch:
 
 
 @pytest.mark.parametrize("failing", ["fsync", "open"])
-def test_old_file_survives_a_failing_disk(
+def test_a_failed_write_leaves_the_old_file_unchanged(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failing: str
 ) -> None:
     path = tmp_path / "a.json"
@@ -57,7 +57,7 @@ def test_old_file_survives_a_failing_disk(
 
 
 @pytest.mark.skipif(os.name == "nt", reason="POSIX permissions and links")
-def test_permissions_and_links_are_kept(tmp_path: Path) -> None:
+def test_a_write_keeps_permissions_and_links(tmp_path: Path) -> None:
     real, link = tmp_path / "real.json", tmp_path / "link.json"
     real.write_bytes(b"old")
     real.chmod(0o640)
@@ -68,38 +68,38 @@ def test_permissions_and_links_are_kept(tmp_path: Path) -> None:
     assert real.stat().st_mode & 0o777 == 0o640
 
 
-def test_missing_folder_is_named(tmp_path: Path) -> None:
+def test_a_missing_folder_raises_an_error_that_names_it(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match=r"the folder '.*nowhere' does not exist.*Fix: create the folder"):
         write_atomically(tmp_path / "nowhere" / "a.json", b"")
 
 
-def test_folder_in_the_files_place_is_refused(tmp_path: Path) -> None:
+def test_writing_to_the_path_of_a_folder_is_refused(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match="the path is an existing folder"):
         write_atomically(tmp_path, b"")
 
 
-def test_nul_in_a_path_is_refused() -> None:
+def test_a_path_with_a_nul_character_is_refused() -> None:
     with pytest.raises(FormatError, match="the path holds a NUL character"):
         write_atomically("a\0b", b"")
 
 
-def test_missing_file_is_said(tmp_path: Path) -> None:
+def test_a_missing_file_raises_an_error_that_names_it(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match=r"a\.json: there is no such file"):
         read_bounded(tmp_path / "a.json", 10)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows refuses folders with a permission error")
-def test_folder_is_not_a_file(tmp_path: Path) -> None:
+def test_reading_a_folder_is_refused(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match="this is a folder"):
         read_bounded(tmp_path, 10)
 
 
-def test_unreadable_path_is_said(tmp_path: Path) -> None:
+def test_an_unreadable_path_is_refused(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match="the file cannot be read"):
         read_bounded(f"{tmp_path}/a\0b", 10)
 
 
-def test_oversized_file_is_refused(tmp_path: Path) -> None:
+def test_a_file_above_the_size_limit_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a").write_bytes(b"12345")
     with pytest.raises(FormatError, match=r"too large.*Allowed: at most 4 bytes"):
         read_bounded(tmp_path / "a", 4)

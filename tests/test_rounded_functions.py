@@ -1,4 +1,4 @@
-"""Functions of constants: correctly rounded, and so the same on every machine."""
+"""Functions of constants are correctly rounded, and thus have the same value on every machine."""
 
 import decimal
 import math
@@ -11,7 +11,7 @@ from armblocks.rounded_functions import FUNCTIONS
 
 INFINITY, NAN = math.inf, math.nan
 
-# The nearest doubles to the values that mpmath 1.3 gives with 2600 bits.
+# The doubles nearest to the values of mpmath 1.3 with 2600 bits.
 CORRECT = [
     ("sin", (1e22,), -0.8522008497671888),
     ("cos", (1.995,), -0.4115951665320671),
@@ -77,8 +77,8 @@ def test_values_are_the_nearest_doubles(name: str, arguments: tuple[float, ...],
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_values_are_those_of_the_c_library_up_to_its_error(name: str) -> None:
-    """Two units in the last place: what C libraries promise of their functions."""
+def test_values_agree_with_the_c_library_within_two_units_in_the_last_place(name: str) -> None:
+    """C libraries state errors of up to two units in the last place for these functions."""
     rng = np.random.default_rng(3)
     sizes = np.ldexp(rng.uniform(-1.0, 1.0, 300), rng.integers(-60, 9, 300))
     values = 1.0 + np.abs(sizes) if name == "acosh" else np.concatenate([sizes, rng.uniform(-1.0, 1.0, 100)])
@@ -89,7 +89,7 @@ def test_values_are_those_of_the_c_library_up_to_its_error(name: str) -> None:
         try:
             expected = reference(*arguments)
         except (ValueError, OverflowError):
-            continue  # the ends of the range stand in the table above
+            continue  # the table above has the ends of the range
         assert abs(FUNCTIONS[name](*arguments) - expected) <= 2.0 * math.ulp(expected), arguments
 
 

@@ -1,4 +1,4 @@
-"""The folders of the user are those in which earlier versions kept their files, on each system."""
+"""The user's folders are those of earlier versions, on each operating system."""
 
 import os
 from pathlib import Path
@@ -12,7 +12,7 @@ from platformdirs.windows import Windows
 from armblocks import user_folders
 
 
-@pytest.mark.skipif(os.name == "nt", reason="the paths of Unix are asked for")
+@pytest.mark.skipif(os.name == "nt", reason="tests the paths of Unix")
 @pytest.mark.parametrize(
     ("system", "cache", "state"),
     [
@@ -20,7 +20,7 @@ from armblocks import user_folders
         (MacOS, "Library/Caches/armblocks", "Library/Application Support/armblocks"),
     ],
 )
-def test_the_places_of_unix(
+def test_user_folders_on_unix(
     system: type[PlatformDirsABC], cache: str, state: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in ("XDG_CACHE_HOME", "XDG_STATE_HOME", "XDG_DATA_HOME"):
@@ -30,7 +30,7 @@ def test_the_places_of_unix(
     assert (asked.user_cache_path, asked.user_state_path) == (tmp_path / cache, tmp_path / state)
 
 
-def test_the_places_of_windows(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_user_folders_on_windows(monkeypatch: pytest.MonkeyPatch) -> None:
     folders = {"CSIDL_LOCAL_APPDATA": "local"}
     monkeypatch.setattr("platformdirs.windows.get_win_folder", folders.__getitem__)
     asked = Windows("armblocks", appauthor=False)
@@ -38,7 +38,7 @@ def test_the_places_of_windows(monkeypatch: pytest.MonkeyPatch) -> None:
     assert Path(asked.user_state_dir) == Path("local/armblocks")
 
 
-def test_a_variable_moves_them_and_without_a_home_there_are_none(
+def test_a_variable_sets_the_folders_and_without_a_home_there_are_none(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("platformdirs.PlatformDirs", Unix)

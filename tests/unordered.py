@@ -1,4 +1,4 @@
-"""Comparison of numbers whose order rounding decides: poles, zeros, crossings."""
+"""Comparison of sets of numbers, such as poles and zeros, whose order depends on rounding."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from scipy.optimize import linear_sum_assignment
 
 
 def matched(found: Any, wanted: Any, tolerance: float = 1e-8) -> bool:
-    """Whether both are the same numbers in any order, each to ``tolerance * max(1, |wanted|)``.
+    """Return whether both hold the same numbers in any order, each within ``tolerance * max(1, |wanted|)``.
 
-    The pairs are those with the least sum of distances. Sorting would not do: where two real parts agree but
-    for rounding, the last bits of LAPACK decide which number comes first.
+    The numbers are paired such that the sum of distances is least. Sorting is not enough: where two real
+    parts are equal up to rounding, the last bits of LAPACK's result decide the order.
     """
     left, right = (np.ravel(np.asarray(values, dtype=np.complex128)) for values in (found, wanted))
     if left.size != right.size:

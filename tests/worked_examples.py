@@ -1,4 +1,4 @@
-"""The worked examples of the blocks, each built once for all tests of a process that ask for it."""
+"""The worked examples of the blocks, each built once per test process."""
 
 from __future__ import annotations
 
@@ -10,5 +10,5 @@ from armblocks.diagram import Block, Diagram
 
 @cache
 def worked_example(kind: type[Block]) -> Diagram:
-    """The worked example of a block: its equations and native code are kept with it."""
+    """Return the worked example of a block, cached together with its equations and native code."""
     return ab.block_example(kind)

@@ -1,6 +1,7 @@
-"""Linear systems against laws, closed forms and python-control.
+"""Linear systems compared with closed forms, identities and python-control.
 
-Tests import python-control when they run: that takes seconds, and every process of the tests reads this file.
+Each test imports python-control itself: the import takes seconds, and every worker process collects this
+file.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ SEEDS = range(6)
 def random_system(
     seed: int, states: int = 5, inputs: int = 2, outputs: int = 3, dt: float = 0.0
 ) -> LinearSystem:
-    """Stable, with a direct way."""
+    """A random stable system with direct feedthrough."""
     random = np.random.default_rng(seed)
     A = random.standard_normal((states, states))
     if dt:
@@ -45,7 +46,7 @@ def random_system(
 
 
 def transfer(numerator: list[float], denominator: list[float]) -> LinearSystem:
-    """Controllable canonical form."""
+    """The transfer function in controllable canonical form."""
     below = np.array(denominator) / denominator[0]
     above = np.concatenate([np.zeros(len(below) - len(numerator)), np.array(numerator) / denominator[0]])
     n = len(below) - 1
@@ -60,7 +61,7 @@ def transfer(numerator: list[float], denominator: list[float]) -> LinearSystem:
 # Poles and zeros.
 
 
-def test_poles_are_those_of_the_polynomial() -> None:
+def test_poles_are_the_roots_of_the_characteristic_polynomial() -> None:
     system = transfer([1.0], [1.0, 6.0, 11.0, 6.0])
     assert matched(system.poles(), [-1.0, -2.0, -3.0])
 
@@ -73,7 +74,7 @@ def test_damping_and_frequency_of_a_second_order_system() -> None:
     assert modes[0].time_constant == pytest.approx(1.0 / (zeta * wn))
 
 
-def test_damping_of_a_sampled_pole_is_that_of_the_motion_that_it_samples() -> None:
+def test_damping_of_a_discrete_pole_equals_that_of_the_continuous_pole() -> None:
     s, dt = complex(-0.4, 2.0), 0.1
     z = np.exp(s * dt)
     A = [[z.real, z.imag], [-z.imag, z.real]]
@@ -83,7 +84,7 @@ def test_damping_of_a_sampled_pole_is_that_of_the_motion_that_it_samples() -> No
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_at_a_zero_the_system_matrix_loses_rank(seed: int) -> None:
+def test_the_system_matrix_loses_rank_at_a_zero(seed: int) -> None:
     system = random_system(seed, 6, 2, 2)
     zeros = system.zeros()
     assert len(zeros) == 6  # D is square and invertible
@@ -94,7 +95,7 @@ def test_at_a_zero_the_system_matrix_loses_rank(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_zeros_without_a_direct_way_are_the_finite_ones_of_python_control(seed: int) -> None:
+def test_zeros_without_feedthrough_equal_the_finite_zeros_of_python_control(seed: int) -> None:
     import control
 
     system = random_system(seed, 6, 2, 2)
@@ -104,9 +105,9 @@ def test_zeros_without_a_direct_way_are_the_finite_ones_of_python_control(seed: 
     assert matched(strict.zeros(), peer[np.abs(peer) < 1e8], 1e-6)
 
 
-def test_a_system_with_more_outputs_than_inputs_has_zeros_only_where_all_vanish() -> None:
+def test_a_system_with_more_outputs_than_inputs_has_only_common_zeros() -> None:
     assert len(random_system(1, 5, 1, 3).zeros()) == 0
-    # Both outputs hold the factor s + 2.
+    # Both numerators have the factor s + 2.
     first, second = transfer([1.0, 2.0], [1.0, 3.0, 5.0]), transfer([3.0, 6.0], [1.0, 3.0, 5.0])
     both = LinearSystem(first.A, first.B, np.vstack([first.C, second.C]), np.vstack([first.D, second.D]))
     assert matched(both.zeros(), [-2.0])
@@ -119,7 +120,7 @@ def test_an_uncontrollable_mode_is_an_invariant_zero() -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("dt", [0.0, 0.05])
-def test_other_states_change_nothing_that_is_seen(seed: int, dt: float) -> None:
+def test_a_similarity_transformation_keeps_poles_and_gains(seed: int, dt: float) -> None:
     system = random_system(seed, dt=dt)
     T = np.random.default_rng(seed + 100).standard_normal((5, 5)) + 3.0 * np.eye(5)
     other = system.transformed(T)
@@ -131,14 +132,14 @@ def test_other_states_change_nothing_that_is_seen(seed: int, dt: float) -> None:
 # Transfer functions and frequency.
 
 
-def test_a_transfer_function_comes_back() -> None:
+def test_a_canonical_form_returns_its_transfer_function() -> None:
     found = transfer([2.0, 3.0], [1.0, 4.0, 6.0, 5.0]).transfer_function()
     assert np.allclose(found.numerator, [2.0, 3.0], rtol=1e-9)
     assert np.allclose(found.denominator, [1.0, 4.0, 6.0, 5.0], rtol=1e-9)
     assert repr(found).splitlines() == ["       2 s + 3", "---------------------", "s^3 + 4 s^2 + 6 s + 5"]
 
 
-def test_a_gain_is_a_transfer_function_without_roots() -> None:
+def test_a_system_without_states_is_a_stable_gain() -> None:
     nothing = np.zeros((0, 0))
     gain = LinearSystem(nothing, np.zeros((0, 1)), np.zeros((1, 0)), np.array([[-4.0]]))
     assert gain.transfer_function().numerator.tolist() == [-4.0]
@@ -146,7 +147,7 @@ def test_a_gain_is_a_transfer_function_without_roots() -> None:
     assert gain.is_stable
 
 
-def test_what_cancels_is_taken_off() -> None:
+def test_cancelling_poles_and_zeros_are_removed() -> None:
     found = transfer([1.0, 1.0], [1.0, 3.0, 2.0]).transfer_function()
     assert matched(found.poles, [-2.0])
     assert len(found.zeros) == 0
@@ -154,14 +155,14 @@ def test_what_cancels_is_taken_off() -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("dt", [0.0, 0.05])
-def test_frequency_response_is_that_of_python_control(seed: int, dt: float) -> None:
+def test_frequency_response_agrees_with_python_control(seed: int, dt: float) -> None:
     system = random_system(seed, dt=dt)
     w = np.geomspace(0.01, 50.0, 40)
     peer = np.moveaxis(np.asarray(system.to_control().frequency_response(w).complex), 2, 0)
     assert np.allclose(system.frequency_response(w), peer, rtol=1e-9, atol=1e-12)
 
 
-def test_gain_at_rest_of_an_integrator_is_infinite_and_spoils_no_other_path() -> None:
+def test_the_static_gain_of_an_integrator_is_infinite_only_on_its_own_channel() -> None:
     system = LinearSystem(
         [[0.0, 0.0], [0.0, -2.0]],
         [[1.0, 0.0], [0.0, 1.0]],
@@ -171,7 +172,7 @@ def test_gain_at_rest_of_an_integrator_is_infinite_and_spoils_no_other_path() ->
     assert system.dcgain().tolist() == [[math.inf, 0.0], [0.0, 2.0]]
 
 
-def test_bandwidth_of_a_lag_is_where_its_power_is_half() -> None:
+def test_bandwidth_of_a_lag_is_its_half_power_frequency() -> None:
     assert transfer([5.0], [1.0, 4.0]).bandwidth(10.0 * math.log10(2.0)) == pytest.approx(4.0, rel=1e-10)
 
 
@@ -184,20 +185,20 @@ LOOPS = {
 
 
 @pytest.mark.parametrize("name", LOOPS)
-def test_margins_are_those_of_python_control(name: str) -> None:
+def test_margins_agree_with_python_control(name: str) -> None:
     import control
 
     loop = LOOPS[name]
     found = loop.margins()
     peer = control.stability_margins(loop.to_control(), returnall=True)
-    # python-control takes a phase of 180 degrees at infinity, where the gain is rounding, for a crossing.
+    # python-control reports a phase crossover at infinite frequency, where the gain is only rounding error.
     gains = [value for value in np.asarray(peer[0]) if 0.0 < value < 1e9]
     assert matched([gain for _, gain in found.gain_crossings], gains, 1e-6)
     assert matched([angle for _, angle in found.phase_crossings], peer[1], 1e-6)
     assert found.stable == bool(control.feedback(loop.to_control(), 1).poles().real.max() < 0)
 
 
-def test_at_its_gain_margin_a_loop_is_on_the_edge() -> None:
+def test_a_loop_scaled_by_its_gain_margin_is_marginally_stable() -> None:
     loop = LOOPS["third order"]
     found = loop.margins()
     assert found.gain == pytest.approx(2.0, rel=1e-9)  # 8 / 4, at sqrt(3)
@@ -206,7 +207,7 @@ def test_at_its_gain_margin_a_loop_is_on_the_edge() -> None:
     assert scaled.feedback().poles().real.max() == pytest.approx(0.0, abs=1e-8)
 
 
-def test_a_delay_of_its_margin_turns_the_loop_to_minus_one() -> None:
+def test_the_delay_margin_moves_the_open_loop_to_minus_one() -> None:
     loop = LOOPS["integrating"]
     found = loop.margins()
     value = loop.at(1j * found.delay_frequency)[0, 0] * np.exp(-1j * found.delay_frequency * found.delay)
@@ -214,10 +215,10 @@ def test_a_delay_of_its_margin_turns_the_loop_to_minus_one() -> None:
     assert abs(1.0 + loop.at(1j * found.modulus_frequency)[0, 0]) == pytest.approx(found.modulus)
 
 
-# Time.
+# Time responses.
 
 
-def test_a_step_response_is_the_closed_form() -> None:
+def test_a_step_response_equals_its_closed_form() -> None:
     wn, zeta = 3.0, 0.3
     response = transfer([wn**2], [1.0, 2 * zeta * wn, wn**2]).step_response(6.0)
     t, wd = response.time, wn * math.sqrt(1 - zeta**2)
@@ -233,7 +234,7 @@ def test_a_step_response_is_the_closed_form() -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("dt", [0.0, 0.05])
-def test_responses_are_those_of_python_control(seed: int, dt: float) -> None:
+def test_responses_agree_with_python_control(seed: int, dt: float) -> None:
     import control
 
     system = random_system(seed, dt=dt)
@@ -266,7 +267,7 @@ def test_a_discrete_impulse_response_lists_the_markov_parameters() -> None:
 # Structure.
 
 
-def test_what_no_input_reaches_is_found_and_taken_off() -> None:
+def test_uncontrollable_states_are_removed_from_the_minimal_system() -> None:
     small = random_system(4, 3, 1, 1)
     T = np.random.default_rng(0).standard_normal((5, 5)) + 3.0 * np.eye(5)
     A, B, C = np.zeros((5, 5)), np.zeros((5, 1)), np.zeros((1, 5))
@@ -282,14 +283,14 @@ def test_what_no_input_reaches_is_found_and_taken_off() -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_a_staircase_basis_is_orthogonal_and_spans_what_is_reached(seed: int) -> None:
+def test_a_staircase_basis_is_orthogonal_and_spans_the_controllable_subspace(seed: int) -> None:
     system = random_system(seed, 6, 1, 1)
     basis, reached = staircase(system.A, system.B)
     assert reached == 6
     assert np.allclose(basis.T @ basis, np.eye(6), atol=1e-13)
 
 
-def test_states_off_the_path_go_and_the_others_keep_their_names() -> None:
+def test_states_outside_the_path_are_removed_and_the_others_keep_their_names() -> None:
     system = LinearSystem(
         np.array([[-1.0, 0.0, 0.0], [1.0, -2.0, 0.0], [0.0, 1.0, -3.0]]),
         np.array([[0.0], [1.0], [0.0]]),
@@ -317,7 +318,7 @@ def test_gramians_solve_their_equations(dt: float) -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_connections_are_the_algebra_of_their_values(seed: int) -> None:
+def test_connections_obey_the_algebra_of_transfer_matrices(seed: int) -> None:
     first, second = random_system(seed, 3, 2, 2), random_system(seed + 50, 4, 2, 2)
     s = 0.4 + 1.1j
     a, b = first.at(s), second.at(s)
@@ -328,10 +329,10 @@ def test_connections_are_the_algebra_of_their_values(seed: int) -> None:
     assert np.allclose(first.feedback(0.5, sign=1).at(s), a @ np.linalg.inv(np.eye(2) - 0.5 * a))
 
 
-# What is refused.
+# Rejected inputs.
 
 
-def test_what_does_not_fit_is_refused() -> None:
+def test_inconsistent_shapes_and_unsuitable_systems_are_refused() -> None:
     system = random_system(0)
     with pytest.raises(InputError, match="B has shape"):
         LinearSystem(system.A, system.B[:2], system.C, system.D)
@@ -359,7 +360,7 @@ def test_what_does_not_fit_is_refused() -> None:
         system.step_response(-1.0)
 
 
-def test_connections_that_do_not_fit_are_refused() -> None:
+def test_connections_of_inconsistent_sizes_or_sample_times_are_refused() -> None:
     system, square = random_system(0), random_system(0, 3, 2, 2)
     with pytest.raises(InputError, match=r"systems with the sample times 0 s and 0.1 s are connected"):
         _ = random_system(0, dt=0.1) @ system
@@ -375,7 +376,7 @@ def test_connections_that_do_not_fit_are_refused() -> None:
         LinearSystem(square.A, square.B, square.C, -np.eye(2)).feedback()
 
 
-def test_responses_that_do_not_fit_are_refused() -> None:
+def test_responses_with_inconsistent_times_or_shapes_are_refused() -> None:
     system = random_system(0)
     with pytest.raises(InputError, match="the instants do not rise"):
         system.response([0.0, 0.0], np.zeros((2, 2)))
@@ -387,14 +388,16 @@ def test_responses_that_do_not_fit_are_refused() -> None:
         random_system(0, dt=0.1).response([0.0, 1.0], np.zeros((2, 2)))
 
 
-def test_python_control_may_be_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_python_control_the_conversion_says_how_to_install_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setitem(sys.modules, "control", None)
     with pytest.raises(InputError, match=r"python-control is not installed.*Fix: pip install control"):
         random_system(0).to_control()
 
 
 @pytest.mark.parametrize("suffix", ["json", "npz", "mat"])
-def test_files_hold_the_matrices_to_the_bit(tmp_path: Path, suffix: str) -> None:
+def test_files_keep_the_matrices_bit_for_bit(tmp_path: Path, suffix: str) -> None:
     system = random_system(1, dt=0.1)
     path = tmp_path / f"plant.{suffix}"
     system.save(path)
@@ -414,7 +417,7 @@ def test_files_hold_the_matrices_to_the_bit(tmp_path: Path, suffix: str) -> None
         system.save(tmp_path / "plant.txt")
 
 
-def test_a_system_shows_itself() -> None:
+def test_representations_of_a_system_in_text_and_notebooks() -> None:
     text = repr(random_system(0))
     assert text.startswith("<LinearSystem linear system: continuous, 5 states, 2 inputs, 3 outputs, stable>")
     html = random_system(0, 20)._repr_html_()

@@ -1,4 +1,4 @@
-"""Root loci against the polynomials that they are the roots of."""
+"""Root loci compared with the roots of the closed-loop polynomial."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from armblocks.errors import InputError
 
 
 def chain() -> LinearSystem:
-    """1 / (s (s + 1) (s + 2))."""
+    """The system 1 / (s (s + 1) (s + 2))."""
     A = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, -2.0, -3.0]])
     return LinearSystem(A, [[0.0], [0.0], [1.0]], [[1.0, 0.0, 0.0]], [[0.0]])  # type: ignore[arg-type]
 
 
-def test_roots_are_those_of_the_closed_polynomial() -> None:
+def test_roots_are_those_of_the_closed_loop_polynomial() -> None:
     locus = root_locus(chain())
     assert locus.gains[0] == 0.0
     for gain, roots in zip(locus.gains[::40], locus.roots[::40]):
@@ -30,13 +30,13 @@ def test_branches_are_followed_without_jumps() -> None:
     locus = root_locus(chain())
     seen = np.abs(locus.roots) < 4.0
     steps = np.abs(np.diff(locus.roots, axis=0)) * seen[1:]
-    # Two branches meet at -0.42 and leave at right angles: the only place where they move fast.
+    # Two branches meet at -0.42 and leave at right angles: the roots move fast only there.
     assert steps.max() < 0.2
     crossing = np.argmax(locus.roots.real.max(axis=1) > 0.0)
     assert locus.gains[crossing - 1] <= 6.0 <= locus.gains[crossing]  # Routh: gain 6 at sqrt(2) rad/s
 
 
-def test_gains_may_be_given() -> None:
+def test_the_caller_may_give_the_gains() -> None:
     locus = root_locus(chain(), np.array([0.0, 6.0]))
     assert np.abs(locus.roots[1]).min() == pytest.approx(np.sqrt(2.0), rel=1e-9)
 
@@ -53,7 +53,7 @@ def test_phase_is_continuous_and_starts_at_minus_90_for_an_integrator() -> None:
     assert np.allclose(phase[:, 0, 0], wanted, atol=1e-9)
 
 
-def test_an_undamped_pole_turns_the_phase_down() -> None:
+def test_the_phase_falls_by_180_degrees_at_an_undamped_pole() -> None:
     A = np.array([[0.0, 1.0], [-4.0, 0.0]])
     system = LinearSystem(A, [[0.0], [1.0]], [[1.0, 0.0]], [[0.0]])  # type: ignore[arg-type]
     _, phase = gain_and_phase(system, np.array([0.1, 1.0, 1.99, 2.01, 10.0]))

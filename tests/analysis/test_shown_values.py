@@ -1,4 +1,4 @@
-"""What is shown of numbers near zero: rounding errors are 0, and small values that are real stay."""
+"""Displayed values near zero: rounding errors are shown as 0, true small values stay."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ SEEDS = range(12)
 
 
 def similar(A: Array, random: np.random.Generator) -> tuple[Array, Array]:
-    """A and its inverse transformation: A random, well conditioned change of the states."""
+    """A after a random, well-conditioned similarity transformation, and the transformation matrix."""
     n = A.shape[0]
     T = np.linalg.qr(random.normal(size=(n, n)))[0] @ np.diag(random.uniform(0.5, 2.0, n))
     return np.linalg.solve(T, A @ T), T
 
 
 def plant(random: np.random.Generator, integrators: int, scale: float = 1.0) -> tuple[Array, int]:
-    """A chain of integrators behind three decaying states, rad/s of the given scale."""
+    """A chain of integrators after three decaying states, whose poles have the given scale in rad/s."""
     n = integrators + 3
     A = np.zeros((n, n))
     A[:integrators, :integrators] = np.eye(integrators, k=1)
@@ -64,8 +64,9 @@ def test_poles_at_zero_are_shown_as_zero_in_any_states_and_units(integrators: in
 
 
 @pytest.mark.parametrize("small", [1e-3, 1e-6, 1e-12])
-def test_small_poles_of_a_slow_part_are_shown_beside_a_fast_one(small: float) -> None:
-    """However fast another part is, 1e-12 rad/s is a pole of a slow part, and not a rounding error."""
+def test_small_poles_of_a_slow_subsystem_are_shown_beside_a_fast_subsystem(small: float) -> None:
+    """1e-12 rad/s is a pole of the slow subsystem, not a rounding error, however fast the other subsystem
+    is."""
     for seed in SEEDS:
         random = np.random.default_rng(seed)
         slow = small * (random.normal(size=(3, 3)) - 4.0 * np.eye(3))
@@ -81,7 +82,7 @@ def test_small_poles_of_a_slow_part_are_shown_beside_a_fast_one(small: float) ->
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_an_undamped_oscillation_and_a_double_pole_are_shown_without_rounding(seed: int) -> None:
+def test_an_undamped_pair_and_a_double_pole_are_shown_without_rounding_errors(seed: int) -> None:
     random = np.random.default_rng(seed)
     A = np.zeros((5, 5))
     A[:2, :2] = [[0.0, 3.0], [-3.0, 0.0]]
@@ -97,8 +98,8 @@ def test_an_undamped_oscillation_and_a_double_pole_are_shown_without_rounding(se
     assert [(mode.damping, mode.time_constant) for mode in waves] == [(0.0, math.inf)] * 2
 
 
-def test_a_little_damping_is_shown() -> None:
-    """Also beside an undamped pair of the same frequency: -1e-9 is no rounding error of it."""
+def test_a_damping_of_1e_9_is_shown() -> None:
+    """A real part of -1e-9 is not a rounding error, even beside an undamped pair of the same frequency."""
     A = np.array(
         [[0.0, 3.0, 0.0, 0.0], [-3.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1e-9, 3.0], [0.0, 0.0, -3.0, -1e-9]]
     )
@@ -107,7 +108,7 @@ def test_a_little_damping_is_shown() -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_poles_of_a_sampled_system_are_shown_at_0_at_1_and_on_the_circle(seed: int) -> None:
+def test_poles_of_a_discrete_system_are_shown_at_0_at_1_and_on_the_unit_circle(seed: int) -> None:
     random = np.random.default_rng(seed)
     turn = 0.7
     A = np.diag([0.0, 1.0, 0.0, 0.0, 0.4])
@@ -123,8 +124,8 @@ def test_poles_of_a_sampled_system_are_shown_at_0_at_1_and_on_the_circle(seed: i
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_zeros_and_the_gain_at_rest_of_a_derivative_are_shown_as_zero(seed: int) -> None:
-    """G(s) = s (s + 4) / ((s + 1) (s + 2) (s + 3)), small in one direction by 1e-12, in any states."""
+def test_zeros_and_the_static_gain_of_a_derivative_are_shown_as_zero(seed: int) -> None:
+    """G(s) = s (s + 4) / ((s + 1) (s + 2) (s + 3)), with an input gain of 1e-12, in any state basis."""
     random = np.random.default_rng(seed)
     A = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-6.0, -11.0, -6.0]])
     hidden, T = similar(A, random)
@@ -138,7 +139,7 @@ def test_zeros_and_the_gain_at_rest_of_a_derivative_are_shown_as_zero(seed: int)
     assert shown_zeros(small)[0].real == pytest.approx(-2.5001563e-4, rel=1e-6)
 
 
-def test_a_loop_through_minus_one_has_margins_of_zero() -> None:
+def test_a_loop_through_minus_one_is_shown_with_margins_of_zero() -> None:
     """L = 8 / (s + 1)^3 passes -1 at sqrt(3) rad/s; with 7.99 it does not. L = 1 / s^2 passes at 1 rad/s."""
     lag = np.array([[-1.0, 1.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, -1.0]])
     for seed in SEEDS:
@@ -172,8 +173,8 @@ def test_entries_of_matrices_are_shown_as_zero_only_beside_larger_ones_in_any_un
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_a_transfer_function_is_written_without_rounding(seed: int) -> None:
-    """(s^2 + 4) / (s^2 (s + 1)); and slow poles stay: 1 / (s + 1e-12)^2."""
+def test_a_transfer_function_is_printed_without_rounding_errors(seed: int) -> None:
+    """(s^2 + 4) / (s^2 (s + 1)) has exact coefficients; the small ones of 1 / (s + 1e-12)^2 stay."""
     A = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
     hidden, T = similar(A, np.random.default_rng(seed))
     system = LinearSystem(
@@ -186,7 +187,7 @@ def test_a_transfer_function_is_written_without_rounding(seed: int) -> None:
     assert repr(slow.transfer_function()).split("\n")[2].strip() == "s^2 + 2e-12 s + 1e-24"
 
 
-def test_a_step_response_without_overshoot_has_none() -> None:
+def test_a_step_response_without_overshoot_is_shown_with_an_overshoot_of_zero() -> None:
     lag = LinearSystem([[-1.0, 0.3], [0.0, -2.0]], [[0.0], [1.0]], [[1.0, 0.1]], [[0.0]])
     measures = shown_measures(lag.step_response(100.0))
     assert (measures.overshoot, measures.undershoot) == (0.0, 0.0)
@@ -196,13 +197,13 @@ def test_a_step_response_without_overshoot_has_none() -> None:
 
 
 def test_joints_that_do_not_move_are_shown_as_at_rest() -> None:
-    """The second joint moves; the others have what rounding leaves of them."""
+    """The second joint moves; the values of the others are rounding errors."""
     robot = build_puma560()
     n = len(robot.joints)
     time = np.linspace(0.0, 1.0, 11)
     q, qd, qdd, tau = (np.full((11, n), 3e-17) for _ in range(4))
     q[:, 1], qd[:, 1], qdd[:, 1], tau[:, 1] = time, 1.0, 0.5, 40.0
-    tau[:, 0] = 1e-9  # small, and not by rounding
+    tau[:, 0] = 1e-9  # small, but not a rounding error
     summary = summarise(robot, time, q, qd, qdd, tau, np.zeros((11, 3)))
     shown = shown_summary(summary)
     assert shown.joints[2].position_max == shown.joints[2].speed_peak == shown.joints[2].torque_rms == 0.0

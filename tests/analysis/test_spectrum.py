@@ -1,4 +1,4 @@
-"""Spectra: lines have the amplitudes of their sines, densities integrate to the mean square, SciPy agrees."""
+"""Spectra: amplitudes of sines, densities that integrate to the mean square, agreement with SciPy."""
 
 from typing import Any
 
@@ -25,7 +25,7 @@ def test_a_line_has_the_amplitude_of_its_sine_under_every_window(window: str) ->
     assert np.argmax(found.values[:, 0]) == line
 
 
-def test_a_constant_and_the_wave_of_half_the_rate_have_their_amplitudes() -> None:
+def test_a_constant_and_a_wave_at_the_nyquist_frequency_have_their_amplitudes() -> None:
     wave = 2.0 + 0.5 * np.cos(np.pi * RATE * TIME)
     found = signal_spectrum(TIME, wave, window="rectangular", remove_mean=False)
     assert found.values[[0, -1], 0] == pytest.approx([2.0, 0.5], rel=1e-12)
@@ -42,7 +42,7 @@ def test_a_power_density_integrates_to_the_mean_square() -> None:
 @pytest.mark.parametrize("window", WINDOWS)
 @pytest.mark.parametrize("averages", [1, 7])
 def test_scipy_gives_the_same_densities(quantity: str, window: str, averages: int) -> None:
-    # The coefficients of SciPy's flat top are the same published ones: agreement is to rounding.
+    # SciPy's flat-top window has the same published coefficients: both agree to rounding errors.
     found = signal_spectrum(TIME, NOISE, quantity=quantity, window=window, averages=averages)
     assert found.length == 2 * COUNT // (averages + 1)
     frequency, expected = SIGNAL.welch(
@@ -60,7 +60,7 @@ def test_scipy_gives_the_same_densities(quantity: str, window: str, averages: in
     assert values == pytest.approx(expected, rel=1e-9, abs=1e-25)
 
 
-def test_instants_of_events_and_repeated_ones_change_nothing_on_the_grid() -> None:
+def test_event_times_and_repeated_times_do_not_change_the_spectrum() -> None:
     jump = (TIME >= 2.0).astype(float)
     time = np.sort(np.concatenate([TIME, [2.0, 1.00001]]))
     values = np.where(time >= 2.0, 1.0, 0.0)
@@ -69,7 +69,7 @@ def test_instants_of_events_and_repeated_ones_change_nothing_on_the_grid() -> No
     assert uneven.values == pytest.approx(plain.values, rel=1e-12, abs=1e-15)
 
 
-def test_the_beginning_is_left_out_and_several_signals_stand_side_by_side() -> None:
+def test_samples_before_begin_are_ignored_and_several_signals_are_columns() -> None:
     waves = np.column_stack([np.sin(2 * np.pi * 16 * TIME), np.where(TIME < 2.0, 9.0, 0.0)])
     found = signal_spectrum(TIME, waves, begin=2.0, remove_mean=False)
     assert found.sample_rate == pytest.approx(RATE)
@@ -77,7 +77,7 @@ def test_the_beginning_is_left_out_and_several_signals_stand_side_by_side() -> N
     assert np.max(found.values[:, 1]) < 1e-12
 
 
-def test_what_cannot_be_worked_out_is_said() -> None:
+def test_unsuitable_signals_and_unknown_options_are_refused() -> None:
     with pytest.raises(InputError, match=r"3 segments of 6 samples are asked for"):
         signal_spectrum(np.arange(7.0), np.arange(7.0), averages=3)
     with pytest.raises(InputError, match=r"there are fewer than two instants"):

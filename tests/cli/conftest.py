@@ -1,4 +1,4 @@
-"""What the tests of the command line share: one way to call it in-process, one in a process of its own."""
+"""Fixtures of the command-line tests: calls in this process and in a separate process."""
 
 import json
 import os
@@ -15,12 +15,12 @@ from typer.testing import CliRunner, Result
 from armblocks.cli.main import app
 
 command_made_once = cache(get_command)
-"""Typer's runner reads the signatures of all commands for each call: half of the time of a short command."""
+"""Built once: otherwise Typer's runner reads the signatures of all commands in each call."""
 
 
 @pytest.fixture
 def invoke(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Result]:
-    """Call the command line in this process, from an empty folder."""
+    """Return a function that calls the command line in this process, from an empty folder."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("typer.testing._get_command", command_made_once)
 
@@ -32,7 +32,8 @@ def invoke(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Res
 
 @pytest.fixture
 def refused(invoke: Callable[..., Result]) -> Callable[..., str]:
-    """Call the command line with something that it must refuse: its message, after the common checks."""
+    """Return a function that calls the command line with bad input, makes the common checks, and returns the
+    message."""
 
     def call(*arguments: str) -> str:
         result = invoke(*arguments)
@@ -46,7 +47,8 @@ def refused(invoke: Callable[..., Result]) -> Callable[..., str]:
 
 @pytest.fixture
 def spawn(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
-    """Call the command line in a process of its own, from an empty folder, as a terminal would."""
+    """Return a function that calls the command line in a separate process, from an empty folder, as a
+    terminal does."""
 
     def call(*arguments: str) -> subprocess.CompletedProcess[str]:
         return subprocess.run(
@@ -65,7 +67,8 @@ def spawn(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
 
 @pytest.fixture
 def write_diagram(tmp_path: Path) -> Callable[..., str]:
-    """Write a diagram file by hand: ``{"name": ("Type", {parameters})}`` and wires; gives its path."""
+    """Return a function that writes a diagram file from ``{"name": ("Type", {parameters})}`` and connections,
+    and returns its path."""
 
     def write(
         blocks: Mapping[str, tuple[str, Mapping[str, object]]], *connections: str, **settings: object

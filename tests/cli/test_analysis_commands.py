@@ -1,4 +1,4 @@
-"""What ``armblocks linearize`` and ``armblocks trim`` say and leave behind."""
+"""Output and files of ``armblocks linearize`` and ``armblocks trim``."""
 
 import json
 import shlex
@@ -10,7 +10,7 @@ from typer.testing import Result
 Invoke = Callable[..., Result]
 
 
-def test_a_loop_is_shown_with_its_margins_and_figures(invoke: Invoke, tmp_path: Path) -> None:
+def test_linearize_prints_the_margins_of_a_loop_and_writes_figures(invoke: Invoke, tmp_path: Path) -> None:
     result = invoke(
         "linearize", "van_der_pol_pid", "--input", "PID", "--output", "PID", "--open", "PID",
         "--report", "figures", "--save", "loop.json",
@@ -28,14 +28,14 @@ def test_a_loop_is_shown_with_its_margins_and_figures(invoke: Invoke, tmp_path: 
     assert saved["states"] == ["PID/integral", "PID/filter", "x1/x", "x2/x"]
 
 
-def test_a_channel_is_shown_with_gain_and_bandwidth(invoke: Invoke) -> None:
+def test_linearize_prints_gain_bandwidth_and_zeros_of_a_channel(invoke: Invoke) -> None:
     result = invoke("linearize", "van_der_pol_pid", "--input", "PID", "--output", "x1", "--hertz", "--trim")
     assert result.exit_code == 0, result.output
     assert "frequency, Hz" in result.stdout
     assert "zeros: 0, -100" in result.stdout
 
 
-def test_a_point_is_found_and_saved_and_runs_from_there(invoke: Invoke, tmp_path: Path) -> None:
+def test_trim_saves_an_operating_point_from_which_a_run_starts(invoke: Invoke, tmp_path: Path) -> None:
     result = invoke("trim", "falling_pendulum", "--guess", "pendulum/q=-1.2", "--save", "rest.npz")
     assert result.exit_code == 0, result.output
     assert "at rest" in result.stdout
@@ -45,7 +45,7 @@ def test_a_point_is_found_and_saved_and_runs_from_there(invoke: Invoke, tmp_path
     assert again.exit_code == 0, again.output
 
 
-def test_a_bare_trim_that_finds_no_rest_lists_what_can_be_given(invoke: Invoke) -> None:
+def test_trim_without_options_lists_the_possible_options_when_it_finds_no_point(invoke: Invoke) -> None:
     result = invoke("trim", "falling_pendulum")
     assert result.exit_code == 2
     assert "no operating point was found" in result.stderr
@@ -53,21 +53,21 @@ def test_a_bare_trim_that_finds_no_rest_lists_what_can_be_given(invoke: Invoke) 
         assert words in result.stdout
     lines = [line.strip() for line in result.stdout.splitlines() if line.startswith("  armblocks trim")]
     assert len(lines) == 2
-    for line in lines:  # what is proposed works
+    for line in lines:  # the proposed commands work
         assert "at rest" in invoke(*shlex.split(line)[1:]).stdout
     listed = invoke("trim", "falling_pendulum", "--names")
     assert listed.exit_code == 0
     assert listed.stdout == result.stdout
 
 
-def test_a_bare_trim_of_a_diagram_without_states_says_so(invoke: Invoke) -> None:
+def test_trim_of_a_diagram_without_states_says_that_there_are_none(invoke: Invoke) -> None:
     result = invoke("trim", "kr180model")
     assert result.exit_code == 0
     assert "There are no states" in result.stdout
     assert "--free jtraj.q0 --output rne/tau=0.5" in result.stdout
 
 
-def test_what_cannot_be_read_is_refused(refused: Callable[..., str]) -> None:
+def test_unreadable_or_unknown_options_are_refused(refused: Callable[..., str]) -> None:
     assert "--free is given without --trim" in refused("linearize", "falling_pendulum", "--free", "a.b")
     assert "is not of the form NAME=VALUE" in refused("trim", "falling_pendulum", "--fix", "q")
     assert "'up' is not a number" in refused("trim", "falling_pendulum", "--fix", "pendulum/q=up")

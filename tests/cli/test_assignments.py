@@ -1,4 +1,4 @@
-"""The grammar of ``--set``: what it reads, and what it refuses in which words."""
+"""The grammar of ``--set``: accepted values, and the messages for others."""
 
 import math
 
@@ -38,57 +38,57 @@ from armblocks.errors import InputError
         ('""', ""),
     ],
 )
-def test_a_value_is_read(text: str, value: object) -> None:
+def test_values_of_the_grammar_are_parsed(text: str, value: object) -> None:
     found = parse_value(text)
     assert found == value
     assert isinstance(found, type(value) | int)
 
 
-def test_a_whole_number_stays_one() -> None:
-    # Counts, such as the inputs of a Mux, are refused as 2.0 by the block.
+def test_a_whole_number_is_parsed_as_an_integer() -> None:
+    # A block refuses 2.0 as a count, such as the number of inputs of a Mux.
     assert isinstance(parse_value("2"), int)
     assert isinstance(parse_value("2.0"), float)
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False))
-def test_a_number_comes_back_to_the_last_bit(number: float) -> None:
+def test_a_number_is_parsed_to_the_last_bit(number: float) -> None:
     assert parse_value(repr(number)) == number
 
 
 @given(st.text())
-def test_any_text_gives_a_value_or_a_refusal(text: str) -> None:
+def test_any_text_gives_a_value_or_an_input_error(text: str) -> None:
     try:
         parse_value(text)
     except InputError as error:
         assert error.allowed
 
 
-def test_not_a_number_reaches_the_check_of_the_parameter() -> None:
-    # The block's own check refuses it, and can say what the parameter may be.
+def test_nan_is_parsed_and_left_to_the_check_of_the_parameter() -> None:
+    # The block refuses NaN with a message that states the allowed values of the parameter.
     value = parse_value("nan")
     assert isinstance(value, float)
     assert math.isnan(value)
 
 
 @pytest.mark.parametrize("text", ["__import__('os')", "٣", "2pi", "", "{}", "a b", "2*k", "u.v*2"])
-def test_what_the_grammar_does_not_know_is_no_value(text: str) -> None:
+def test_text_outside_the_grammar_is_refused(text: str) -> None:
     with pytest.raises(
         InputError, match=r"--set: .*'.*Allowed: a number, a vector.*correct it, or put quotes around a text"
     ):
         parse_value(text)
 
 
-def test_a_vector_says_which_entry_is_no_number() -> None:
+def test_the_message_names_the_entry_of_a_vector_that_is_not_a_number() -> None:
     with pytest.raises(InputError, match="there is no name named 'x'"):
         parse_value("[1 x 3]")
 
 
-def test_a_vector_says_that_a_number_is_missing() -> None:
+def test_a_vector_with_a_missing_number_is_refused() -> None:
     with pytest.raises(InputError, match="a number is missing before a comma"):
         parse_value("1,,3")
 
 
-def test_rows_of_a_matrix_have_one_length() -> None:
+def test_matrix_rows_of_different_lengths_are_refused() -> None:
     with pytest.raises(InputError, match="the rows of an array have 2, 1 numbers"):
         parse_value("[1 2; 3]")
 
@@ -99,11 +99,11 @@ def test_assignments_are_collected_by_path() -> None:
 
 
 @pytest.mark.parametrize("text", ["tmax=5", "jtraj.tmax", "=5", ".tmax=5", "jtraj.=5", ""])
-def test_an_assignment_names_block_and_parameter(text: str) -> None:
+def test_an_assignment_without_block_and_parameter_is_refused(text: str) -> None:
     with pytest.raises(InputError, match=r"is not of the form block.parameter=value.*--set jtraj.tmax=5"):
         parse_assignments([text])
 
 
-def test_a_parameter_is_set_once() -> None:
+def test_a_parameter_that_is_set_twice_is_refused() -> None:
     with pytest.raises(InputError, match=r"'jtraj.tmax' is set twice"):
         parse_assignments(["jtraj.tmax=5", "jtraj.tmax = 6"])

@@ -1,4 +1,5 @@
-"""Bad input through the command line: a message with what, where, allowed and fix; exit code 2."""
+"""Bad input to the command line: a message that states the error, its place, the allowed values and a fix;
+exit code 2."""
 
 import os
 import signal
@@ -18,11 +19,11 @@ Write = Callable[..., str]
 SCOPE = {"scope": ("Scope", {"inputs": 1})}
 
 
-def test_an_unknown_model_says_the_nearest(refused: Refused) -> None:
+def test_an_unknown_model_is_refused_with_the_nearest_name(refused: Refused) -> None:
     assert "did you mean 'kr180model'?" in refused("run", "kr180modle")
 
 
-def test_an_unknown_robot_says_the_nearest(refused: Refused) -> None:
+def test_an_unknown_robot_is_refused_with_the_nearest_name(refused: Refused) -> None:
     text = refused("show", "puma650")
     assert "there is no" in text
     assert "did you mean 'puma560'?" in text
@@ -32,7 +33,7 @@ def test_a_missing_file_is_named(refused: Refused) -> None:
     assert "nowhere.json" in refused("run", "nowhere.json")
 
 
-def test_a_file_that_is_no_json_is_named(refused: Refused, tmp_path: Path) -> None:
+def test_a_file_that_is_not_json_is_named(refused: Refused, tmp_path: Path) -> None:
     (tmp_path / "broken.json").write_text("{", encoding="utf-8")
     assert "broken.json" in refused("run", "broken.json")
 
@@ -41,13 +42,13 @@ def test_an_unknown_command_is_refused(refused: Refused) -> None:
     assert "No such command" in refused("simulate")
 
 
-def test_an_unknown_solver_says_the_nearest(refused: Refused, write_diagram: Write) -> None:
+def test_an_unknown_solver_is_refused_with_the_nearest_name(refused: Refused, write_diagram: Write) -> None:
     path = write_diagram({"i": ("Integrator", {}), "c": ("Constant", {"value": 1.0})}, "c/y -> i/u")
     assert "did you mean 'heun'?" in refused("run", path, "--solver", "huen")
 
 
 @pytest.mark.parametrize("time", ["-1", "nan", "inf"])
-def test_a_stop_time_is_finite_and_not_negative(time: str, refused: Refused) -> None:
+def test_a_negative_or_infinite_stop_time_is_refused(time: str, refused: Refused) -> None:
     text = refused("run", "kr180model", f"--stop-time={time}")
     assert "stop_time is" in text
     assert "a finite time in s, 0 or more" in text
@@ -57,37 +58,37 @@ def test_a_stop_time_is_finite_and_not_negative(time: str, refused: Refused) -> 
 @pytest.mark.parametrize(
     "option", ["--step=0", "--step=-1", "--step=nan", "--rtol=0", "--rtol=nan", "--atol=-1"]
 )
-def test_settings_of_the_solver_are_checked(option: str, refused: Refused, write_diagram: Write) -> None:
+def test_bad_settings_of_the_solver_are_refused(option: str, refused: Refused, write_diagram: Write) -> None:
     path = write_diagram({"i": ("Integrator", {}), "c": ("Constant", {"value": 1.0})}, "c/y -> i/u")
     assert option[2:].split("=")[0] in refused("run", path, option)
 
 
-def test_a_stop_time_that_is_no_number_is_refused(refused: Refused) -> None:
+def test_a_stop_time_that_is_not_a_number_is_refused(refused: Refused) -> None:
     assert "stop-time" in refused("run", "kr180model", "--stop-time", "ten")
 
 
-def test_an_assignment_has_a_form(refused: Refused) -> None:
+def test_an_assignment_without_a_block_is_refused_with_the_required_form(refused: Refused) -> None:
     assert "block.parameter=value" in refused("run", "kr180model", "--set", "tmax=5")
 
 
-def test_an_assignment_says_the_nearest_block(refused: Refused) -> None:
+def test_an_assignment_to_an_unknown_block_is_refused_with_the_nearest_name(refused: Refused) -> None:
     assert "did you mean 'jtraj'?" in refused("run", "kr180model", "--set", "jtrja.tmax=5")
 
 
-def test_an_assignment_says_the_nearest_parameter(refused: Refused) -> None:
+def test_an_assignment_to_an_unknown_parameter_is_refused_with_the_nearest_name(refused: Refused) -> None:
     assert "did you mean 'tmax'?" in refused("run", "kr180model", "--set", "jtraj.tmxa=5")
 
 
 @pytest.mark.parametrize("value", ["nan", "inf", "-1", "0", "[1 2]", "text"])
-def test_an_assigned_value_is_checked(value: str, refused: Refused) -> None:
+def test_an_assigned_value_of_the_wrong_kind_is_refused(value: str, refused: Refused) -> None:
     assert "tmax" in refused("run", "kr180model", "--set", f"jtraj.tmax={value}")
 
 
-def test_an_assigned_vector_has_the_right_length(refused: Refused) -> None:
+def test_an_assigned_vector_of_the_wrong_length_is_refused(refused: Refused) -> None:
     assert "q0" in refused("run", "kr180model", "--set", "jtraj.q0=[1 2 3]")
 
 
-def test_code_is_no_value(refused: Refused) -> None:
+def test_python_code_as_a_value_is_refused(refused: Refused) -> None:
     assert "is not a formula" in refused("run", "kr180model", "--set", "jtraj.tmax=__import__('os')")
 
 
@@ -122,7 +123,9 @@ def test_mismatched_widths_are_refused(refused: Refused, write_diagram: Write) -
     assert "3" in text
 
 
-def test_an_algebraic_loop_is_printed(refused: Refused, write_diagram: Write) -> None:
+def test_the_message_about_an_algebraic_loop_lists_its_signals(
+    refused: Refused, write_diagram: Write
+) -> None:
     blocks = {"first": ("Gain", {"gain": 2.0}), "second": ("Gain", {"gain": 0.5})}
     text = refused("run", write_diagram(blocks, "first/y -> second/u", "second/y -> first/u"))
     assert "algebraic loop" in text
@@ -130,14 +133,16 @@ def test_an_algebraic_loop_is_printed(refused: Refused, write_diagram: Write) ->
     assert "second" in text
 
 
-def test_an_unknown_block_type_says_the_nearest(refused: Refused, write_diagram: Write) -> None:
+def test_an_unknown_block_type_is_refused_with_the_nearest_name(
+    refused: Refused, write_diagram: Write
+) -> None:
     assert "did you mean 'Constant'?" in refused("run", write_diagram({"c": ("Constnat", {})}))
 
 
-def test_a_signal_that_is_not_finite_names_the_block_that_made_it(
+def test_the_message_about_an_infinite_signal_names_the_block_that_computed_it(
     refused: Refused, write_diagram: Write, tmp_path: Path
 ) -> None:
-    # 1 / (t - 1) becomes infinite at t = 1; what follows it is not the culprit.
+    # 1 / (t - 1) becomes infinite at t = 1; the blocks after it are not the cause.
     blocks = {
         "clock": ("Clock", {}),
         "one": ("Constant", {"value": 1.0}),
@@ -158,7 +163,7 @@ def test_a_signal_that_is_not_finite_names_the_block_that_made_it(
     text = refused("run", path, "--out", "kept", "--no-figures")
     assert "quotient" in text
     assert "1 s" in text or "t = 1" in text
-    # Nothing is lost: the instants before that are in the report.
+    # The report has the samples before that time.
     assert (tmp_path / "kept" / "report.html").is_file()
 
 
@@ -181,14 +186,16 @@ one = robot(L, 'one');
         ("1", "0", "0", "bad.m:6"),
     ],
 )
-def test_a_robot_that_cannot_be_is_refused(
+def test_an_impossible_robot_is_refused_with_the_line_of_its_script(
     mass: str, motor: str, gear: str, place: str, refused: Refused, tmp_path: Path
 ) -> None:
     (tmp_path / "bad.m").write_text(ROBOT_SCRIPT.format(mass=mass, motor=motor, gear=gear), encoding="utf-8")
     assert f"where {place}" in refused("show", "bad.m")
 
 
-def test_a_script_with_code_it_does_not_know_says_line_and_text(refused: Refused, tmp_path: Path) -> None:
+def test_unsupported_code_in_a_robot_script_is_refused_with_its_line(
+    refused: Refused, tmp_path: Path
+) -> None:
     (tmp_path / "odd.m").write_text("a = 1;\nsystem('rm -rf x');\n", encoding="utf-8")
     text = refused("show", "odd.m")
     assert "odd.m:2" in text
@@ -220,8 +227,10 @@ def test_without_debugging_a_process_shows_no_traceback(
 
 
 @pytest.mark.skipif(os.name == "nt", reason="a signal cannot be sent to a child alone on Windows")
-def test_ctrl_c_keeps_what_was_computed_and_says_so(write_diagram: Write, tmp_path: Path) -> None:
-    # An oscillator for 10^11 steps: longer than any machine takes to get the signal.
+def test_ctrl_c_keeps_the_computed_results_and_marks_them_as_incomplete(
+    write_diagram: Write, tmp_path: Path
+) -> None:
+    # An oscillator for 10^11 steps: on any machine the signal arrives before the run ends.
     blocks = {"v": ("Integrator", {}), "x": ("Integrator", {"initial": 1.0}), "k": ("Gain", {"gain": -1.0})}
     path = write_diagram(
         blocks, "k/y -> v/u", "v/y -> x/u", "x/y -> k/u", stop_time=1e9, step=1e-2, sample_time=1e5
@@ -244,7 +253,7 @@ def test_ctrl_c_keeps_what_was_computed_and_says_so(write_diagram: Write, tmp_pa
     assert (tmp_path / "kept" / "report.html").is_file()
 
 
-def test_nothing_is_left_of_the_probe_of_the_folder(
+def test_the_write_test_of_the_output_folder_leaves_no_file(
     invoke: Callable[..., Result], tmp_path: Path, write_diagram: Write
 ) -> None:
     path = write_diagram({"c": ("Constant", {"value": 1.0}), **SCOPE}, "c/y -> scope/u")

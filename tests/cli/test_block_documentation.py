@@ -1,4 +1,4 @@
-"""``armblocks blocks`` lists and documents the blocks, and hands out their worked examples."""
+"""``armblocks blocks`` lists and documents the blocks, and saves their worked examples."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from worked_examples import worked_example
 Invoke = Callable[..., Result]
 
 
-def test_a_block_is_told_with_equation_ports_units_and_parameters(invoke: Invoke) -> None:
+def test_the_documentation_of_a_block_has_equation_ports_units_and_parameters(invoke: Invoke) -> None:
     text = invoke("blocks", "Chirp").stdout
     assert "Chirp  (Chirp Signal; sources)" in text
     assert "y = sin(2 pi (f1 t + (f2 - f1) t^2 / (2 T)))" in " ".join(text.split())
@@ -29,7 +29,7 @@ def test_a_block_is_found_by_its_title_and_in_any_case(invoke: Invoke) -> None:
     assert invoke("blocks", "xy graph").stdout == invoke("blocks", "XYGraph").stdout
 
 
-def test_a_wrong_name_is_met_with_the_nearest(invoke: Invoke) -> None:
+def test_an_unknown_block_is_refused_with_the_nearest_name(invoke: Invoke) -> None:
     result = invoke("blocks", "Intergrator")
     assert result.exit_code == 2
     assert "there is no block named 'Intergrator'" in result.stderr
@@ -43,7 +43,7 @@ def test_without_a_name_all_blocks_are_listed(invoke: Invoke) -> None:
     assert f"{len(BLOCKS)} blocks" in text
 
 
-def test_a_search_lists_what_mentions_the_words(invoke: Invoke) -> None:
+def test_a_search_lists_the_blocks_whose_documentation_has_the_words(invoke: Invoke) -> None:
     text = invoke("blocks", "--search", "hysteresis").stdout
     assert "Relay" in text
     assert "Gain" not in text
@@ -52,13 +52,13 @@ def test_a_search_lists_what_mentions_the_words(invoke: Invoke) -> None:
         assert kind is None or "hysteresis" in (kind.__doc__ or "").casefold()
 
 
-def test_a_search_without_a_find_says_so(invoke: Invoke) -> None:
+def test_a_search_without_a_match_is_reported(invoke: Invoke) -> None:
     result = invoke("blocks", "--search", "xyzzy")
     assert result.exit_code == 2
     assert "no block's documentation contains 'xyzzy'" in result.stderr
 
 
-def test_options_that_do_not_go_together_are_refused(invoke: Invoke) -> None:
+def test_options_that_exclude_each_other_are_refused(invoke: Invoke) -> None:
     both = invoke("blocks", "Gain", "--search", "gain")
     assert both.exit_code == 2
     assert "the block 'Gain' and the search 'gain' are both given" in both.stderr
@@ -67,7 +67,7 @@ def test_options_that_do_not_go_together_are_refused(invoke: Invoke) -> None:
     assert "--save needs a block" in nameless.stderr
 
 
-def test_the_example_is_saved_to_be_run(invoke: Invoke, tmp_path: Path) -> None:
+def test_a_saved_example_is_a_diagram_that_runs(invoke: Invoke, tmp_path: Path) -> None:
     path = tmp_path / "relay.json"
     result = invoke("blocks", "Relay", "--save", str(path))
     assert result.exit_code == 0, result.output

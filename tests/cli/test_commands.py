@@ -1,4 +1,4 @@
-"""What each command says and leaves behind."""
+"""Output and files of each command."""
 
 import json
 import os
@@ -54,7 +54,7 @@ def test_show_prints_the_table_of_the_toolbox(invoke: Invoke) -> None:
     assert "| link1 |         q|      0.75|      0.35|     1.571|         0|" in text
 
 
-def test_show_names_the_links_whose_inertia_no_body_has(invoke: Invoke) -> None:
+def test_show_warns_about_links_with_a_physically_impossible_inertia(invoke: Invoke) -> None:
     result = invoke("show", "kr180")
     warned = [line for line in result.stderr.splitlines() if line.startswith("warning:")]
     names = [link.name for link in ab.load_robot("kr180").robot.links]
@@ -71,7 +71,7 @@ NAMES = {
 
 
 @pytest.mark.parametrize("kind", NAMES)
-def test_list_names_all_of_a_kind(kind: str, invoke: Invoke) -> None:
+def test_list_prints_all_names_of_a_category(kind: str, invoke: Invoke) -> None:
     result = invoke("list", kind)
     assert result.exit_code == 0
     assert set(NAMES[kind]()) <= set(result.stdout.split())
@@ -116,7 +116,7 @@ def test_the_shell_completes_names_and_files_without_a_heavy_import(tmp_path: Pa
     assert json.loads(done.stdout or "0") == [COMPLETED, []], done.stderr
 
 
-def test_bench_tells_a_time_for_every_method(invoke: Invoke) -> None:
+def test_bench_prints_a_time_for_every_method(invoke: Invoke) -> None:
     result = invoke("bench", "--robot", "twolink", "--samples", "64", "--threads", "2")
     assert result.exit_code == 0
     for method in ("fkine", "jacob0", "inertia", "rne", "accel"):
@@ -126,7 +126,7 @@ def test_bench_tells_a_time_for_every_method(invoke: Invoke) -> None:
 
 @pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory) -> tuple["subprocess.CompletedProcess[str]", Path]:
-    """The main job, as a person runs it: in a process of its own."""
+    """A report made by ``armblocks run`` in a separate process, as a user runs it."""
     import sys
 
     folder = tmp_path_factory.mktemp("run")
@@ -142,7 +142,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> tuple["subprocess.Comple
     return done, folder / "kr180model-report"
 
 
-def test_run_succeeds_and_says_where_the_report_is(
+def test_run_prints_where_the_report_is(
     report: tuple["subprocess.CompletedProcess[str]", Path],
 ) -> None:
     done, folder = report
@@ -151,8 +151,8 @@ def test_run_succeeds_and_says_where_the_report_is(
     assert (folder / "report.html").is_file()
 
 
-def test_run_shows_the_tool_at_the_end(report: tuple["subprocess.CompletedProcess[str]", Path]) -> None:
-    # The paper's last position, to the digits that the screen has.
+def test_run_prints_the_final_tool_position(report: tuple["subprocess.CompletedProcess[str]", Path]) -> None:
+    # The paper's last position, to the printed digits.
     assert "-2.94927874" in report[0].stdout
     assert "2.34792904" in report[0].stdout
 
@@ -179,7 +179,7 @@ def test_a_changed_parameter_changes_the_run(invoke: Invoke, tmp_path: Path) -> 
     assert (tmp_path / "short" / "report.html").is_file()
 
 
-def test_a_run_goes_on_from_a_saved_state_bit_for_bit(invoke: Invoke, tmp_path: Path) -> None:
+def test_a_run_continues_from_a_saved_state_bit_for_bit(invoke: Invoke, tmp_path: Path) -> None:
     first = ("run", "falling_pendulum", "--stop-time", "4", "--sample-time", "0.01", "--no-figures")
     assert invoke(*first, "--save-state", "stopped.npz", "--out", "first").exit_code == 0
     second = ("run", "falling_pendulum", "--stop-time", "6", "--sample-time", "0.01", "--no-figures")
@@ -192,14 +192,14 @@ def test_a_run_goes_on_from_a_saved_state_bit_for_bit(invoke: Invoke, tmp_path: 
             np.testing.assert_array_equal(data[name][1:], whole[name][whole.time > 4.0])
 
 
-def test_a_file_that_is_no_saved_state_is_refused(invoke: Invoke, tmp_path: Path) -> None:
+def test_a_file_that_is_not_a_saved_state_is_refused(invoke: Invoke, tmp_path: Path) -> None:
     (tmp_path / "other.npz").write_bytes(b"not a state")
     result = invoke("run", "falling_pendulum", "--from-state", "other.npz", "--no-figures")
     assert result.exit_code == 2
     assert "other.npz" in result.stderr
 
 
-def test_what_is_beyond_a_limit_stands_out(invoke: Invoke) -> None:
+def test_a_joint_that_exceeds_a_limit_is_marked(invoke: Invoke) -> None:
     motion = next(
         name for name, block in ab.load_diagram("kr180model").blocks.items() if block.type_name() == "JTraj"
     )
@@ -208,7 +208,7 @@ def test_what_is_beyond_a_limit_stands_out(invoke: Invoke) -> None:
     assert "! joint 'link1' leaves its range" in result.stdout
 
 
-def test_a_run_is_logged_while_it_goes_on(
+def test_a_run_logs_the_chosen_signals_while_it_runs(
     invoke: Invoke, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     import pyarrow.parquet as pq

@@ -1,4 +1,4 @@
-"""``armblocks convert``: files in other formats, none replaced unasked."""
+"""``armblocks convert``: conversion to other formats; existing files are replaced only with ``--force``."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -27,7 +27,7 @@ def test_diagrams_robots_and_libraries_are_converted(invoke: Invoke, tmp_path: P
     assert ab.load_robot(tmp_path / "arm.json").robot == ab.load_robot(tmp_path / "arm.m").robot
 
 
-def test_a_file_is_replaced_with_force_only(invoke: Invoke, tmp_path: Path) -> None:
+def test_an_existing_file_is_replaced_only_with_force(invoke: Invoke, tmp_path: Path) -> None:
     (tmp_path / "model.py").write_text("mine", encoding="utf-8")
     result = invoke("convert", "kr180model", "model.py")
     assert result.exit_code == 2
@@ -37,7 +37,7 @@ def test_a_file_is_replaced_with_force_only(invoke: Invoke, tmp_path: Path) -> N
     assert "import armblocks" in (tmp_path / "model.py").read_text(encoding="utf-8")
 
 
-def test_what_cannot_be_converted_is_refused(invoke: Invoke, tmp_path: Path) -> None:
+def test_conversions_that_do_not_exist_are_refused(invoke: Invoke, tmp_path: Path) -> None:
     refused = {
         ("kr180", "arm.py"): "a robot cannot be written as '.py'",
         ("kr180model", "model.txt"): "a diagram cannot be written as '.txt'",

@@ -1,4 +1,4 @@
-"""``armblocks diagram``: sheets as files, and what is refused."""
+"""``armblocks diagram``: drawings of sheets as files, and rejected arguments."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -28,7 +28,9 @@ def nested() -> Diagram:
 
 
 @pytest.mark.parametrize("kind", DRAWING_FORMATS)
-def test_every_format_is_written_and_repeatable(invoke: Invoke, tmp_path: Path, kind: str) -> None:
+def test_every_format_is_written_and_two_drawings_are_equal(
+    invoke: Invoke, tmp_path: Path, kind: str
+) -> None:
     result = invoke("diagram", "van_der_pol_pid", "-o", f"drawn.{kind}")
     assert result.exit_code == 0, result.output
     assert result.stdout == f"wrote drawn.{kind}\n"
@@ -37,7 +39,7 @@ def test_every_format_is_written_and_repeatable(invoke: Invoke, tmp_path: Path, 
     assert written == drawing_bytes(ab.load_diagram("van_der_pol_pid"), kind)
 
 
-def test_a_sheet_shows_what_is_inside_a_subsystem(invoke: Invoke, tmp_path: Path) -> None:
+def test_the_sheet_option_draws_the_blocks_of_a_subsystem(invoke: Invoke, tmp_path: Path) -> None:
     ab.save_diagram(nested(), tmp_path / "outer.json")
     assert invoke("diagram", "outer.json", "--sheet", "amplifier", "--dark").exit_code == 0
     text = (tmp_path / "outer-amplifier.svg").read_text(encoding="utf-8")
@@ -45,13 +47,13 @@ def test_a_sheet_shows_what_is_inside_a_subsystem(invoke: Invoke, tmp_path: Path
     assert "prefers-color-scheme" not in text
 
 
-def test_dark_and_light_differ(tmp_path: Path) -> None:
+def test_drawings_in_dark_and_light_differ(tmp_path: Path) -> None:
     diagram = nested()
     for kind in DRAWING_FORMATS:
         assert drawing_bytes(diagram, kind, theme="light") != drawing_bytes(diagram, kind, theme="dark")
 
 
-def test_other_sheets_and_suffixes_are_refused(invoke: Invoke, tmp_path: Path) -> None:
+def test_unknown_sheets_and_suffixes_are_refused(invoke: Invoke, tmp_path: Path) -> None:
     ab.save_diagram(nested(), tmp_path / "outer.json")
     result = invoke("diagram", "outer.json", "--sheet", "amplifer")
     assert result.exit_code == 2
@@ -62,8 +64,8 @@ def test_other_sheets_and_suffixes_are_refused(invoke: Invoke, tmp_path: Path) -
     assert not (tmp_path / "out.bmp").exists()
 
 
-def test_a_drawing_in_progress_is_drawn() -> None:
-    """Its inputs are not connected yet, so that nothing is known of its wires."""
+def test_an_unfinished_diagram_is_drawn() -> None:
+    """The inputs are not connected yet, so that the types of the signals are unknown."""
     wire = Connection(PortRef("gain", "y"), PortRef("scope", "u1"))
     draft = Diagram(name="draft", blocks={"gain": Gain(), "scope": Scope(inputs=2)}, connections=(wire,))
     assert b"gain (Gain)" in drawing_bytes(draft, "svg")

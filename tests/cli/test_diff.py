@@ -1,4 +1,4 @@
-"""What ``armblocks diff`` says, and its exit codes."""
+"""Output and exit codes of ``armblocks diff``."""
 
 import dataclasses
 import json
@@ -23,7 +23,7 @@ def changed() -> Diagram:
     return dataclasses.replace(diagram, settings=dataclasses.replace(diagram.settings, stop_time=5.0))
 
 
-def test_equal_diagrams_end_with_0(invoke: Invoke, tmp_path: Path) -> None:
+def test_equal_diagrams_give_exit_code_0(invoke: Invoke, tmp_path: Path) -> None:
     diagram = ab.load_diagram("kr180model")
     ab.save_diagram(dataclasses.replace(diagram, layout={}, name="other"), tmp_path / "copy.json")
     result = invoke("diff", "kr180model", "copy.json")
@@ -31,7 +31,7 @@ def test_equal_diagrams_end_with_0(invoke: Invoke, tmp_path: Path) -> None:
     assert result.stdout == "kr180model and copy.json are the same, layout aside\n"
 
 
-def test_changes_are_lines_with_old_and_new_and_end_with_1(
+def test_changes_are_lines_with_both_values_and_give_exit_code_1(
     invoke: Invoke, tmp_path: Path, changed: Diagram
 ) -> None:
     ab.save_diagram(changed, tmp_path / "new.json")
@@ -42,7 +42,7 @@ def test_changes_are_lines_with_old_and_new_and_end_with_1(
     assert "  ~ stop_time: 10 -> 5\n" in result.stdout
 
 
-def test_json_holds_the_same(invoke: Invoke, tmp_path: Path, changed: Diagram) -> None:
+def test_the_json_output_has_the_same_changes(invoke: Invoke, tmp_path: Path, changed: Diagram) -> None:
     ab.save_diagram(changed, tmp_path / "new.json")
     result = invoke("diff", "kr180model", "new.json", "--json")
     assert result.exit_code == 1
@@ -53,7 +53,7 @@ def test_json_holds_the_same(invoke: Invoke, tmp_path: Path, changed: Diagram) -
     assert said["added"] == said["removed"] == said["wires_added"] == []
 
 
-def test_logged_outputs_and_notes_are_told(invoke: Invoke, tmp_path: Path) -> None:
+def test_changed_logged_outputs_and_notes_are_listed(invoke: Invoke, tmp_path: Path) -> None:
     old = ab.load_diagram("van_der_pol_pid")
     notes = {"/n1": Note(x=0.0, y=0.0, text="held by a PID")}
     new = dataclasses.replace(old, logged=(PortRef("PID", "y"),), notes=notes)
@@ -66,14 +66,16 @@ def test_logged_outputs_and_notes_are_told(invoke: Invoke, tmp_path: Path) -> No
     assert found["notes"] == [{"path": "", "name": "/n1", "before": None, "after": "held by a PID"}]
 
 
-def test_unlike_diagrams_fit_into_80_columns(invoke: Invoke) -> None:
+def test_the_differences_of_unlike_diagrams_fit_into_80_columns(invoke: Invoke) -> None:
     result = invoke("diff", "kr180model", "van_der_pol_pid")
     assert result.exit_code == 1, result.output
     assert max(len(line) for line in result.stdout.splitlines()) <= 80
     assert invoke("diff", "kr180model", "van_der_pol_pid", "--json").exit_code == 1
 
 
-def test_values_whose_short_texts_agree_are_told_apart(invoke: Invoke, tmp_path: Path) -> None:
+def test_values_with_the_same_short_text_are_listed_with_their_difference(
+    invoke: Invoke, tmp_path: Path
+) -> None:
     robot = ab.load_robot("kr180").robot
     on_the_moon = dataclasses.replace(robot, gravity=(0.0, 0.0, -1.62))
     diagram = with_parameters(ab.load_diagram("kr180model"), {"rne.robot": on_the_moon})
@@ -91,7 +93,7 @@ def test_an_unknown_diagram_is_refused(refused: Callable[..., str]) -> None:
     assert "kr180modle" in refused("diff", "kr180model", "kr180modle")
 
 
-def test_numbers_that_differ_never_look_alike() -> None:
+def test_different_numbers_have_different_texts() -> None:
     assert value_text(0.1) == "0.1"
     assert value_text(0.1 + 1e-12) != value_text(0.1)
     assert value_text(((1.0, 2.0), (3.0, 4.5))) == "[1 2; 3 4.5]"

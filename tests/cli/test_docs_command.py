@@ -1,4 +1,4 @@
-"""``armblocks docs`` opens a page, builds the pages in a checkout, and reports why it cannot."""
+"""``armblocks docs`` opens a page, builds the pages in a checkout, and reports the reason of a failure."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from armblocks.errors import FormatError
 
 @pytest.fixture
 def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Some pages in place of the installed ones."""
+    """Test pages in place of the installed pages."""
     folder = tmp_path / "pages"
     for name in ("index", "simulation", "reference/blocks", "reference/blocks/Gain"):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
@@ -37,19 +37,21 @@ def test_a_page_or_a_block_is_opened(
         assert invoke("docs", *typed).stdout == ""
     files = [site / f"{name}.html" for name in ("index", "simulation", "reference/blocks/Gain")]
     assert opened == [file.as_uri() for file in files]
-    # Where there is no browser the place is printed, as with --path.
+    # Without a browser the address is printed, as with --path.
     assert invoke("docs").stdout.strip() == invoke("docs", "--path").stdout.strip() == str(files[0])
     assert len(opened) == 4
 
 
-def test_pages_are_completed_and_unknown_ones_refused(site: Path, refused: Callable[..., str]) -> None:
+def test_page_names_are_completed_and_unknown_pages_are_refused(
+    site: Path, refused: Callable[..., str]
+) -> None:
     assert docs.complete_pages("sim") == ["simulation"]
     text = refused("docs", "simulatoin")
     assert "there is no page of the documentation named 'simulatoin'" in text
     assert "did you mean 'simulation'?" in text
 
 
-def test_a_checkout_builds_the_pages_once_and_says_why_it_cannot(
+def test_a_checkout_builds_the_pages_once_and_reports_why_a_build_fails(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     absent, script = tmp_path / "absent", tmp_path / "docs" / "build_site.py"
@@ -72,4 +74,4 @@ def test_a_checkout_builds_the_pages_once_and_says_why_it_cannot(
     assert len(lines) == 2
     assert "Building the documentation of this checkout" in lines[0]
     script.write_text("raise SystemExit(3)")
-    assert docs.built_pages(lines.append, absent, script) == index.parent  # they are there
+    assert docs.built_pages(lines.append, absent, script) == index.parent  # the pages exist

@@ -13,7 +13,7 @@ from armblocks.cli.progress import RunProgress
     ("spent", "fraction", "told"),
     [(10.0, 0.5, "about 10 s left"), (60.0, 0.1, "about 9 min left"), (3600.0, 0.25, "about 3.0 h left")],
 )
-def test_a_long_run_tells_how_long_the_rest_takes(
+def test_a_long_run_shows_the_remaining_time(
     spent: float, fraction: float, told: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now = [100.0]
@@ -26,7 +26,7 @@ def test_a_long_run_tells_how_long_the_rest_takes(
 
 
 @pytest.mark.parametrize(("factor", "told"), [(0.00612, "0.00612"), (3.0, "3"), (123456.0, "123,456")])
-def test_a_run_slower_than_real_time_says_how_slow(
+def test_the_speed_relative_to_real_time_is_shown(
     factor: float, told: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now = [100.0]
@@ -38,7 +38,7 @@ def test_a_run_slower_than_real_time_says_how_slow(
     assert f"t = 1 s, {told} x real time" in text.getvalue()
 
 
-def test_a_run_that_is_nearly_done_tells_no_rest(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_that_is_nearly_finished_shows_no_remaining_time(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [100.0]
     monkeypatch.setattr(module.time, "perf_counter", lambda: now[0])
     text = io.StringIO()

@@ -1,4 +1,4 @@
-"""``armblocks show`` for robots that the shipped ones do not cover: trees, sliding joints, modified rows."""
+"""``armblocks show`` for robots unlike the shipped ones: trees, prismatic joints, modified D-H parameters."""
 
 import io
 import math
@@ -47,7 +47,7 @@ def test_a_tree_as_text_has_a_line_for_each_link(tree: Robot) -> None:
     assert "right trunk revolute 0 1 0 0, -0.2, 0" in lines
 
 
-def test_a_sliding_joint_has_limits_in_metres(tree: Robot) -> None:
+def test_a_prismatic_joint_has_limits_in_metres(tree: Robot) -> None:
     lines = [" ".join(line.split()) for line in printed(tree).splitlines()]
     assert "trunk -0.5 m 1.25 m 2 m/s 300 N" in lines
 
@@ -58,13 +58,13 @@ def test_a_base_that_is_not_the_identity_is_printed(tree: Robot) -> None:
     assert "tool = identity" in text
 
 
-def test_the_joint_variable_of_a_sliding_joint_stands_under_d() -> None:
+def test_the_variable_of_a_prismatic_joint_is_in_the_column_of_d() -> None:
     slide = standard_dh("slide", theta=math.pi / 2, a=0.25, sigma=1, offset=0.125)
     lines = dh_table(Robot(name="slider", links=(slide,)))
     assert lines[3] == "| slide |     1.571|         q|      0.25|         0|     0.125|"
 
 
-def test_modified_rows_are_named() -> None:
+def test_the_header_names_modified_denavit_hartenberg_parameters() -> None:
     robot = Robot(
         name="craig", links=(modified_dh("one", alpha=0.5), modified_dh("two", parent="one", a=1.0))
     )
@@ -72,12 +72,12 @@ def test_modified_rows_are_named() -> None:
 
 
 @pytest.mark.parametrize("width", [60, 80, 160])
-def test_many_links_are_split_to_the_width(width: int) -> None:
+def test_the_names_of_many_links_are_wrapped_to_the_width(width: int) -> None:
     links = tuple(
         standard_dh(f"link{k}", a=0.1, mass=1.0 + k, parent=f"link{k - 1}" if k else None) for k in range(20)
     )
     text = printed(Robot(name="snake", links=links), width)
     assert max(len(line.rstrip()) for line in text.splitlines()) <= max(
         width, 66
-    )  # the D-H table of these names is 65 wide
+    )  # the D-H table with these names is 65 columns wide
     assert all(f"link{k}" in text for k in range(20))

@@ -1,4 +1,4 @@
-"""``armblocks studio`` reports why it cannot start; exit code 2."""
+"""``armblocks studio`` reports the reason of a failed start; exit code 2."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def said(text: str) -> str:
     return " ".join(text.replace("│", " ").split())
 
 
-def test_a_port_that_another_program_holds(refused: Refused) -> None:
+def test_a_port_in_use_by_another_program_is_refused(refused: Refused) -> None:
     with socket.socket() as held:
         held.bind(("127.0.0.1", 0))
         held.listen()
@@ -29,20 +29,20 @@ def test_a_port_that_another_program_holds(refused: Refused) -> None:
     assert "choose another --port" in text
 
 
-def test_a_folder_that_is_missing_or_is_a_file(refused: Refused, tmp_path: Path) -> None:
+def test_a_missing_folder_or_a_file_in_its_place_is_refused(refused: Refused, tmp_path: Path) -> None:
     (tmp_path / "a.json").write_text("{}")
     for folder in ("none", "a.json"):
         assert "there is no such folder" in said(refused("studio", "--no-browser", "--folder", folder))
 
 
-def test_a_folder_that_cannot_be_read(
+def test_an_unreadable_folder_is_refused(
     refused: Refused, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("os.access", lambda *_: False)  # whoever runs the tests may be allowed everything
+    monkeypatch.setattr("os.access", lambda *_: False)  # the user who runs the tests may have all permissions
     assert "is not readable" in said(refused("studio", "--no-browser", "--folder", str(tmp_path)))
 
 
-def test_a_model_outside_of_the_folder(refused: Refused, tmp_path: Path) -> None:
+def test_a_model_outside_of_the_folder_is_refused(refused: Refused, tmp_path: Path) -> None:
     (tmp_path / "m.json").write_text("{}")
     (tmp_path / "other").mkdir()
     text = said(refused("studio", "--no-browser", "--folder", "other", "m.json"))
@@ -50,11 +50,13 @@ def test_a_model_outside_of_the_folder(refused: Refused, tmp_path: Path) -> None
     assert "omit --folder" in text
 
 
-def test_a_model_that_is_not_there(refused: Refused) -> None:
+def test_a_missing_model_is_refused(refused: Refused) -> None:
     assert "there is no such file and no such example" in said(refused("studio", "--no-browser", "nix"))
 
 
-def test_an_installation_without_the_page(refused: Refused, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_installation_without_the_studio_page_is_reported(
+    refused: Refused, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def missing() -> Path:
         return built_page(Path("nowhere"), Path("nowhere/build_page.py"))
 
@@ -64,7 +66,7 @@ def test_an_installation_without_the_page(refused: Refused, monkeypatch: pytest.
     assert "install a wheel that has the page" in text
 
 
-def test_a_checkout_builds_the_page_once_and_says_why_it_cannot(tmp_path: Path) -> None:
+def test_a_checkout_builds_the_page_once_and_reports_why_a_build_fails(tmp_path: Path) -> None:
     web, script = tmp_path / "web", tmp_path / "build_page.py"
     lines: list[str] = []
     build_in_checkout(lines.append, web, script)  # not a checkout: nothing to build from
@@ -81,5 +83,5 @@ def test_a_checkout_builds_the_page_once_and_says_why_it_cannot(tmp_path: Path) 
     assert len(lines) == 2
     assert "Building the studio page of this checkout" in lines[0]
     script.write_text("raise SystemExit(3)")
-    build_in_checkout(lines.append, web, script)  # it is there
+    build_in_checkout(lines.append, web, script)  # the page exists
     assert built_page(web) == web

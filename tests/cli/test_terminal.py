@@ -1,4 +1,4 @@
-"""How messages look: every part of an error, warnings once and on one line, narrow and wide."""
+"""Messages in the terminal: the parts of an error, warnings once and on one line, narrow and wide."""
 
 import io
 import warnings
@@ -26,7 +26,7 @@ def test_an_error_shows_only_the_parts_it_has(capsys: pytest.CaptureFixture[str]
     assert capsys.readouterr().err.rstrip() == "error: nothing works"
 
 
-def test_square_brackets_in_a_message_are_no_markup(capsys: pytest.CaptureFixture[str]) -> None:
+def test_square_brackets_in_a_message_are_not_markup(capsys: pytest.CaptureFixture[str]) -> None:
     terminal.show_error(InputError("the value is [bold]x[/bold]", allowed="[1 2 3]"))
     text = capsys.readouterr().err
     assert "[bold]x[/bold]" in text
@@ -40,7 +40,7 @@ def test_lines_of_a_log_are_never_wrapped(capsys: pytest.CaptureFixture[str]) ->
 
 
 @pytest.mark.parametrize("width", [40, 80, 160])
-def test_a_terminal_gets_no_line_wider_than_itself(width: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_line_is_wider_than_the_terminal(width: int, monkeypatch: pytest.MonkeyPatch) -> None:
     console = Console(width=width, force_terminal=True, record=True, highlight=False, file=io.StringIO())
     monkeypatch.setattr(terminal, "messages_console", lambda: console)
     terminal.show_error(UnknownNameError("block", "blok7", [f"block{number}" for number in range(50)]))
@@ -56,7 +56,7 @@ def test_a_warning_is_one_line_and_comes_once(capsys: pytest.CaptureFixture[str]
     assert capsys.readouterr().err == "warning: link 'link1' has inertia but no mass\n"
 
 
-def test_other_warnings_stay_pythons_own() -> None:
+def test_warnings_of_other_categories_are_left_to_python() -> None:
     with (
         terminal.tidy_warnings(terminal.messages_console()),
         pytest.raises(UserWarning, match="somebody else's"),

@@ -1,4 +1,5 @@
-"""Diagram files by hand, given to ``armblocks run``: bad ones are refused, good ones give closed forms."""
+"""Hand-written diagram files for ``armblocks run``: bad files are refused, good files agree with closed
+forms."""
 
 from __future__ import annotations
 
@@ -42,15 +43,15 @@ HOSTILE: dict[str, tuple[str | bytes, str]] = {
     ),
     "brackets without end": ("[" * 100_000, "levels"),
     "blocks as a list": (json.dumps({"format": 1, "name": "a", "blocks": [1]}), "blocks"),
-    "a format of the future": (json.dumps({"format": 99, "name": "a", "blocks": {}}), "99"),
+    "a later format version": (json.dumps({"format": 99, "name": "a", "blocks": {}}), "99"),
     "a parameter that does not exist": (
         document({"c": block("Constant", valeu=1.0)}),
         "did you mean 'value'?",
     ),
-    "text in the place of a number": (document({"c": block("Constant", value="one")}), "c"),
-    "a wire that is no sentence": (document(FED, "c/y to x/u"), "c/y to x/u"),
-    "a wire to no port": (document(FED, "c/y -> x/v"), "'v'"),
-    "a wire to no block": (document(FED, "c/y -> z/u"), "'z'"),
+    "text in place of a number": (document({"c": block("Constant", value="one")}), "c"),
+    "a connection without an arrow": (document(FED, "c/y to x/u"), "c/y to x/u"),
+    "a connection to an unknown port": (document(FED, "c/y -> x/v"), "'v'"),
+    "a connection to an unknown block": (document(FED, "c/y -> z/u"), "'z'"),
     "a name with a slash": (document({"a/b": block("Constant")}), "'/'"),
     "code in a formula": (
         document({"c": block("Clock"), "f": block("Expression", formula="open('x','w')")}, "c/y -> f/u"),
@@ -66,7 +67,7 @@ HOSTILE: dict[str, tuple[str | bytes, str]] = {
         ),
         "passwd",
     ),
-    "a file outside of the folder": (
+    "a file outside the folder": (
         document({"c": block("Clock"), "f": block("ToFile", file="../../stolen.csv")}, "c/y -> f/u"),
         "stolen.csv",
     ),
@@ -76,7 +77,7 @@ HOSTILE: dict[str, tuple[str | bytes, str]] = {
 
 
 @pytest.mark.parametrize(("content", "words"), HOSTILE.values(), ids=HOSTILE.keys())
-def test_a_bad_file_is_refused_by_one_message_and_leaves_nothing(
+def test_a_bad_file_is_refused_with_one_message_and_writes_nothing(
     content: str | bytes, words: str, invoke: Callable[..., Result], tmp_path: Path
 ) -> None:
     (tmp_path / "evil.py").write_text("open('stolen', 'w')\ndef f(u): return u\n", encoding="utf-8")
@@ -240,7 +241,7 @@ GOOD: dict[str, tuple[str, Callable[[Signals], tuple[NDArray[np.float64], NDArra
 
 
 @pytest.mark.parametrize(("content", "compare", "error"), GOOD.values(), ids=GOOD.keys())
-def test_a_good_file_gives_its_closed_form(
+def test_the_run_of_a_good_file_agrees_with_its_closed_form(
     content: str, compare: Any, error: float, invoke: Callable[..., Result], tmp_path: Path
 ) -> None:
     (tmp_path / "tried.json").write_text(content, encoding="utf-8")
@@ -250,6 +251,6 @@ def test_a_good_file_gives_its_closed_form(
         names, *rows = csv.reader(stream)
     columns = np.array(rows, dtype=float).T
     found, expected = compare(dict(zip(names, columns)))
-    # The tolerance of a run is 1e-6 of each step; what adds up over the run stays within this.
+    # The tolerance is 1e-6 per step; the accumulated error of the run stays below this bound.
     assert found == pytest.approx(expected, rel=error, abs=error)
     assert found.size >= 5
