@@ -1,4 +1,4 @@
-"""One block, evaluated with numbers through CasADi."""
+"""Evaluation of a single block with numbers, by CasADi's interpreter."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from armblocks.diagram import Block, DiagramBuilder, trace_diagram
 
 
 def evaluate(block: Block, *inputs: ArrayLike, t: float = 0.0, x: ArrayLike = ()) -> dict[str, np.ndarray]:
-    """All outputs and records of a block whose inputs are constant, at time ``t`` and states ``x``."""
+    """Return all outputs and records of a block with constant inputs at time ``t`` and states ``x``."""
     builder = DiagramBuilder("one block")
     sources = [builder.add(f"in{k}", Constant(value=value)) for k, value in enumerate(inputs)]
     builder.add("block", block, *sources)
@@ -19,7 +19,7 @@ def evaluate(block: Block, *inputs: ArrayLike, t: float = 0.0, x: ArrayLike = ()
     z = np.zeros(0)
     if system.discrete.size:
         (start,) = system.initial_discrete(p)
-        # a reset without events: the modes settle
+        # a reset without events: the modes become consistent
         _, z = system.reset(t, x, start, (), p, np.zeros(system.guards.outputs.size))
     (y,) = system.signals(t, x, z, (), p)
     values = system.signals_layout.unpack(y)

@@ -1,4 +1,4 @@
-"""Algebraic constraints against closed forms; decision tables against Python's own."""
+"""Algebraic constraints compared with closed forms; decision tables compared with Python."""
 
 import itertools
 from typing import Any
@@ -33,7 +33,7 @@ RUNS: list[dict[str, Any]] = [
 
 
 def constrained(formula: str, initial: float = 0.0) -> ab.DiagramBuilder:
-    """z such that formula(z, t) = 0, its derivative and integral, and what a sampled block sees of it."""
+    """A diagram with z from formula(z, t) = 0, its derivative, its integral and a sample-and-hold of z."""
     builder = ab.DiagramBuilder("constrained", settings=ab.SimulationOptions(stop_time=2.0, sample_time=0.1))
     z = builder.add("z", AlgebraicConstraint(initial=initial))
     time = builder.add("time", Clock())
@@ -46,7 +46,7 @@ def constrained(formula: str, initial: float = 0.0) -> ab.DiagramBuilder:
 
 
 @pytest.mark.parametrize("settings", RUNS)
-def test_the_root_is_the_one_next_to_the_start_and_moves_along(settings: dict[str, Any]) -> None:
+def test_the_root_nearest_to_the_start_value_is_found_and_tracked(settings: dict[str, Any]) -> None:
     for sign in (1.0, -1.0):
         result = ab.simulate(constrained("u1 ^ 2 - 1 - u2", initial=3.0 * sign).build(), **settings)
         expected = sign * np.sqrt(1.0 + result.time)
@@ -58,7 +58,7 @@ def test_the_root_is_the_one_next_to_the_start_and_moves_along(settings: dict[st
         np.testing.assert_allclose(result["held"], held, rtol=1e-9)
 
 
-def test_a_linear_equation_is_solved_while_compiling() -> None:
+def test_a_linear_equation_is_eliminated_symbolically() -> None:
     diagram = constrained("4 * u1 - u2").build()
     assert ab.compile_diagram(diagram).system.algebraic.size == 0
     result = ab.simulate(diagram)
@@ -78,8 +78,8 @@ def test_a_vector_is_solved_as_a_whole() -> None:
     np.testing.assert_allclose(result["z"] @ np.transpose(matrix), result["right"], rtol=1e-14, atol=1e-15)
 
 
-def test_two_constraints_that_hang_together() -> None:
-    """a + b = 3 and a b = 2 with a > b: 2 and 1."""
+def test_two_coupled_constraints_are_solved() -> None:
+    """a + b = 3 and a b = 2 with a > b have the solution a = 2, b = 1."""
     builder = ab.DiagramBuilder("pair", settings=ab.SimulationOptions(stop_time=1.0))
     a = builder.add("a", AlgebraicConstraint(initial=3.0))
     b = builder.add("b", AlgebraicConstraint(initial=0.5))
@@ -90,7 +90,7 @@ def test_two_constraints_that_hang_together() -> None:
     np.testing.assert_allclose(result["b"], 1.0, rtol=1e-12)
 
 
-def test_an_input_without_influence_is_refused() -> None:
+def test_a_constraint_whose_input_does_not_depend_on_its_output_is_refused() -> None:
     builder = ab.DiagramBuilder("alone")
     z = builder.add("z", AlgebraicConstraint(), builder.add("one", Constant()))
     builder.add("double", Gain(gain=2.0), z)
@@ -98,8 +98,8 @@ def test_an_input_without_influence_is_refused() -> None:
         ab.simulate(builder.build())
 
 
-def test_its_linear_system_is_that_of_the_implicit_function() -> None:
-    """x' = z with z^3 + z = u + x: at z = 1 the slope is 1 / 4."""
+def test_linearisation_differentiates_the_implicit_function() -> None:
+    """x' = z with z^3 + z = u + x: at z = 1 the derivative of z is 1 / 4."""
     builder = ab.DiagramBuilder("flow")
     z = builder.add("z", AlgebraicConstraint(initial=0.9))
     x = builder.add("x", Integrator(initial=1.5), z)
@@ -124,7 +124,9 @@ def decided(conditions: tuple[int, ...]) -> tuple[float, ...]:
 
 @pytest.mark.parametrize("conditions", list(itertools.product((0, 1), repeat=3)))
 @pytest.mark.parametrize("settings", RUNS[:2])
-def test_the_first_decision_that_fits_is_taken(conditions: tuple[int, ...], settings: dict[str, Any]) -> None:
+def test_the_first_matching_row_of_a_decision_table_is_taken(
+    conditions: tuple[int, ...], settings: dict[str, Any]
+) -> None:
     builder = ab.DiagramBuilder("table", settings=ab.SimulationOptions(stop_time=1.0))
     given = [builder.add(f"c{k}", Constant(value=5.0 * value)) for k, value in enumerate(conditions)]
     table = TruthTable(decisions=DECISIONS, actions=ACTIONS)
@@ -133,7 +135,7 @@ def test_the_first_decision_that_fits_is_taken(conditions: tuple[int, ...], sett
     assert tuple(result["table"][-1]) == decided(conditions)
 
 
-def test_tables_that_do_not_decide_are_refused() -> None:
+def test_invalid_decision_tables_are_refused() -> None:
     with pytest.raises(InputError, match=r"the conditions \[0, 1\] are not decided"):
         TruthTable(decisions=((1.0, -1.0), (-1.0, 0.0)), actions=((1.0,), (0.0,)))
     with pytest.raises(InputError, match=r"there are 2 decisions and 1 actions"):
@@ -142,7 +144,7 @@ def test_tables_that_do_not_decide_are_refused() -> None:
         TruthTable(decisions=((-1.0,) * 13,), actions=((1.0,),))
 
 
-def test_a_constraint_that_nothing_reads_is_solved_or_refused_too() -> None:
+def test_an_unsolvable_constraint_with_an_unused_output_is_refused() -> None:
     builder = ab.DiagramBuilder("unread")
     z = builder.add("z", AlgebraicConstraint())
     builder.connect(builder.add("c", Constant()), z["u"])
@@ -151,7 +153,8 @@ def test_a_constraint_that_nothing_reads_is_solved_or_refused_too() -> None:
 
 
 def pendulum(constraint: str) -> ab.Diagram:
-    """A point on a rod of length 1 from the horizontal: x'' = -L x, y'' = -L y - g, and a rule for L."""
+    """A point mass on a rod of length 1 that starts horizontal: x'' = -L x, y'' = -L y - g, with a constraint
+    for L."""
     builder = ab.DiagramBuilder("rod")
     force = builder.add("L", AlgebraicConstraint())
     x = builder.add("x", SecondOrderIntegrator(initial=1.0))
@@ -164,8 +167,9 @@ def pendulum(constraint: str) -> ab.Diagram:
     return builder.build()
 
 
-def test_a_rod_is_refused_as_it_stands_and_swings_once_it_is_differentiated() -> None:
-    """The length itself is of index 3, the speed along the rod of index 2; the acceleration holds L."""
+def test_a_rod_is_refused_at_index_3_and_2_and_simulated_at_index_1() -> None:
+    """The constraint on the length has index 3, on the speed along the rod index 2; the one on the
+    acceleration contains L."""
     for constraint in ("u1^2 + u2^2 - 1", "u1*u3 + u2*u4"):
         with pytest.raises(
             AlgebraicLoopError,
@@ -177,6 +181,7 @@ def test_a_rod_is_refused_as_it_stands_and_swings_once_it_is_differentiated() ->
     period = 2.3678419475762374493  # 4 K(1/2) / sqrt(9.81)
     whole = pendulum("u3^2 + u4^2 - u5 * (u1^2 + u2^2) - 9.81 * u2")
     found = ab.simulate(whole, stop_time=period, rtol=1e-11, atol=1e-12)
-    # the length is kept by its second derivative only, and so is as good as the tolerance times the square
+    # only the second derivative of the length is constrained: its error is the tolerance times the time
+    # squared
     assert found["x/x"][-1] == pytest.approx(1.0, abs=1e-9)
     assert found["y/x"][-1] == pytest.approx(0.0, abs=1e-9)

@@ -1,4 +1,4 @@
-"""Elementwise arithmetic and reductions against NumPy, on random numbers and where they are tricky."""
+"""Elementwise arithmetic and reductions compared with NumPy, on random numbers and special cases."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ U = RANDOM.normal(size=(3, 4))
 V = RANDOM.normal(size=(3, 4))
 
 
-def test_one_operation_each() -> None:
+def test_blocks_with_one_elementwise_operation() -> None:
     assert np.array_equal(evaluate(Abs(), U)["y"], np.abs(U))
     assert np.array_equal(evaluate(Bias(bias=2.5), U)["y"], U + 2.5)
     assert np.array_equal(evaluate(UnaryMinus(), U)["y"], -U)
@@ -64,7 +64,7 @@ def test_rounding(name: str, function: np.ufunc) -> None:
     assert np.array_equal(evaluate(Rounding(function=name), u)["y"], function(u))
 
 
-def test_halves_are_rounded_away_from_zero_and_nothing_else() -> None:
+def test_exact_halves_are_rounded_away_from_zero() -> None:
     u = [0.5, 1.5, 2.5, -0.5, -2.5, 0.49999999999999994, 2.4, -2.6, 4503599627370497.0]
     expected = [1, 2, 3, -1, -3, 0, 2, -3, 4503599627370497.0]
     assert evaluate(Rounding(function="round"), u)["y"].tolist() == expected
@@ -78,7 +78,7 @@ def test_remainders() -> None:
     assert np.isnan(evaluate(Modulo(function="rem"), 5.0, 0.0)["y"])
 
 
-def test_a_polynomial_is_numpys() -> None:
+def test_a_polynomial_agrees_with_numpy() -> None:
     c = RANDOM.normal(size=6)
     assert evaluate(Polynomial(coefficients=c), U)["y"] == pytest.approx(np.polyval(c, U), rel=1e-15)
     assert evaluate(Polynomial(coefficients=[3.0]), U)["y"].tolist() == np.full((3, 4), 3.0).tolist()
@@ -92,7 +92,7 @@ def test_polar_and_cartesian_are_inverse() -> None:
     assert back["y"] == pytest.approx(V, rel=1e-14)
 
 
-def test_an_angle_difference_goes_the_short_way() -> None:
+def test_an_angle_difference_lies_between_minus_pi_and_pi() -> None:
     found = evaluate(AngleDifference(), [3.0, -3.0, np.pi, 0.2], [-3.0, 3.0, 0.0, 0.1])["y"]
     assert found == pytest.approx([6 - 2 * np.pi, 2 * np.pi - 6, -np.pi, 0.1], rel=1e-13)
 
@@ -113,7 +113,7 @@ def test_exponentials_and_logarithms(name: str, function: np.ufunc) -> None:
     assert evaluate(MathFunction(function=name), u)["y"] == pytest.approx(function(u), rel=4e-15)
 
 
-def test_area_functions() -> None:
+def test_inverse_hyperbolic_functions() -> None:
     u = RANDOM.uniform(0.1, 0.9, 20)
     assert evaluate(Trigonometry(function="asinh"), u)["y"] == pytest.approx(np.arcsinh(u), rel=1e-14)
     assert evaluate(Trigonometry(function="acosh"), u + 1)["y"] == pytest.approx(np.arccosh(u + 1), rel=1e-14)
@@ -128,7 +128,7 @@ def test_reductions() -> None:
     assert evaluate(CumulativeSum(), U[0])["y"] == pytest.approx(np.cumsum(U[0]), rel=1e-14)
 
 
-def test_extrema_tell_their_place_the_first_of_equals() -> None:
+def test_extrema_give_the_index_of_the_first_of_equal_elements() -> None:
     found = evaluate(Extremum(), [3.0, 1.0, 2.0, 1.0])
     assert (float(found["y"]), float(found["index"])) == (1.0, 2.0)
     found = evaluate(Extremum(function="max"), U)
@@ -144,7 +144,7 @@ def test_norms() -> None:
         assert evaluate(Norm(norm=name), U)["y"] == pytest.approx(np.linalg.norm(U, order), rel=1e-14)
 
 
-def test_what_does_not_fit_is_said() -> None:
+def test_operands_of_unsuitable_shape_are_refused() -> None:
     builder = DiagramBuilder("d")
     a, b = builder.add("a", Constant(value=[1, 2])), builder.add("b", Constant(value=[1, 2, 3]))
     builder.add("dot", DotProduct(), a, b)

@@ -1,4 +1,4 @@
-"""Every block against NumPy, with numbers worked out beside it."""
+"""Outputs of blocks compared with NumPy and with values computed by hand."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def test_sources() -> None:
     assert evaluate(sine, t=0.7)["y"] == pytest.approx(2 * np.sin(3 * 0.7 + 0.4) - 1, rel=1e-15)
 
 
-def test_gains_spread() -> None:
+def test_scalar_and_vector_gains_are_broadcast() -> None:
     assert evaluate(Gain(gain=2.0), [1, 2, 3])["y"].tolist() == [2, 4, 6]
     assert evaluate(Gain(gain=[1, 2, 3]), 2.0)["y"].tolist() == [2, 4, 6]
     assert evaluate(Gain(gain=[[1, 2], [3, 4]]), [[1, 0], [0, 1]])["y"].tolist() == [[1, 0], [0, 4]]
@@ -87,7 +87,7 @@ def test_trigonometry(name: str) -> None:
     assert evaluate(Trigonometry(function=name), u)["y"] == pytest.approx(expected, rel=1e-15)
 
 
-def test_functions_of_two() -> None:
+def test_functions_of_several_inputs() -> None:
     y, x = np.array([1.0, 1.0, -1.0, -1.0]), np.array([1.0, -1.0, -1.0, 1.0])
     assert evaluate(Atan2(), y, x)["angle"] == pytest.approx(np.arctan2(y, x), rel=1e-15)
     assert evaluate(Power(), [2.0, 3.0], 3.0)["y"] == pytest.approx([8.0, 27.0], rel=1e-15)
@@ -101,7 +101,7 @@ def test_saturation() -> None:
     assert evaluate(Saturation(lower=0.0, upper=np.inf), 1e300)["y"] == 1e300
 
 
-def test_routing_undoes_itself() -> None:
+def test_demux_is_the_inverse_of_mux() -> None:
     assert evaluate(Mux(inputs=3), 1.0, [2.0, 3.0], 4.0)["y"].tolist() == [1, 2, 3, 4]
     parts = evaluate(Demux(parts=2), [1.0, 2.0, 3.0, 4.0])
     assert parts["y1"].tolist() == [1, 2]
@@ -116,7 +116,7 @@ def test_poses_and_positions_are_inverse() -> None:
     assert {axis: float(value) for axis, value in evaluate(T2xyz(), T).items()} == {"x": 1, "y": 2, "z": 3}
 
 
-def test_a_state_space_gives_its_output() -> None:
+def test_the_output_of_a_state_space_system() -> None:
     system = StateSpace(
         A=[[0, 1], [-2, -3]], B=[[0], [1]], C=[[1, 0], [1, 1]], D=[[0], [2]], initial=[1.0, 0.0]
     )
@@ -124,18 +124,18 @@ def test_a_state_space_gives_its_output() -> None:
 
 
 @pytest.mark.parametrize("signs", ["", "+*", "+ "])
-def test_signs_are_plus_and_minus(signs: str) -> None:
+def test_signs_other_than_plus_and_minus_are_refused(signs: str) -> None:
     with pytest.raises(InputError, match=r"Sum\.signs: the value is .*Allowed: \+ and -, at least one"):
         Sum(signs=signs)
 
 
 @pytest.mark.parametrize("operators", ["", "*+"])
-def test_operators_are_times_and_divide(operators: str) -> None:
+def test_operators_other_than_times_and_divide_are_refused(operators: str) -> None:
     with pytest.raises(InputError, match=r"Product\.operators: the value is .*: \* and /, at least one"):
         Product(operators=operators)
 
 
-def test_state_space_matrices_fit_each_other() -> None:
+def test_state_space_matrices_of_inconsistent_shapes_are_refused() -> None:
     with pytest.raises(InputError, match=r"A is \(1, 1\), B is \(2, 1\).*A \(n, n\), B \(n, m\)"):
         StateSpace(B=[[1.0], [2.0]])
     with pytest.raises(
@@ -145,7 +145,7 @@ def test_state_space_matrices_fit_each_other() -> None:
         StateSpace(initial=[1.0, 2.0])
 
 
-def test_parameters_of_one_source_fit_each_other() -> None:
+def test_source_parameters_of_inconsistent_shapes_are_refused() -> None:
     with pytest.raises(InputError, match=r"'initial' has shape \(2,\) and 'final' has shape \(3,\)"):
         Step(initial=[1, 2], final=[1, 2, 3])
     with pytest.raises(InputError, match=r"'slope' has shape \(2,\) and 'initial' has shape \(3,\)"):
@@ -157,7 +157,9 @@ def test_parameters_of_one_source_fit_each_other() -> None:
 @pytest.mark.parametrize(
     ("numerator", "denominator"), [((1.0,), (0.0, 1.0)), ((1.0,), (2.0,)), ((1.0, 2.0, 3.0), (1.0, 1.0))]
 )
-def test_a_transfer_function_is_proper(numerator: tuple[float, ...], denominator: tuple[float, ...]) -> None:
+def test_an_improper_transfer_function_is_refused(
+    numerator: tuple[float, ...], denominator: tuple[float, ...]
+) -> None:
     from armblocks.blocks import TransferFunction
 
     with pytest.raises(InputError, match=r"TransferFunction: the denominator is .*no more b than a"):

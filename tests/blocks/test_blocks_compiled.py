@@ -1,4 +1,4 @@
-"""Stateless blocks give the same in native code as in CasADi's interpreter, and survive a file."""
+"""Stateless blocks: native code agrees with CasADi's interpreter, and files keep all parameters."""
 
 from __future__ import annotations
 
@@ -44,7 +44,8 @@ from armblocks.integration.system import compile_system
 
 @pytest.fixture(scope="module")
 def diagram() -> Diagram:
-    """Some of each family behind waves that cross zero and walk through tables and singular poses."""
+    """Blocks of each family, fed by waves that cross zero and pass through all table segments and singular
+    poses."""
     random = np.random.default_rng(31)
     b = DiagramBuilder("stateless blocks")
     u = b.add("u", SineWave(amplitude=[2.0, 1.5, 1.0], frequency=[1.0, 3.0, 2.0], phase=[0.1, 1.0, 2.0]))
@@ -83,7 +84,7 @@ def diagram() -> Diagram:
     return b.build()
 
 
-def test_native_code_gives_what_the_interpreter_gives(diagram: Diagram) -> None:
+def test_native_code_agrees_with_the_interpreter(diagram: Diagram) -> None:
     system = trace_diagram(diagram)
     compiled = compile_system(system)
     times, p = np.linspace(0.0, 5.0, 101), system.parameter_values
@@ -91,11 +92,11 @@ def test_native_code_gives_what_the_interpreter_gives(diagram: Diagram) -> None:
     none = np.zeros((101, 0))
     native = compiled.evaluate_signals(times, none, np.tile(modes, (101, 1)), none, p)
     interpreted = np.array([system.signals(t, (), modes, (), p)[0] for t in times]).T
-    # the same operations; sums and products may be fused, and elementary functions differ by an ulp or two
+    # same operations; multiply-adds may be fused, and elementary functions differ by an ulp or two
     assert native == pytest.approx(interpreted, rel=1e-11, abs=1e-12)
 
 
-def test_a_diagram_with_tables_of_three_axes_survives_a_file(diagram: Diagram, tmp_path: Path) -> None:
+def test_a_file_keeps_a_diagram_with_three_dimensional_tables(diagram: Diagram, tmp_path: Path) -> None:
     path = tmp_path / "diagram.json"
     write_diagram(path, diagram)
     assert read_diagram(path, BLOCKS).blocks == diagram.blocks

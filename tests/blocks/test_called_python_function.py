@@ -1,4 +1,4 @@
-"""Python functions that are called at ticks: equivalence to equations, reports, and errors."""
+"""Python functions called at ticks: agreement with traced functions, run messages, and errors."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ RUNS = pytest.mark.parametrize("settings", SETTINGS, ids=["rk4", "rk45"])
 
 
 def bang(u: float) -> float:
-    """What no tracing can follow."""
+    """A function that cannot be traced."""
     return 1.0 if u < 0.3 else -1.0
 
 
 def loop(controller: Block, *, delay: bool = False) -> Diagram:
-    """A sampled controller around y' = u - y / 2, between sampled blocks that tick with it."""
+    """A sampled controller of y' = u - y / 2, between sampled blocks with the same clock."""
     builder = DiagramBuilder("d")
     plant = builder.add("plant", Integrator())
     seen = builder.add("seen", TransportDelay(delay=0.07), plant) if delay else plant
@@ -49,7 +49,7 @@ def loop(controller: Block, *, delay: bool = False) -> Diagram:
 
 
 def by_hand(count: int) -> np.ndarray:
-    """The same loop, tick by tick: between ticks y' = c - y / 2 has the closed form."""
+    """The same loop, computed tick by tick with the closed form of y' = c - y / 2 between ticks."""
     y, before, found = 0.0, 0.0, list[float]()
     for _ in range(count):
         found.append(y)
@@ -60,7 +60,9 @@ def by_hand(count: int) -> np.ndarray:
 
 
 @RUNS
-def test_it_is_an_equation_to_all_that_ticks_with_it(settings: dict[str, Any]) -> None:
+def test_a_called_function_is_evaluated_in_order_with_the_other_sampled_blocks(
+    settings: dict[str, Any],
+) -> None:
     result = ab.simulate(
         loop(CalledPythonFunction(function=bang, sample_time=T)), stop_time=3.0, sample_time=T, **settings
     )
@@ -73,8 +75,8 @@ def test_it_is_an_equation_to_all_that_ticks_with_it(settings: dict[str, Any]) -
 
 @RUNS
 @pytest.mark.parametrize("delay", [False, True])
-def test_it_gives_what_the_traced_function_gives(settings: dict[str, Any], delay: bool) -> None:
-    """Behind the same clock, for a function that can be both, and with delayed signals on the way."""
+def test_a_called_function_agrees_with_the_traced_function(settings: dict[str, Any], delay: bool) -> None:
+    """With the same clock, for a function that can be called and traced, with and without delayed signals."""
 
     def law(u: Any, t: Any) -> Any:
         return 1.0 - u * u / 4 + 0.1 * t
@@ -99,7 +101,7 @@ def test_it_gives_what_the_traced_function_gives(settings: dict[str, Any], delay
         np.testing.assert_allclose(first[name], second[name], rtol=1e-8, atol=1e-9, err_msg=name)
 
 
-def test_functions_behind_each_other_are_called_once_each_in_order() -> None:
+def test_functions_in_series_are_called_once_per_tick_in_order() -> None:
     calls: list[tuple[str, float]] = []
 
     def first(u: float, t: float) -> float:
@@ -130,7 +132,9 @@ def test_functions_behind_each_other_are_called_once_each_in_order() -> None:
 
 
 @RUNS
-def test_pauses_logs_and_saved_states_change_nothing(settings: dict[str, Any], tmp_path: Path) -> None:
+def test_pauses_logs_and_saved_states_do_not_change_the_result(
+    settings: dict[str, Any], tmp_path: Path
+) -> None:
     diagram = loop(CalledPythonFunction(function=bang, sample_time=T))
     whole = ab.simulate(diagram, stop_time=2.0, sample_time=0.02, **settings)
     run = ab.begin(diagram, stop_time=2.0, sample_time=0.02, **settings)
@@ -147,7 +151,7 @@ def test_pauses_logs_and_saved_states_change_nothing(settings: dict[str, Any], t
     assert first.run.calls + second.run.calls == 21
 
 
-def test_a_loop_that_no_tick_can_order_is_refused() -> None:
+def test_an_algebraic_loop_through_a_called_function_is_refused() -> None:
     builder = DiagramBuilder("d")
     handle = builder.add("f", CalledPythonFunction(function=bang))
     builder.connect(builder.add("g", Gain(gain=0.5), handle), handle["u"])
@@ -155,7 +159,7 @@ def test_a_loop_that_no_tick_can_order_is_refused() -> None:
         trace_diagram(builder.build())
 
 
-def test_what_fails_says_where_and_keeps_the_good_part() -> None:
+def test_a_failed_call_names_block_and_time_and_keeps_the_earlier_samples() -> None:
     def late(u: float, t: float) -> Any:
         return {0.0: 1.0, 1.0: np.ones(3), 2.0: np.nan}.get(t, 1 / 0 if t > 2.5 else u)
 
@@ -188,7 +192,7 @@ def test_what_fails_says_where_and_keeps_the_good_part() -> None:
         ab.simulate(builder.build(), stop_time=1.0)
 
 
-def test_what_has_no_equations_has_no_slopes() -> None:
+def test_derivatives_through_a_called_function_are_refused() -> None:
     diagram = loop(CalledPythonFunction(function=bang, sample_time=T))
     with pytest.raises(
         InputError, match=r"block 'controller' calls Python, which has no derivatives[\s\S]*traceable"
@@ -206,7 +210,7 @@ def test_what_has_no_equations_has_no_slopes() -> None:
         simulate(compile_system(trace_diagram(diagram)), SimulationOptions(stop_time=1.0))
 
 
-def test_parameters_that_do_not_fit_are_refused() -> None:
+def test_invalid_parameters_of_a_called_function_are_refused() -> None:
     with pytest.raises(InputError, match=r"the shapes are '3' for the results a, b[\s\S]*as many shapes"):
         CalledPythonFunction(results="a, b", shapes="3")
     with pytest.raises(InputError, match=r"the shapes are '0'"):
@@ -220,7 +224,7 @@ def test_parameters_that_do_not_fit_are_refused() -> None:
         ab.simulate(builder.build(), stop_time=1.0)
 
 
-def test_a_file_calls_nothing_unasked(tmp_path: Path) -> None:
+def test_a_file_with_a_python_function_is_loaded_only_with_trust(tmp_path: Path) -> None:
     (tmp_path / "law.py").write_text("def bang(u):\n    return 1.0 if u < 0.3 else -1.0\n")
     document = ab.save_diagram(loop(CalledPythonFunction(sample_time=T)), tmp_path / "d.json")
     document.write_text(document.read_text().replace('"function": ""', '"function": "law.py:bang"'))

@@ -1,4 +1,4 @@
-"""Selection and logic: every choice against indexing and comparisons in NumPy."""
+"""Selection and logic blocks compared with indexing and comparisons in NumPy."""
 
 from __future__ import annotations
 
@@ -42,27 +42,27 @@ def test_elements_are_selected_in_order() -> None:
     assert evaluate(Selector(indices=2), U)["y"].shape == ()
 
 
-def test_parts_of_a_matrix() -> None:
+def test_sub_matrices_are_selected() -> None:
     A = np.arange(12.0).reshape(3, 4)
     part = SubMatrix(first_row=2, first_column=2, last_column=3)
     assert np.array_equal(evaluate(part, A)["y"], A[1:, 1:3])
     assert np.array_equal(evaluate(SubMatrix(), A)["y"], A)
 
 
-def test_elements_are_replaced() -> None:
+def test_assignment_replaces_elements() -> None:
     assert evaluate(Assignment(indices=[2, 4]), U, [1.0, 2.0])["y"].tolist() == [10, 1, 30, 2]
     assert evaluate(Assignment(indices=[0, 1], counting="zero-based"), U, 7.0)["y"].tolist() == [7, 7, 30, 40]
 
 
 @pytest.mark.parametrize(("index", "place"), [(-5, 0), (0, 0), (0.99, 0), (1, 1), (3, 3), (9, 3)])
-def test_a_signal_points_at_an_element(index: float, place: int) -> None:
+def test_a_signal_selects_an_element_by_its_index(index: float, place: int) -> None:
     assert evaluate(IndexVector(), index, U)["y"] == U[place]
     assert evaluate(IndexVector(counting="one-based"), index + 1, U)["y"] == U[place]
     switch = MultiportSwitch(inputs=4, counting="zero-based")
     assert evaluate(switch, index, *U)["y"] == U[place]
 
 
-def test_switched_signals_spread() -> None:
+def test_scalar_inputs_of_switches_are_broadcast() -> None:
     assert evaluate(MultiportSwitch(inputs=2), 1.0, 5.0, [1.0, 2.0])["y"].tolist() == [5, 5]
     assert evaluate(MultiportSwitch(inputs=2), 2.0, 5.0, [1.0, 2.0])["y"].tolist() == [1, 2]
     assert evaluate(ManualSwitch(), 5.0, [1.0, 2.0])["y"].tolist() == [5, 5]
@@ -70,7 +70,7 @@ def test_switched_signals_spread() -> None:
 
 
 @pytest.mark.parametrize(("relation", "function"), COMPARISONS.items())
-def test_relations(relation: str, function: np.ufunc) -> None:
+def test_relational_operators(relation: str, function: np.ufunc) -> None:
     left, right = np.array([1.0, 2.0, 3.0]), np.array([2.0, 2.0, 2.0])
     expected = function(left, right).tolist()
     assert evaluate(RelationalOperator(relation=relation), left, right)["y"].tolist() == expected
@@ -89,7 +89,7 @@ GATES = {
 
 
 @pytest.mark.parametrize("operator", GATES)
-def test_gates(operator: str) -> None:
+def test_logical_operators(operator: str) -> None:
     for u in itertools.product([0.0, -2.5], repeat=3):
         found = evaluate(LogicalOperator(operator=operator, inputs=3), *u)["y"]
         assert found == float(GATES[operator](u))
@@ -125,7 +125,7 @@ def test_a_truth_table() -> None:
     assert [float(evaluate(CombinatorialLogic(), u)["y"]) for u in ([0, 1], [1, 1])] == [0, 1]
 
 
-def test_what_does_not_fit_is_said() -> None:
+def test_invalid_indices_shapes_and_tables_are_refused() -> None:
     with pytest.raises(InputError, match=r"Selector: the indices are \[1.5\].*integers, at least 1"):
         Selector(indices=[1.5])
     with pytest.raises(InputError, match=r"Assignment: the indices are \[0.0\]"):

@@ -1,4 +1,4 @@
-"""Complex arithmetic against Python's, whose last bits are the compiler's."""
+"""Complex arithmetic compared with Python's, whose last bits depend on the compiler."""
 
 import cmath
 from itertools import pairwise
@@ -12,7 +12,7 @@ RNG = np.random.default_rng(2)
 NUMBERS = [complex(*pair) for pair in RNG.uniform(-3.0, 3.0, (40, 2)).tolist()]
 
 
-def test_it_agrees_with_pythons() -> None:
+def test_complex_arithmetic_agrees_with_python() -> None:
     for a, b in pairwise(NUMBERS):
         assert product([a, b, a]) == pytest.approx(a * b * a, rel=1e-14)
         assert quotient(a, b) == pytest.approx(a / b, rel=1e-14)

@@ -1,4 +1,4 @@
-"""Linear systems with algebraic equations, against closed forms and SciPy's generalised eigenvalues."""
+"""Descriptor state-space systems compared with closed forms and SciPy's generalised eigenvalues."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ def test_a_circuit_with_the_current_as_an_unknown(solver: dict[str, Any]) -> Non
     )
     result = ab.simulate(diagram(block, Step(time=0.0)), **TOLERANCES, **solver)
     v = -np.expm1(-2.0 * result.time)
-    # RK4 of 0.01: (2 h)^4 / 120 = 1e-9 of the exponential
+    # RK4 with h = 0.01 s: relative error (2 h)^4 / 120 = 1e-9 of the exponential
     assert result["block/y"] == pytest.approx(np.column_stack([v, (1.0 - v) / R]), abs=4e-9)
 
 
 @SOLVERS
-def test_it_is_the_state_space_where_E_is_regular(solver: dict[str, Any]) -> None:
+def test_a_system_with_regular_E_agrees_with_the_state_space_block(solver: dict[str, Any]) -> None:
     random = np.random.default_rng(3)
     E, A = random.normal(size=(3, 3)) + 3 * np.eye(3), random.normal(size=(3, 3)) - 3 * np.eye(3)
     B, C, D = random.normal(size=(3, 2)), random.normal(size=(2, 3)), random.normal(size=(2, 2))
@@ -55,8 +55,8 @@ def test_it_is_the_state_space_where_E_is_regular(solver: dict[str, Any]) -> Non
     assert found["block/y"] == pytest.approx(expected["block/y"], abs=1e-12)
 
 
-def test_its_poles_are_the_finite_generalised_eigenvalues() -> None:
-    """Of a random pencil with E of rank 3 of 5; and the gain at rest is C (-A)^-1 B + D."""
+def test_the_poles_are_the_finite_generalised_eigenvalues() -> None:
+    """A random pencil with E of rank 3 of 5; its static gain is C (-A)^-1 B + D."""
     random = np.random.default_rng(5)
     E = random.normal(size=(5, 3)) @ random.normal(size=(3, 5))
     A, B, C, D = (random.normal(size=size) for size in ((5, 5), (5, 1), (1, 5), (1, 1)))
@@ -69,8 +69,8 @@ def test_its_poles_are_the_finite_generalised_eigenvalues() -> None:
     assert linear.dcgain() == pytest.approx(C @ np.linalg.solve(-A, B) + D, rel=1e-9)
 
 
-def test_the_start_keeps_what_is_differentiated_and_the_rest_follows() -> None:
-    """x1' = -x1, 0 = x2 - 2 x1: of the start (3, 100) only x1 counts."""
+def test_initial_algebraic_variables_follow_from_the_differential_ones() -> None:
+    """x1' = -x1, 0 = x2 - 2 x1: of the initial values (3, 100) only that of x1 is used."""
     block = DescriptorStateSpace(
         E=((1.0, 0.0), (0.0, 0.0)),
         A=((-1.0, 0.0), (-2.0, 1.0)),
@@ -84,7 +84,7 @@ def test_the_start_keeps_what_is_differentiated_and_the_rest_follows() -> None:
     assert result["block/y"] == pytest.approx(np.column_stack([course, 2.0 * course]), abs=1e-9)
 
 
-def test_nothing_but_algebra_is_a_gain() -> None:
+def test_a_system_with_E_equal_to_zero_is_a_gain() -> None:
     """E = 0: 0 = A x + B u."""
     block = DescriptorStateSpace(
         E=np.zeros((2, 2)), A=((2.0, 0.0), (0.0, 4.0)), B=((1.0,), (1.0,)), C=np.eye(2), D=np.zeros((2, 1))
@@ -93,8 +93,8 @@ def test_nothing_but_algebra_is_a_gain() -> None:
     assert result["block/y"] == pytest.approx(np.outer(np.sin(result.time), [-0.5, -0.25]), abs=1e-15)
 
 
-def test_what_does_not_feed_through_may_stand_in_a_loop() -> None:
-    """E is singular, but y = x1 alone: y' = -y + (u - y), which is (1 - exp(-2 t)) / 2."""
+def test_a_system_without_feedthrough_may_be_part_of_a_loop() -> None:
+    """E is singular, but y = x1 only: y' = -y + (u - y) with the solution (1 - exp(-2 t)) / 2."""
     builder = DiagramBuilder("d")
     block = DescriptorStateSpace(
         E=((0.0, 2.0), (0.0, 0.0)),
@@ -112,7 +112,7 @@ def test_what_does_not_feed_through_may_stand_in_a_loop() -> None:
     assert np.ravel(result["plant/y"]) == pytest.approx(-np.expm1(-2.0 * result.time) / 2.0, abs=1e-9)
 
 
-def test_equations_that_do_not_decide_the_rest_are_refused() -> None:
+def test_a_system_of_index_2_and_inconsistent_shapes_are_refused() -> None:
     """Index 2: x1' = x2, 0 = x1 - u."""
     shapes = {"B": ((0.0,), (-1.0,)), "C": ((1.0, 0.0),), "D": ((0.0,),)}
     E = ((1.0, 0.0), (0.0, 0.0))

@@ -1,4 +1,4 @@
-"""Errors of switching blocks, and their guards for vectors."""
+"""Switching blocks: invalid limits, guards for vectors, and outputs at fixed inputs."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_limits_in_the_wrong_order_are_refused(kind: type[Block], lower: str, up
         kind(**{lower: 2.0, upper: 1.0})
 
 
-def test_every_element_of_a_vector_is_guarded_by_itself() -> None:
+def test_every_element_of_a_vector_has_its_own_guards_and_modes() -> None:
     builder = DiagramBuilder("d")
     builder.add("limit", Saturation(upper=[1.0, 2.0]), builder.add("u", Constant(value=[0.0, 3.0])))
     system = trace_diagram(builder.build())
@@ -48,18 +48,18 @@ def test_every_element_of_a_vector_is_guarded_by_itself() -> None:
     assert system.guard_directions == (0, 0, 0, 0)
     p = system.parameter_values
     assert system.guards(0.0, (), [0.0, 0.0], (), p)[0].tolist() == [-1.0, 1.0, 0.5, 3.5]
-    # the second element contradicts its mode, and follows its signal whatever guard fires
+    # the mode of the second element contradicts its signal, and is corrected whatever guard fires
     _, z = system.reset(0.0, (), [0.0, 0.0], (), p, [-1.0, 0.0, 0.0, 0.0])
     assert z.tolist() == [0.0, 1.0]
-    # one that fired and contradicts nothing goes by the event
+    # a guard that fired without a contradiction sets the mode of its element
     _, z = system.reset(0.0, (), [0.0, 0.0], (), p, [1.0, 0.0, 0.0, 0.0])
     assert z.tolist() == [1.0, 1.0]
-    # none fired: modes are consistent
+    # no guard fired: the modes become consistent
     _, z = system.reset(0.0, (), [0.0, 0.0], (), p, [0.0, 0.0, 0.0, 0.0])
     assert z.tolist() == [0.0, 1.0]
 
 
-def test_values_at_one_moment() -> None:
+def test_outputs_at_fixed_inputs() -> None:
     u = np.array([-3.0, -0.5, -0.2, 0.0, 0.5, 0.76, 2.0])
     assert evaluate(Saturation(), u)["y"].tolist() == np.clip(u, -0.5, 0.5).tolist()
     assert evaluate(DeadZone(), u)["y"] == pytest.approx(u - np.clip(u, -0.5, 0.5), abs=0.0)

@@ -1,4 +1,4 @@
-"""Sampled blocks against difference equations worked out by NumPy and SciPy, tick by tick."""
+"""Sampled blocks compared with difference equations solved by NumPy and SciPy, tick by tick."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ U = 2.0 * np.sin(3.0 * TIMES + 0.4) + 0.3
 
 
 def ticked(block: Block, source: Block | None = None, count: int = 40) -> np.ndarray:
-    """The held output of a block at its first ticks; ``source`` feeds it, a sine ``U`` unless given."""
+    """Return the output of a block at its first ticks; its input is ``source``, by default the sine ``U``."""
     builder = DiagramBuilder("d")
     source = source or SineWave(amplitude=2.0, frequency=3.0, phase=0.4, bias=0.3)
     inputs = [builder.add("source", source)] if block.input_ports() else []
@@ -52,13 +52,13 @@ def ticked(block: Block, source: Block | None = None, count: int = 40) -> np.nda
     return np.array(found)
 
 
-def test_a_hold_takes_the_value_of_the_tick() -> None:
+def test_a_hold_samples_its_input_at_the_tick() -> None:
     assert ticked(ZeroOrderHold(sample_time=T)) == pytest.approx(U, rel=1e-14)
     assert ticked(RateTransition(sample_time=T)) == pytest.approx(U, rel=1e-14)
     assert ticked(DigitalClock(sample_time=T)).tolist() == [k * T for k in range(40)]
 
 
-def test_a_held_output_stays_when_its_clock_does_not_tick() -> None:
+def test_a_held_output_does_not_change_between_ticks_of_its_clock() -> None:
     builder = DiagramBuilder("d")
     builder.add("hold", ZeroOrderHold(sample_time=T), builder.add("t", Clock()))
     system = trace_diagram(builder.build())
@@ -87,7 +87,7 @@ def test_a_delay_of_matrices_is_refused() -> None:
         Delay().output_shapes({"u": (2, 2)})
 
 
-def test_integrators_by_the_three_rules() -> None:
+def test_integrators_with_the_three_integration_rules() -> None:
     sums = 0.5 + np.concatenate([[0.0], np.cumsum(2.0 * T * U)])
     rules = {
         "forward_euler": sums[:-1],
@@ -96,11 +96,11 @@ def test_integrators_by_the_three_rules() -> None:
     }
     for rule, expected in rules.items():
         block = DiscreteIntegrator(method=rule, gain=2.0, initial=0.5, sample_time=T)
-        # forty sums
+        # rounding errors of forty sums
         assert ticked(block) == pytest.approx(expected, rel=1e-13)
 
 
-def test_a_limited_integrator_leaves_its_limit_at_once() -> None:
+def test_a_limited_integrator_leaves_its_limit_without_delay() -> None:
     found = ticked(DiscreteIntegrator(lower=-0.1, upper=0.2, sample_time=T))
     x = [0.0]
     for u in U[:-1]:
@@ -132,7 +132,7 @@ def test_transfer_functions_and_filters(b: tuple[float, ...]) -> None:
         assert ticked(DiscreteFir(coefficients=b, sample_time=T)) == pytest.approx(expected, abs=1e-14)
 
 
-def test_a_longer_numerator_remembers_more() -> None:
+def test_a_filter_with_a_numerator_longer_than_the_denominator() -> None:
     block = DiscreteFilter(numerator=(1.0, 2.0, 3.0), denominator=(1.0, -0.5), sample_time=T)
     assert ticked(block) == pytest.approx(signal.lfilter([1.0, 2.0, 3.0], [1.0, -0.5], U), abs=1e-13)
 
@@ -176,18 +176,18 @@ def test_a_rate_limiter() -> None:
     assert found == pytest.approx(expected, rel=1e-13)
 
 
-def test_a_counter_starts_again() -> None:
+def test_a_limited_counter_restarts_at_zero() -> None:
     assert ticked(CounterLimited(upper=2, sample_time=T), count=7).tolist() == [0, 1, 2, 0, 1, 2, 0]
 
 
-def test_matrices_that_do_not_fit_are_refused() -> None:
+def test_matrices_of_inconsistent_shapes_are_refused() -> None:
     with pytest.raises(InputError, match=r"DiscreteStateSpace: A is \(1, 1\), B is \(2, 1\).*the shapes"):
         DiscreteStateSpace(B=[[1.0], [2.0]])
     with pytest.raises(InputError, match=r"DiscreteStateSpace.initial: initial has shape \(2,\)"):
         DiscreteStateSpace(initial=[1.0, 2.0])
 
 
-def test_filters_that_are_none_are_refused() -> None:
+def test_invalid_filter_coefficients_are_refused() -> None:
     with pytest.raises(InputError, match=r"DiscreteTransferFunction: the denominator is \[0\.0, 1\.0\]"):
         DiscreteTransferFunction(denominator=(0.0, 1.0))
     with pytest.raises(InputError, match=r"DiscreteFilter: the denominator is \[1\.0\].*use a Gain"):

@@ -55,14 +55,14 @@ def test_vectors_are_processed_elementwise() -> None:
     assert evaluate(two, U, 2.0)["y"] == pytest.approx(U * 2 - 0.3, rel=1e-15)
 
 
-def test_constants_have_names_and_stay_tunable() -> None:
+def test_named_constants_are_tunable() -> None:
     block = Expression(formula="k * u + offset", names="k, offset", values=[2.0, 0.5])
     assert evaluate(block, 3.0)["y"] == 6.5
     assert evaluate(Expression(formula="k", inputs=0, names="k", values=4.0))["y"] == 4.0
     assert next(rule for rule in Expression.parameters() if rule.name == "values").tunable
 
 
-def test_a_long_sum_is_not_deep() -> None:
+def test_a_long_sum_does_not_exceed_the_nesting_limit() -> None:
     assert evaluate(Expression(formula="+".join(["u"] * 1000)), 1.0)["y"] == 1000.0
 
 

@@ -1,4 +1,5 @@
-"""Blocks with external reset: sampled ones against recurrences, continuous ones against closed forms."""
+"""Blocks with external reset: sampled blocks compared with recurrences, continuous blocks with closed
+forms."""
 
 from __future__ import annotations
 
@@ -45,7 +46,7 @@ SOLVERS = pytest.mark.parametrize(
 
 
 def fires(kind: str, now: float, before: float | None) -> bool:
-    """By the words of Simulink's documentation, on plain numbers."""
+    """Return whether a reset fires, by the rules of Simulink's documentation."""
     first = before is None
     was = 0.0 if before is None else before
     return {
@@ -63,7 +64,7 @@ def played(values: np.ndarray) -> RepeatingSequenceStair:
 
 
 def ticked(*blocks: Block) -> list[dict[str, np.ndarray]]:
-    """What blocks, side by side in one diagram, give at their ticks, fed with the courses above."""
+    """Return the outputs of several blocks at each tick, with the signals above as inputs."""
     builder = DiagramBuilder("d")
     courses = {"u": U, "reset": TRIGGER, "initial": START, "enable": ENABLE}
     sources = {name: builder.add(name, played(course)) for name, course in courses.items()}
@@ -88,7 +89,7 @@ def ticked(*blocks: Block) -> list[dict[str, np.ndarray]]:
 
 
 @pytest.mark.parametrize("method", ["forward_euler", "backward_euler", "trapezoidal"])
-def test_a_discrete_integrator_begins_anew_at_its_ticks(method: str) -> None:
+def test_a_discrete_integrator_is_reset_at_its_ticks(method: str) -> None:
     cases = list(product(EXTERNAL_RESETS, ("internal", "external", "external at resets")))
     blocks = [
         DiscreteIntegrator(
@@ -110,7 +111,7 @@ def test_a_discrete_integrator_begins_anew_at_its_ticks(method: str) -> None:
 
 
 def check_discrete_integrator(found: dict[str, np.ndarray], kind: str, source: str, method: str) -> None:
-    """Against the recurrence, with the gain 2 and limits."""
+    """Compare outputs with the recurrence, for a gain of 2 and limits."""
     lower, upper = -0.9, 0.8
     share = {"forward_euler": 0.0, "backward_euler": 1.0, "trapezoidal": 0.5}[method]
     x = 0.3
@@ -124,7 +125,7 @@ def check_discrete_integrator(found: dict[str, np.ndarray], kind: str, source: s
         x = min(max(x + 2.0 * T * U[k], lower), upper)
 
 
-def test_a_delay_begins_anew_at_its_ticks() -> None:
+def test_a_delay_is_reset_at_its_ticks() -> None:
     cases = list(product(EXTERNAL_RESETS, ("internal", "external"), (1, 3), (False, True)))
     blocks = [
         ResettableDelay(
@@ -142,7 +143,7 @@ def test_a_delay_begins_anew_at_its_ticks() -> None:
 
 
 def check_delay(found: np.ndarray, kind: str, source: str, length: int, enable: bool) -> None:
-    """Against a list of what went in."""
+    """Compare outputs with the list of earlier inputs."""
     past, held, before, begun = [0.3] * length, 0.3, None, source == "internal"
     for k in range(COUNT):
         if not enable or ENABLE[k]:
@@ -153,7 +154,7 @@ def check_delay(found: np.ndarray, kind: str, source: str, length: int, enable: 
         assert found[k] == pytest.approx(held, abs=1e-14)
 
 
-def test_a_delay_without_a_reset_is_the_delay() -> None:
+def test_a_resettable_delay_without_reset_agrees_with_the_delay_block() -> None:
     plain = Delay(length=3, initial=0.3, sample_time=T)
     block = ResettableDelay(
         length=3, external_reset="none", initial_condition_source="internal", initial=0.3, sample_time=T
@@ -162,7 +163,7 @@ def test_a_delay_without_a_reset_is_the_delay() -> None:
     np.testing.assert_array_equal(found["y"], expected["y"])
 
 
-def test_a_delay_of_vectors_begins_anew_from_a_scalar() -> None:
+def test_a_delay_of_vectors_is_reset_to_a_scalar() -> None:
     builder = DiagramBuilder("d")
     source = builder.add("u", SineWave(amplitude=[1.0, 2.0]))
     pulses = builder.add("reset", PulseGenerator(period=0.5, width=20.0))
@@ -179,7 +180,8 @@ def test_a_delay_of_vectors_begins_anew_from_a_scalar() -> None:
 
 
 def test_a_loop_through_the_state_port_is_not_algebraic() -> None:
-    """A sum that starts again from half of what it had reached; through y the tick would need itself."""
+    """A sum that is reset to half of its value. The state port has the value before the reset; y depends on
+    it."""
 
     def loop(port: str) -> Diagram:
         builder = DiagramBuilder("d")
@@ -219,8 +221,9 @@ def integral(block: ResettableIntegrator, sources: Mapping[str, Block]) -> Diagr
 
 @SOLVERS
 @pytest.mark.parametrize("kind", ["level", "level hold"])
-def test_a_level_holds_the_initial_value_of_the_moment(kind: str, solver: dict[str, Any]) -> None:
-    """y = sin 3t while the pulse is there (0.5 to 1.25, 2.5 to 3.25 …), then goes on from it with slope 1."""
+def test_a_level_reset_holds_the_present_initial_value(kind: str, solver: dict[str, Any]) -> None:
+    """y = sin 3t during each pulse (0.5 s to 1.25 s, 2.5 s to 3.25 s …), then y rises from that value with
+    rate 1."""
     pulses = PulseGenerator(period=2.0, width=37.5, delay=0.5)
     block = ResettableIntegrator(external_reset=kind, initial_condition_source="external")
     sources = {"u": Constant(value=1.0), "reset": pulses, "initial": SineWave(frequency=3.0)}
@@ -235,8 +238,9 @@ def test_a_level_holds_the_initial_value_of_the_moment(kind: str, solver: dict[s
 
 
 @SOLVERS
-def test_what_level_hold_keeps_is_the_value_before_the_trigger_lets_go(solver: dict[str, Any]) -> None:
-    """Where the initial value jumps as the trigger becomes 0, level takes the new one, level hold not."""
+def test_level_hold_keeps_the_initial_value_before_the_trigger_falls(solver: dict[str, Any]) -> None:
+    """When the initial value jumps as the trigger falls to 0, level takes the new value, level hold the
+    old."""
     pulse = PulseGenerator(period=10.0, width=10.0, amplitude=2.0)
     for kind, kept in (("level", 0.0), ("level hold", 2.0)):
         block = ResettableIntegrator(external_reset=kind, initial_condition_source="external")
@@ -248,7 +252,7 @@ def test_what_level_hold_keeps_is_the_value_before_the_trigger_lets_go(solver: d
 
 
 @SOLVERS
-def test_the_port_says_where_it_begins(solver: dict[str, Any]) -> None:
+def test_the_start_value_of_each_initial_condition_source(solver: dict[str, Any]) -> None:
     for source, start in (("external", 5.0), ("external at resets", 1.0), ("internal", 1.0)):
         block = ResettableIntegrator(external_reset="none", initial_condition_source=source, initial=1.0)
         sources: dict[str, Block] = {"u": Clock(), "initial": Constant(value=5.0)}
@@ -258,8 +262,8 @@ def test_the_port_says_where_it_begins(solver: dict[str, Any]) -> None:
         assert result["y/y"] == pytest.approx(start + result.time**2 / 2, abs=1e-9)
 
 
-def test_the_port_is_asked_when_what_feeds_it_has_settled() -> None:
-    """Through a Relay, whose mode is not known before the signals are."""
+def test_the_initial_port_is_read_after_the_modes_are_consistent() -> None:
+    """The initial value comes from a Relay, whose mode depends on the signals at the start."""
     builder = DiagramBuilder("d")
     relay = builder.add("relay", Relay(on_value=4.0, off_value=-4.0), builder.add("one", Constant(value=1.0)))
     block = ResettableIntegrator(external_reset="none", initial_condition_source="external")
@@ -268,7 +272,7 @@ def test_the_port_is_asked_when_what_feeds_it_has_settled() -> None:
     assert y.tolist() == [4.0] * 11
 
 
-def test_a_run_that_goes_on_does_not_begin_again() -> None:
+def test_a_continued_run_does_not_reset_the_integrator() -> None:
     block = ResettableIntegrator(external_reset="none", initial_condition_source="external")
     diagram = integral(block, {"u": Constant(value=1.0), "initial": Constant(value=5.0)})
     first = ab.simulate(diagram, stop_time=1.0)
@@ -277,8 +281,8 @@ def test_a_run_that_goes_on_does_not_begin_again() -> None:
 
 
 @SOLVERS
-def test_a_ball_by_the_state_port(solver: dict[str, Any]) -> None:
-    """Speed -e v at each impact, the speed before it from the state port: impacts of the FMI reference."""
+def test_a_bouncing_ball_with_the_state_port(solver: dict[str, Any]) -> None:
+    """The speed becomes -e v at each impact; the state port gives v. Impact times of the FMI reference."""
     builder = DiagramBuilder("d")
     speed = builder.add(
         "speed",
@@ -302,8 +306,8 @@ def test_a_ball_by_the_state_port(solver: dict[str, Any]) -> None:
 
 
 @SOLVERS
-def test_a_level_loop_needs_the_state_port(solver: dict[str, Any]) -> None:
-    """While held, y = 0.5 + state / 2; through y itself it is y = 0.5 + y / 2, that is y = 1."""
+def test_a_loop_of_a_level_reset_through_the_state_port_and_through_y(solver: dict[str, Any]) -> None:
+    """During the reset y = 0.5 + state / 2; the loop through y has the solution of y = 0.5 + y / 2, y = 1."""
     expected = {"y": 1.0, "state": 0.5}
     for port, held in expected.items():
         builder = DiagramBuilder("d")
@@ -323,8 +327,8 @@ def test_a_level_loop_needs_the_state_port(solver: dict[str, Any]) -> None:
 
 
 @SOLVERS
-def test_limits_and_resets_together(solver: dict[str, Any]) -> None:
-    """The integral of 1 between -1 and 1, set to -1 (asked for: -3) at 0.5, 3.5 …: a cut sawtooth."""
+def test_an_integrator_with_limits_and_resets(solver: dict[str, Any]) -> None:
+    """The integral of 1 within -1 and 1, reset at 0.5 s, 3.5 s … to -3, limited to -1: a clipped sawtooth."""
     block = ResettableIntegrator(external_reset="rising", initial=-3.0, limit_output=True)
     pulses = PulseGenerator(period=3.0, delay=0.5)
     result = ab.simulate(
@@ -339,8 +343,8 @@ def test_limits_and_resets_together(solver: dict[str, Any]) -> None:
         ResettableIntegrator(limit_output=True, lower=2.0)
 
 
-def test_the_sampled_and_the_continuous_one_fire_alike() -> None:
-    """A staircase of ticks triggers both at the same instants."""
+def test_sampled_and_continuous_integrators_are_reset_at_the_same_times() -> None:
+    """A staircase signal that changes at ticks triggers both integrators."""
     for kind in EDGES:
         builder = DiagramBuilder("d")
         trigger = builder.add(
@@ -355,7 +359,7 @@ def test_the_sampled_and_the_continuous_one_fire_alike() -> None:
         assert result["continuous/y"] == pytest.approx(result["sampled/y"], abs=1e-9)
 
 
-def test_a_start_value_that_does_not_fit_is_told_apart_from_its_parameter() -> None:
+def test_the_message_about_an_initial_shape_names_port_and_parameter() -> None:
     builder = DiagramBuilder("d")
     block = DiscreteIntegrator(initial_condition_source="external", initial=[1.0, 2.0], sample_time=T)
     builder.add(

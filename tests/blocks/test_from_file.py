@@ -1,4 +1,5 @@
-"""Playback of tables: values and integrals against NumPy, in fixed and adaptive runs, short and long."""
+"""Playback of tables: values and integrals compared with NumPy, with fixed and adaptive steps, short and long
+tables."""
 
 from __future__ import annotations
 
@@ -53,14 +54,14 @@ def test_values_and_integrals(method: str, outside: str, solver: str, step: floa
             return np.where(inside | (outside == "hold"), found, 0.0)
 
         np.testing.assert_allclose(result["table/y"][:, k], value(t), atol=1e-12)
-        # between two neighbours of `fine` the course is one straight line
+        # between adjacent values of `fine` the signal is linear in time
         middle = (fine[1:] + fine[:-1]) / 2
         area = np.interp(t, fine, np.concatenate([[0.0], np.cumsum(np.diff(fine) * value(middle))]))
         np.testing.assert_allclose(result["integral/y"][:, k], area, atol=1e-11)
 
 
 @pytest.mark.parametrize("method", ["linear", "flat"])
-def test_a_long_table_is_compiled_and_run_as_a_short_one(method: str) -> None:
+def test_a_table_of_20_000_rows_gives_the_same_values_as_numpy(method: str) -> None:
     random = np.random.default_rng(3)
     times = np.cumsum(random.uniform(0.5e-4, 1.5e-4, 20_000))
     values = random.normal(size=20_000)
@@ -77,7 +78,7 @@ def test_a_long_table_is_compiled_and_run_as_a_short_one(method: str) -> None:
     assert result.run.events >= 17_000
 
 
-def test_the_equations_say_the_same_to_casadi() -> None:
+def test_the_equations_agree_with_numpy_in_casadi() -> None:
     system = trace_diagram(diagram_of(data=np.column_stack([TIMES, VALUES])))
     p = system.parameter_values
     for t in (0.0, 0.6, 1.5005, 2.0, 5.0):
@@ -88,7 +89,7 @@ def test_the_equations_say_the_same_to_casadi() -> None:
 
 
 @pytest.mark.parametrize("suffix", ["csv", "npz", "mat", "parquet"])
-def test_what_a_run_saved_is_played_back(suffix: str, tmp_path: Path) -> None:
+def test_the_saved_results_of_a_run_can_be_played_back(suffix: str, tmp_path: Path) -> None:
     builder = DiagramBuilder("source")
     builder.add("r", Ramp(slope=[2.0, -1.0]))
     result = run(builder.build(), stop=1.0, count=10)
@@ -98,7 +99,7 @@ def test_what_a_run_saved_is_played_back(suffix: str, tmp_path: Path) -> None:
     assert len(table.names) == 2
 
 
-def test_a_file_of_a_diagram_names_the_table(tmp_path: Path) -> None:
+def test_a_diagram_file_refers_to_the_file_of_the_table(tmp_path: Path) -> None:
     path = tmp_path / "wind.csv"
     path.write_text("time,x\n0,1\n1,3\n2.5,-2\n")
     diagram = diagram_of(data=ab.load_table(path))
@@ -106,7 +107,7 @@ def test_a_file_of_a_diagram_names_the_table(tmp_path: Path) -> None:
     assert ab.load_diagram(tmp_path / "d.json") == diagram
     path.write_text("time,x\n0,1\n1,4\n")
     assert ab.load_diagram(tmp_path / "d.json") != diagram
-    # the file now holds something else, so that the rows are written themselves
+    # the table file has changed, so the rows are written into the diagram file
     assert '"data": [' in ab.save_diagram(diagram, tmp_path / "e.json").read_text()
     assert ab.load_diagram(tmp_path / "e.json") == diagram
 
@@ -123,7 +124,7 @@ def test_names_with_commas_in_a_header(tmp_path: Path) -> None:
     assert ab.load_table(path).names == ("M[0,0]", "M[0,1]")
 
 
-def test_tables_that_are_none_are_refused(tmp_path: Path) -> None:
+def test_invalid_tables_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"the table has shape \(2,\).*times \(s\) into the first column"):
         FromFile(data=(0.0, 1.0))
     with pytest.raises(InputError, match=r"row 3 of the table is \[1\.0, 5\.0\].*drop repeated times"):

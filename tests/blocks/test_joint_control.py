@@ -1,4 +1,4 @@
-"""Controllers, drives and quantities of an arm, by the laws that they exist for."""
+"""Controllers, drives and kinematic quantities of an arm, tested by their defining properties."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_quantities_of_the_arm(puma560: Robot) -> None:
     assert found == pytest.approx(tau, rel=1e-11, abs=1e-11)
 
 
-def test_pd_by_joint() -> None:
+def test_pd_control_of_each_joint() -> None:
     qr, qdr, q, qd = RANDOM.normal(size=(4, 3))
     expected = [10, 20, 30] * (qr - q) + 5 * (qdr - qd)
     assert evaluate(JointPD(Kp=[10, 20, 30], Kd=5.0), qr, qdr, q, qd)["tau"] == pytest.approx(
@@ -63,14 +63,14 @@ def test_pd_by_joint() -> None:
     )
 
 
-def test_computed_torque_makes_the_errors_linear(puma560: Robot) -> None:
+def test_computed_torque_gives_linear_error_dynamics(puma560: Robot) -> None:
     qr, qdr, qddr, q, qd = RANDOM.uniform(-1, 1, (5, 6))
     tau = evaluate(ComputedTorque(robot=puma560, Kp=25.0, Kd=[10.0] * 6), qr, qdr, qddr, q, qd)["tau"]
     (qdd,) = dynamics.trace_accel(puma560)(q, qd, tau)
     assert qddr - qdd == pytest.approx(-10 * (qdr - qd) - 25 * (qr - q), rel=1e-9)
 
 
-def test_feed_forward_on_the_wanted_motion_moves_as_wanted(puma560: Robot) -> None:
+def test_feed_forward_on_the_reference_motion_gives_the_reference_acceleration(puma560: Robot) -> None:
     q, qd, qdd = RANDOM.uniform(-1, 1, (3, 6))
     tau = evaluate(FeedForward(robot=puma560), q, qd, qdd, q, qd)["tau"]
     (found,) = dynamics.trace_accel(puma560)(q, qd, tau)
@@ -80,27 +80,27 @@ def test_feed_forward_on_the_wanted_motion_moves_as_wanted(puma560: Robot) -> No
     assert off - on == pytest.approx(np.full(6, 0.7), rel=1e-9)
 
 
-def test_gravity_compensation_rests_where_it_is_told(puma560: Robot) -> None:
+def test_gravity_compensation_at_the_reference_pose_equals_gravload(puma560: Robot) -> None:
     q = RANDOM.uniform(-1, 1, 6)
     tau = evaluate(GravityCompensation(robot=puma560), q, q, np.zeros(6))["tau"]
     (g,) = dynamics.trace_gravload(puma560)(q)
     assert tau == pytest.approx(g, rel=1e-12, abs=1e-12)
 
 
-def test_a_drive_keeps_its_limits() -> None:
+def test_a_drive_limits_its_torque() -> None:
     drive = MotorDrive(peak=10.0, stall=20.0, no_load_speed=100.0)
     u = [50.0, 50.0, 50.0, 50.0, -50.0, 3.0, -50.0]
     w = [0.0, 50.0, 75.0, 110.0, 75.0, 0.0, -75.0]
     assert evaluate(drive, u, w)["y"] == pytest.approx([10, 10, 5, -2, -10, 3, -5], rel=1e-14)
 
 
-def test_stops_push_and_never_pull() -> None:
+def test_joint_stops_push_and_never_pull() -> None:
     stops = JointStops(lower=-1.0, upper=[1.0, 2.0, 1.0, 1.0, np.inf], stiffness=100.0, damping=10.0)
     q, qd = [-1.5, 1.5, 1.2, 1.2, 99.0], [0.0, 0.0, 1.0, -9.0, 0.0]
     assert evaluate(stops, q, qd)["tau"] == pytest.approx([50, 0, -30, 0, 0], rel=1e-14)
 
 
-def test_what_does_not_fit_is_said(puma560: Robot) -> None:
+def test_inputs_of_inconsistent_sizes_are_refused(puma560: Robot) -> None:
     with pytest.raises(DiagramError, match=r"the Jacobian has shape \(6, 4\).*choose 'pseudo' or 'damped'"):
         evaluate(JacobianInverse(), np.ones((6, 4)))
     with pytest.raises(InputError, match=r"ComputedTorque: Kp has 2 gains. Allowed: 6, one for each joint"):

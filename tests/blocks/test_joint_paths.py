@@ -1,4 +1,4 @@
-"""Paths: ends, limits, and that speeds are the rates of what they belong to."""
+"""Paths: end points, limits, and speeds that are the derivatives of the positions."""
 
 from __future__ import annotations
 
@@ -40,13 +40,13 @@ def test_a_trapezoidal_profile(cruise: float) -> None:
     assert evaluate(block, t=2.0)["qd"] == pytest.approx(cruise * (qf - q0) / tmax, rel=1e-14)
 
 
-def test_the_toolboxs_default_makes_three_equal_parts() -> None:
+def test_the_default_trapezoidal_profile_has_three_equal_phases() -> None:
     # lspb(0, 1, 0:3): V = 1.5 / 3, a = V, so 1/4 after one second, 3/4 after two
     block = Trapezoidal(tmax=3.0)
     assert [float(evaluate(block, t=t)["q"]) for t in (1.0, 2.0)] == pytest.approx([0.25, 0.75], rel=1e-14)
 
 
-def test_many_segments() -> None:
+def test_a_path_of_many_segments() -> None:
     points = RANDOM.normal(size=(4, 2))
     block = MultiSegment(points=points, durations=[1.0, 2.0, 1.5], blend=0.4)
     assert evaluate(block, t=0.0)["q"].tolist() == points[0].tolist()
@@ -67,7 +67,7 @@ def test_many_segments() -> None:
 
 
 @pytest.mark.parametrize("profile", ["lspb", "quintic"])
-def test_a_straight_way_of_the_tool(profile: str) -> None:
+def test_a_straight_line_path_of_the_tool(profile: str) -> None:
     turns = Rotation.random(2, rng=RANDOM)
     T0, T1 = np.eye(4), np.eye(4)
     T0[:3, :3], T1[:3, :3] = turns.as_matrix()
@@ -91,7 +91,7 @@ def test_a_circle() -> None:
     assert evaluate(block, t=0.7)["y"] == pytest.approx(expected, rel=1e-15)
 
 
-def test_what_does_not_fit_is_said() -> None:
+def test_invalid_path_parameters_are_refused() -> None:
     with pytest.raises(InputError, match=r"3 points make 2 segments but 1 durations are given"):
         MultiSegment(durations=[1.0])
     with pytest.raises(InputError, match=r"blends of 2 s do not fit into a segment of 1 s"):
@@ -102,8 +102,8 @@ def test_what_does_not_fit_is_said() -> None:
         Trapezoidal(q0=[0, 0], qf=[1, 2, 3])
 
 
-def test_a_straight_path_of_one_orientation_has_a_slope() -> None:
-    """Where nothing turns, T0 + s (T1 - T0); half of a small turn is s of it, about any axis."""
+def test_derivatives_of_a_straight_path_with_constant_orientation() -> None:
+    """With constant orientation T = T0 + s (T1 - T0); a small rotation of the end is scaled by s."""
     start, end = np.eye(4), np.eye(4)
     end[:3, 3] = (0.5, 0.2, 0.1)
     builder = ab.DiagramBuilder("straight")
@@ -114,7 +114,7 @@ def test_a_straight_path_of_one_orientation_has_a_slope() -> None:
         gain = system.D.reshape(4, 4, 4, 4)
         for row in range(3):
             np.testing.assert_allclose(gain[row, 3, row, 3], s, atol=1e-12)
-        # a turn dR = skew(a) of the end turns the path by s a
+        # a rotation dR = skew(a) of the end rotates the path by s a
         turn = np.zeros((4, 4))
         turn[0, 1], turn[1, 0] = -1.0, 1.0
         np.testing.assert_allclose(np.einsum("ijkl,kl->ij", gain, turn), s * turn, atol=1e-12)

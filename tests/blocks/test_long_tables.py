@@ -1,4 +1,4 @@
-"""Tables of thousands of points: the same values as NumPy's, events at every point, compiled in a moment."""
+"""Tables of thousands of points: values of NumPy, events at every point, size of the traced functions."""
 
 from typing import Any
 
@@ -44,7 +44,7 @@ def reference(u: np.ndarray, method: str, beyond: str) -> np.ndarray:
 @pytest.mark.parametrize("method", ["linear", "flat"])
 @pytest.mark.parametrize("beyond", ["clip", "linear"])
 @pytest.mark.parametrize("zero_crossing", [True, False])
-def test_a_long_curve_is_that_of_numpy(method: str, beyond: str, zero_crossing: bool) -> None:
+def test_a_long_curve_agrees_with_numpy(method: str, beyond: str, zero_crossing: bool) -> None:
     table = LookupTable1D(
         positions=X, table=Y, method=method, extrapolation=beyond, zero_crossing=zero_crossing
     )
@@ -63,7 +63,7 @@ def test_a_long_curve_takes_the_nearest_point() -> None:
 @pytest.mark.parametrize("zero_crossing", [True, False])
 @pytest.mark.parametrize("method", ["linear", "nearest"])
 @pytest.mark.parametrize("sizes", [(30, 3), (9, 10), (5, 6, 7), (3, 3, 3, 20)])
-def test_a_large_table_of_several_axes_is_that_of_scipy(
+def test_a_large_table_of_several_axes_agrees_with_scipy(
     sizes: tuple[int, ...], method: str, zero_crossing: bool
 ) -> None:
     axes = [np.cumsum(RANDOM.uniform(0.2, 1, n)) for n in sizes]
@@ -86,7 +86,7 @@ def test_a_large_table_of_several_axes_is_that_of_scipy(
 
 
 @pytest.mark.parametrize("extrapolation", ["clip", "linear"])
-def test_a_long_prelookup_goes_on_or_holds_beyond_its_ends(extrapolation: str) -> None:
+def test_a_long_prelookup_extrapolates_or_clips_outside_its_range(extrapolation: str) -> None:
     k = np.clip(np.searchsorted(X, U, side="right") - 1, 0, COUNT - 2)
     f = (U - X[k]) / (X[k + 1] - X[k])
     f = np.clip(f, 0, 1) if extrapolation == "clip" else f
@@ -95,7 +95,7 @@ def test_a_long_prelookup_goes_on_or_holds_beyond_its_ends(extrapolation: str) -
     np.testing.assert_allclose(found["f"], f, rtol=1e-12, atol=1e-13)
 
 
-def test_entries_of_large_tables_are_read_directly() -> None:
+def test_direct_lookup_reads_entries_of_a_large_table() -> None:
     table = RANDOM.normal(size=(20, 30))
     rows, columns = [0.0, 19.9, -4.0, 7.5], [29.0, 3.2, 2.0, 99.0]
     found = evaluate(DirectLookup(table=table), rows, columns)["y"]
@@ -104,14 +104,16 @@ def test_entries_of_large_tables_are_read_directly() -> None:
 
 @pytest.mark.parametrize("method", ["linear", "flat"])
 @pytest.mark.parametrize("settings", RUNS)
-def test_a_run_meets_every_point_of_both_kinds_of_table(method: str, settings: dict[str, Any]) -> None:
+def test_integrals_are_exact_across_every_point_of_sources_and_curves(
+    method: str, settings: dict[str, Any]
+) -> None:
     builder = ab.DiagramBuilder("long", settings=ab.SimulationOptions(stop_time=4.0, sample_time=0.05))
     course = builder.add("course", FromTable(times=X, values=np.column_stack([Y, 2 * Y]), method=method))
     curve = LookupTable1D(positions=X, table=Y, method=method)
     builder.add("sum", Integrator(initial=(0.0, 0.0)), course)
     builder.add("area", Integrator(), builder.add("curve", curve, builder.add("time", Clock())))
     result = ab.simulate(builder.build(), **settings)
-    fine = np.unique(np.concatenate([X, result.time]))  # between these the course is straight or level
+    fine = np.unique(np.concatenate([X, result.time]))  # between these times the signal is linear or constant
     values = reference(fine, method, "clip")
     left = values[:-1]
     right = values[:-1] if method == "flat" else values[1:]
@@ -121,7 +123,7 @@ def test_a_run_meets_every_point_of_both_kinds_of_table(method: str, settings: d
     np.testing.assert_allclose(result["sum"][:, 1], 2 * expected, rtol=1e-8, atol=1e-9)
 
 
-def test_slopes_in_the_input_are_exact_and_those_in_the_table_are_refused() -> None:
+def test_derivatives_by_the_input_are_exact_and_those_by_the_table_are_refused() -> None:
     builder = ab.DiagramBuilder("slopes", settings=ab.SimulationOptions(stop_time=1.0))
     clock = builder.add("level", ab.blocks.Constant(value=0.5 * (X[20] + X[21])))
     builder.add("curve", LookupTable1D(positions=X, table=Y), clock)
@@ -143,7 +145,7 @@ def test_positions_of_a_long_table_are_checked_when_changed() -> None:
 
 
 def operations_of_large_tables(n: int) -> int:
-    """What the signals of a diagram with two tables of n points and one of 100 x 100 cost to write down."""
+    """Number of instructions of the signals of a diagram with two tables of n points and one of 100 x 100."""
     builder = ab.DiagramBuilder("large", settings=ab.SimulationOptions(stop_time=1.0))
     course = builder.add("course", FromTable(times=np.linspace(0, 1, n), values=np.arange(n) / n))
     curve = LookupTable1D(positions=np.arange(n) / n, table=np.sin(np.arange(n) / n), zero_crossing=False)
@@ -154,14 +156,14 @@ def operations_of_large_tables(n: int) -> int:
     return trace_diagram(builder.build()).signals.casadi_function().n_instructions()
 
 
-def test_long_tables_are_searched_and_not_named_point_by_point() -> None:
+def test_the_traced_function_hardly_grows_with_the_length_of_a_table() -> None:
     short, long = operations_of_large_tables(1_000), operations_of_large_tables(10_000)
     assert long - short < 0.05 * (10_000 - 1_000)
 
 
 @pytest.mark.parametrize("beyond", ["clip", "linear"])
 @pytest.mark.parametrize("zero_crossing", [True, False])
-def test_a_long_spline_is_that_of_scipy(beyond: str, zero_crossing: bool) -> None:
+def test_a_long_spline_agrees_with_scipy(beyond: str, zero_crossing: bool) -> None:
     kind: dict[str, Any] = {"method": "cubic", "extrapolation": beyond, "zero_crossing": zero_crossing}
     for count in (SHORT + 1, 100):
         x = np.cumsum(RANDOM.uniform(0.02, 0.1, count))
@@ -178,7 +180,7 @@ def test_a_long_spline_is_that_of_scipy(beyond: str, zero_crossing: bool) -> Non
         np.testing.assert_array_equal(found[10:], y[at])
 
 
-def test_a_large_spline_surface_is_that_of_scipy() -> None:
+def test_a_large_spline_surface_agrees_with_scipy() -> None:
     axes = [np.cumsum(RANDOM.uniform(0.2, 1, n)) for n in (18, 4)]
     table = RANDOM.normal(size=(18, 4))
     points = [RANDOM.uniform(axis[0], axis[-1], 3) for axis in axes]
@@ -193,7 +195,7 @@ def test_a_large_spline_surface_is_that_of_scipy() -> None:
 
 
 @pytest.mark.parametrize("outside", ["hold", "linear", "zero"])
-def test_a_long_smooth_course_is_that_of_scipy(outside: str) -> None:
+def test_a_long_spline_source_agrees_with_scipy(outside: str) -> None:
     values = np.column_stack([Y, 2 * Y])
     builder = ab.DiagramBuilder(
         "smooth", settings=ab.SimulationOptions(stop_time=X[-1] + 1, sample_time=0.01)
@@ -213,7 +215,7 @@ def test_a_long_smooth_course_is_that_of_scipy(outside: str) -> None:
 
 @pytest.mark.parametrize("count", [2, 3, 4, 5, 40, 700])
 @pytest.mark.parametrize("spacing", ["even", "random", "geometric"])
-def test_slopes_of_splines_are_those_of_scipy(count: int, spacing: str) -> None:
+def test_derivatives_of_splines_agree_with_scipy(count: int, spacing: str) -> None:
     x = {
         "even": np.linspace(0, 10, count),
         "random": np.cumsum(np.random.default_rng(count).uniform(0.01, 1, count)),
@@ -225,7 +227,7 @@ def test_slopes_of_splines_are_those_of_scipy(count: int, spacing: str) -> None:
     np.testing.assert_allclose(spline_slopes(x.tolist(), y) / scale, expected / scale, rtol=0, atol=1e-12)
 
 
-def test_a_long_spline_is_tuned_while_it_runs_and_nothing_is_compiled_anew() -> None:
+def test_a_long_spline_is_tuned_during_a_run_without_compilation() -> None:
     builder = ab.DiagramBuilder("tuned", settings=ab.SimulationOptions(stop_time=4.0, sample_time=0.1))
     builder.add("curve", LookupTable1D(positions=X, table=Y, method="cubic"), builder.add("time", Clock()))
     run = ab.begin(builder.build())
@@ -243,7 +245,7 @@ def test_a_long_spline_is_tuned_while_it_runs_and_nothing_is_compiled_anew() -> 
         np.testing.assert_allclose(done["curve"][part], expected, rtol=1e-9, atol=1e-12)
 
 
-def test_what_a_mask_makes_of_a_long_spline_is_never_stale() -> None:
+def test_a_long_spline_that_depends_on_a_mask_parameter_is_updated() -> None:
     builder = ab.DiagramBuilder("masked", settings=ab.SimulationOptions(stop_time=3.0, sample_time=0.1))
     builder.parameter("k", 1.0)
     values = f"k*[{', '.join(map(repr, Y.tolist()))}]"

@@ -1,4 +1,4 @@
-"""Lookup tables and sources from tables, against SciPy and NumPy."""
+"""Lookup tables and sources from tables compared with SciPy and NumPy."""
 
 from __future__ import annotations
 
@@ -33,21 +33,21 @@ INSIDE = np.concatenate([RANDOM.uniform(a, b, 3) for a, b in pairwise(X)])
 OUTSIDE = np.array([-3.0, -1.5, 4.0, 7.0])
 
 
-def test_lines_between_points() -> None:
+def test_linear_interpolation_between_points() -> None:
     table = LookupTable1D(positions=X, table=Y)
     u = np.concatenate([INSIDE, OUTSIDE])
     assert evaluate(table, u)["y"] == pytest.approx(np.interp(u, X, Y), rel=1e-14, abs=1e-15)
     assert np.array_equal(evaluate(table, X)["y"], Y)
 
 
-def test_lines_go_on_beyond_the_ends() -> None:
+def test_linear_extrapolation_beyond_the_ends() -> None:
     found = evaluate(LookupTable1D(positions=X, table=Y, extrapolation="linear"), [-2.0, 4.5])["y"]
     first, last = (Y[1] - Y[0]) / (X[1] - X[0]), (Y[-1] - Y[-2]) / (X[-1] - X[-2])
     assert found == pytest.approx([Y[0] - first, Y[-1] + last], rel=1e-13)
 
 
 @pytest.mark.parametrize("n", [2, 3, 4, 5, 9])
-def test_the_spline_is_scipys(n: int) -> None:
+def test_cubic_interpolation_agrees_with_scipy(n: int) -> None:
     x, y = np.cumsum(RANDOM.uniform(0.2, 1, n)), RANDOM.normal(size=n)
     u = np.linspace(x[0], x[-1], 3 * n + 1)
     spline = CubicSpline(x, y) if n > 2 else lambda u: np.interp(u, x, y)
@@ -60,7 +60,7 @@ def test_the_spline_is_scipys(n: int) -> None:
     assert held.tolist() == [y[0], y[-1]]
 
 
-def test_nearest_and_flat() -> None:
+def test_nearest_and_flat_interpolation() -> None:
     u = np.array([-5.0, -0.6, -0.5, 0.0, 0.4, 1.25, 3.4, 3.5, 9.0])
     nearest = evaluate(LookupTable1D(positions=X, table=Y, method="nearest"), u)["y"]
     assert nearest.tolist() == Y[[0, 0, 1, 1, 2, 3, 4, 4, 4]].tolist()
@@ -69,7 +69,7 @@ def test_nearest_and_flat() -> None:
 
 
 @pytest.mark.parametrize(("method", "scipys"), [("linear", "linear"), ("nearest", "nearest")])
-def test_surfaces_and_beyond(method: str, scipys: str) -> None:
+def test_tables_of_one_to_three_dimensions_agree_with_scipy(method: str, scipys: str) -> None:
     axes = [np.cumsum(RANDOM.uniform(0.2, 1, n)) for n in (3, 4, 2)]
     points = np.stack([RANDOM.uniform(axis[0], axis[-1], 10) for axis in axes])
     for dimension in (1, 2, 3):
@@ -92,7 +92,7 @@ def test_a_cubic_surface_is_a_spline_of_splines() -> None:
     assert evaluate(block, u1, u2)["y"] == pytest.approx(expected, rel=1e-11)
 
 
-def test_direct_lookup_cuts_and_holds() -> None:
+def test_direct_lookup_truncates_and_clips_its_indices() -> None:
     table = RANDOM.normal(size=(2, 3))
     found = evaluate(DirectLookup(table=table), [0.0, 1.9, -4.0], [2.0, 1.0, 99.0])["y"]
     assert found.tolist() == [table[0, 2], table[1, 1], table[0, 2]]
@@ -111,7 +111,7 @@ def test_prelookup_and_interpolation_make_a_lookup_table(extrapolation: str) -> 
     assert found == pytest.approx([0.75, 0.25] @ surface[1:] @ [0.5, 0.5], rel=1e-14)
 
 
-def test_a_table_of_signals() -> None:
+def test_a_lookup_table_whose_points_are_signals() -> None:
     u = np.concatenate([INSIDE, OUTSIDE])
     assert evaluate(LookupTableDynamic(), u, X, Y)["y"] == pytest.approx(
         np.interp(u, X, Y), rel=1e-13, abs=1e-15
@@ -127,7 +127,7 @@ def test_sources() -> None:
     assert evaluate(block, t=3.7)["y"] == pytest.approx(expected, rel=1e-12)
 
 
-def test_a_course_from_a_table() -> None:
+def test_a_source_from_a_table() -> None:
     values = RANDOM.normal(size=(5, 2))
     for t in (-0.3, 0.2, 2.0, 3.1):
         expected = [np.interp(t, X, column) for column in values.T]
@@ -141,7 +141,7 @@ def test_a_course_from_a_table() -> None:
     assert evaluate(FromTable(times=[0, 1], values=[1, 3], outside="linear"), t=2.0)["y"] == 5.0
 
 
-def test_what_does_not_fit_is_said() -> None:
+def test_inconsistent_break_points_and_tables_are_refused() -> None:
     with pytest.raises(InputError, match=r"LookupTable1D: positions is \[0.0, 0.0\].*each greater than"):
         LookupTable1D(positions=[0, 0])
     with pytest.raises(InputError, match=r"positions1 has 3 break points for 2 entries of the table"):

@@ -1,4 +1,4 @@
-"""Matrix blocks against NumPy's linear algebra."""
+"""Matrix blocks compared with NumPy's linear algebra."""
 
 from __future__ import annotations
 
@@ -25,24 +25,24 @@ RANDOM = np.random.default_rng(21)
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 6])
-def test_equations_are_solved_as_numpy_does(n: int) -> None:
+def test_solutions_of_linear_equations_agree_with_numpy(n: int) -> None:
     A, B = RANDOM.normal(size=(n, n)), RANDOM.normal(size=(n, 2))
-    # errors grow with the condition of A, which is moderate for these
+    # errors grow with the condition number of A, which is moderate here
     assert evaluate(LinearSolve(), A, B)["y"] == pytest.approx(np.linalg.solve(A, B), rel=1e-11)
     assert evaluate(LinearSolve(), A, B[:, 0])["y"] == pytest.approx(np.linalg.solve(A, B[:, 0]), rel=1e-11)
     assert evaluate(MatrixInverse(), A)["y"] == pytest.approx(np.linalg.inv(A), rel=1e-11)
     assert evaluate(Determinant(), A)["y"] == pytest.approx(np.linalg.det(A), rel=1e-12)
 
 
-def test_pivots_are_chosen_by_the_numbers() -> None:
+def test_pivots_are_chosen_by_magnitude() -> None:
     A = np.array([[0.0, 2.0, 0.0], [0.0, 0.0, 4.0], [8.0, 0.0, 0.0]])
     assert evaluate(MatrixInverse(), A)["y"].tolist() == np.linalg.inv(A).tolist()
     assert evaluate(Determinant(), A)["y"] == 64.0
-    small = [[1e-20, 1.0], [1.0, 1.0]]  # without exchange of rows the answer would be (0, 1)
+    small = [[1e-20, 1.0], [1.0, 1.0]]  # without row exchanges the result would be (0, 1)
     assert evaluate(LinearSolve(), small, [1.0, 2.0])["y"] == pytest.approx([1.0, 1.0], rel=1e-15)
 
 
-def test_a_singular_matrix_has_no_determinant_and_no_finite_inverse() -> None:
+def test_a_singular_matrix_has_the_determinant_0_and_no_finite_inverse() -> None:
     singular = [[1.0, 2.0, 3.0], [2.0, 4.0, 6.0], [1.0, 0.0, 1.0]]
     assert evaluate(Determinant(), singular)["y"] == 0.0
     assert evaluate(Determinant(), np.zeros((3, 3)))["y"] == 0.0
@@ -56,7 +56,7 @@ def test_matrix_powers(exponent: int) -> None:
     assert evaluate(MatrixPower(exponent=exponent), A)["y"] == pytest.approx(expected, rel=1e-10, abs=1e-12)
 
 
-def test_shapes_and_parts() -> None:
+def test_reshaping_diagonals_and_products() -> None:
     A = RANDOM.normal(size=(2, 3))
     assert np.array_equal(evaluate(Transpose(), A)["y"], A.T)
     assert evaluate(Transpose(), [1.0, 2.0])["y"].tolist() == [[1, 2]]
@@ -72,7 +72,7 @@ def test_shapes_and_parts() -> None:
     assert evaluate(CrossProduct(), u, v)["y"] == pytest.approx(np.cross(u, v), rel=1e-13)
 
 
-def test_matrices_are_put_together() -> None:
+def test_matrices_are_concatenated() -> None:
     A, B = RANDOM.normal(size=(2, 3)), RANDOM.normal(size=(2, 1))
     assert np.array_equal(evaluate(MatrixConcatenate(), A, B)["y"], np.hstack([A, B]))
     under = MatrixConcatenate(direction="vertical")
@@ -81,7 +81,7 @@ def test_matrices_are_put_together() -> None:
     assert evaluate(under, [1.0, 2.0], 3.0)["y"].tolist() == [1, 2, 3]
 
 
-def test_what_does_not_fit_is_said() -> None:
+def test_matrices_of_unsuitable_shape_are_refused() -> None:
     A = np.ones((2, 3))
     with pytest.raises(DiagramError, match=r"the matrix has shape \(2, 3\).*Allowed: a square matrix"):
         evaluate(MatrixInverse(), A)

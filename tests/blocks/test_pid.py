@@ -1,4 +1,4 @@
-"""PID controllers: transfer functions, limits and resets against independent computations, step by step."""
+"""PID controllers: transfer functions, limits and resets compared with independent computations."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ T = 0.05
 def run(
     block: Block, *sources: Block, solver: str = "auto", step: float | None = None, stop: float = 4.0
 ) -> SimulationResult:
-    """A controller behind its sources, recorded every 0.05 s."""
+    """Simulate a controller with its sources, recorded every 0.05 s."""
     builder = DiagramBuilder("d")
     feeds = [builder.add(f"u{k}", source) for k, source in enumerate(sources)]
     builder.add("pid", block, *feeds)
@@ -44,7 +44,7 @@ def run(
 
 @SOLVERS
 @pytest.mark.parametrize("form", ["parallel", "ideal"])
-def test_the_step_response_is_that_of_the_transfer_function(
+def test_the_step_response_agrees_with_the_transfer_function(
     form: str, solver: str, step: float | None
 ) -> None:
     P, I, D, N = 3.0, 2.0, 0.5, 8.0  # noqa: E741
@@ -65,7 +65,7 @@ def test_two_degrees_of_freedom_weigh_the_reference(solver: str, step: float | N
     np.testing.assert_allclose(result["pid/y"], expected, atol=1e-7)
 
 
-def test_with_weights_of_one_it_is_the_controller_of_the_error() -> None:
+def test_two_degrees_of_freedom_with_weights_of_1_agree_with_the_pid() -> None:
     parameters = {"P": 3.0, "I": 2.0, "D": 0.5, "N": 8.0}
     wave = SineWave(amplitude=[1.0, 2.0], frequency=3.0)
     one = run(PID(**parameters), wave)["pid/y"]
@@ -77,7 +77,7 @@ def test_with_weights_of_one_it_is_the_controller_of_the_error() -> None:
 
 
 def limited_reference(anti_windup: str, times: np.ndarray) -> np.ndarray:
-    """P = 2, I = 3 and a sine behind it, within -1 and 1.5, by SciPy from switch to switch."""
+    """Output for P = 2, I = 3 and a sine as error, with limits -1 and 1.5, computed by SciPy."""
     P, I, low, high, Kb = 2.0, 3.0, -1.0, 1.5, 4.0  # noqa: E741
 
     def error(t: float) -> float:
@@ -94,7 +94,7 @@ def limited_reference(anti_windup: str, times: np.ndarray) -> np.ndarray:
             return [0.0]
         return [rate - (Kb * excess if anti_windup == "back_calculation" else 0.0)]
 
-    # crude at the switches, and so with steps that make it not matter
+    # the switching times are not located; the small step limits the error
     span = (0.0, times[-1])
     solved = integrate.solve_ivp(rate, span, [0.0], max_step=2e-3, t_eval=times, rtol=1e-9)
     return np.clip([free(t, i) for t, i in zip(times, solved.y[0])], low, high)
@@ -102,7 +102,9 @@ def limited_reference(anti_windup: str, times: np.ndarray) -> np.ndarray:
 
 @SOLVERS
 @pytest.mark.parametrize("anti_windup", ["none", "clamping", "back_calculation"])
-def test_limits_and_what_happens_to_the_integral(anti_windup: str, solver: str, step: float | None) -> None:
+def test_output_limits_with_each_anti_windup_method(
+    anti_windup: str, solver: str, step: float | None
+) -> None:
     block = PID(P=2.0, I=3.0, limit_output=True, lower=-1.0, upper=1.5, anti_windup=anti_windup, Kb=4.0)
     result = run(block, SineWave(frequency=2.0), solver=solver, step=step)
     y = result["pid/y"]
@@ -112,7 +114,7 @@ def test_limits_and_what_happens_to_the_integral(anti_windup: str, solver: str, 
 
 
 def test_clamping_holds_the_integral_exactly() -> None:
-    """With P = 1, I = 1 and an error of 1 the limit 1.5 is met at 0.5 s; the error turns at 2 s."""
+    """With P = 1, I = 1 and an error of 1 the limit 1.5 is reached at 0.5 s; the error becomes -1 at 2 s."""
     block = PID(limit_output=True, upper=1.5, lower=-1.5, anti_windup="clamping")
     result = run(block, Step(time=2.0, initial=1.0, final=-1.0), solver="rk45")
     t = result.time
@@ -121,7 +123,7 @@ def test_clamping_holds_the_integral_exactly() -> None:
 
 
 @SOLVERS
-def test_a_reset_begins_anew(solver: str, step: float | None) -> None:
+def test_a_reset_restores_the_initial_integral(solver: str, step: float | None) -> None:
     block = PID(P=0.5, I=2.0, initial_integral=1.0, external_reset="rising")
     pulses = PulseGenerator(period=1.0, delay=0.5)
     result = run(block, Constant(value=1.0), pulses, solver=solver, step=step)
@@ -130,7 +132,7 @@ def test_a_reset_begins_anew(solver: str, step: float | None) -> None:
     np.testing.assert_allclose(result["pid/y"], 0.5 + 1.0 + 2.0 * since, atol=1e-9)
 
 
-def test_a_reset_lifts_the_output_off_its_limit() -> None:
+def test_a_reset_moves_the_output_away_from_its_limit() -> None:
     block = PID(I=2.0, limit_output=True, upper=2.0, anti_windup="clamping", external_reset="either")
     result = run(block, Constant(value=1.0), Step(time=2.0), solver="rk45")
     t = result.time
@@ -139,7 +141,7 @@ def test_a_reset_lifts_the_output_off_its_limit() -> None:
 
 
 @SOLVERS
-def test_tracking_pulls_the_output(solver: str, step: float | None) -> None:
+def test_tracking_moves_the_output_to_the_tracking_signal(solver: str, step: float | None) -> None:
     """With P = I = 0, y' = Kt (tracking - y)."""
     block = PID(P=0.0, I=0.0, tracking=True, Kt=3.0)
     result = run(block, Constant(value=1.0), Constant(value=2.0), solver=solver, step=step)
@@ -155,7 +157,7 @@ SUMS = {
 
 
 @pytest.mark.parametrize(("integrator", "filtered"), [*itertools.product(METHODS, METHODS)])
-def test_a_sampled_one_is_the_transfer_function_in_z(integrator: str, filtered: str) -> None:
+def test_a_discrete_pid_agrees_with_the_transfer_function_in_z(integrator: str, filtered: str) -> None:
     P, I, D, N = 3.0, 2.0, 0.5, 8.0  # noqa: E741
     block = DiscretePID(
         P=P, I=I, D=D, N=N, integrator_method=integrator, filter_method=filtered, sample_time=T
@@ -170,8 +172,8 @@ def test_a_sampled_one_is_the_transfer_function_in_z(integrator: str, filtered: 
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_back_calculation_in_a_sampled_one_needs_no_loop(method: str) -> None:
-    """y - v as the integral sees it is that of the very output: the equation of the tick, by iteration."""
+def test_back_calculation_in_a_discrete_pid_solves_its_implicit_equation(method: str) -> None:
+    """The integral uses y - v of the same tick; the reference solves this equation by iteration."""
     P, I, low, high, Kb = 2.0, 3.0, -1.0, 1.5, 4.0  # noqa: E741
     share = {"forward_euler": 0.0, "backward_euler": 1.0, "trapezoidal": 0.5}[method]
     block = DiscretePID(
@@ -200,7 +202,7 @@ def test_back_calculation_in_a_sampled_one_needs_no_loop(method: str) -> None:
 @pytest.mark.parametrize(
     ("external_reset", "at"), [("rising", [1.0]), ("falling", [2.0]), ("either", [1.0, 2.0])]
 )
-def test_a_sampled_one_is_reset_at_a_tick(external_reset: str, at: list[float]) -> None:
+def test_a_discrete_pid_is_reset_at_a_tick(external_reset: str, at: list[float]) -> None:
     block = DiscretePID(P=0.0, I=1.0, external_reset=external_reset, initial_integral=5.0, sample_time=T)
     pulse = PulseGenerator(period=2.0, width=50.0, delay=1.0)
     result = run(block, Constant(value=1.0), pulse, stop=2.5)
@@ -211,15 +213,15 @@ def test_a_sampled_one_is_reset_at_a_tick(external_reset: str, at: list[float]) 
     np.testing.assert_allclose(result["pid/y"], 5.0 + since, atol=1e-12)
 
 
-def test_a_sampled_one_tracks() -> None:
+def test_a_discrete_pid_tracks_the_tracking_signal() -> None:
     block = DiscretePID(P=0.0, I=0.0, tracking=True, Kt=3.0, sample_time=T)
     result = run(block, Constant(value=1.0), Constant(value=2.0))
     ticks = np.arange(len(result.time))
     np.testing.assert_allclose(result["pid/y"], 2.0 * (1.0 - (1.0 - 3.0 * T) ** ticks), atol=1e-12)
 
 
-def test_a_limiter_behind_it_can_be_tracked() -> None:
-    """A bumpless loop: what the actuator really gives is what the controller tracks."""
+def test_a_pid_tracks_the_output_of_an_external_limiter() -> None:
+    """The controller tracks the output of the saturated actuator, which prevents windup."""
     builder = DiagramBuilder("d")
     error = builder.add("error", SineWave(frequency=2.0))
     control = builder.add("pid", PID(P=2.0, I=3.0, tracking=True, Kt=4.0), error)
@@ -231,7 +233,7 @@ def test_a_limiter_behind_it_can_be_tracked() -> None:
     np.testing.assert_allclose(result["actuator/y"], expected, atol=2e-3)
 
 
-def test_limits_need_to_be_asked_for() -> None:
+def test_limits_without_limit_output_are_refused() -> None:
     with pytest.raises(
         InputError, match=r"PID: there are limits, but limit_output is false.*set limit_output"
     ):

@@ -1,4 +1,4 @@
-"""Orientation and pose blocks against SciPy's rotations and the toolbox's formulas; every pair is inverse."""
+"""Orientation and pose blocks compared with SciPy's rotations and the toolbox's formulas; inverse pairs."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ TURNS = {
     "release 9": lambda r, p, y: Rotation.from_euler("XYZ", [r, p, y]),
     "release 7": lambda r, p, y: Rotation.from_euler("ZYX", [r, p, y]),
 }
-"""SciPy's capital letters are turns about the axes as they have been turned, from the left."""
+"""SciPy's capital letters are intrinsic rotations (about the rotated axes), from left to right."""
 
 
 def random_pose(size: float = 3.0) -> np.ndarray:
@@ -63,7 +63,7 @@ def test_roll_pitch_yaw(convention: str) -> None:
 
 @pytest.mark.parametrize("convention", TURNS)
 @pytest.mark.parametrize("off", [0.0, 1e-15, 1e-12, 1e-7, 1e-4])
-def test_angles_at_the_singular_pitch_still_give_the_pose(convention: str, off: float) -> None:
+def test_angles_at_the_singular_pitch_reproduce_the_pose(convention: str, off: float) -> None:
     for sign in (1, -1):
         T = evaluate(Rpy2T(convention=convention), 0.7, sign * (np.pi / 2 - off), -1.2)["T"]
         back = evaluate(T2rpy(convention=convention), T)
@@ -112,7 +112,7 @@ def test_quaternion_algebra() -> None:
 
 
 @pytest.mark.parametrize("axes", ["body", "world"])
-def test_the_rate_of_a_quaternion_is_its_derivative(axes: str) -> None:
+def test_the_quaternion_rate_is_the_time_derivative(axes: str) -> None:
     turn, w, h = Rotation.random(rng=RANDOM), RANDOM.normal(size=3), 1e-5
     step = {s: Rotation.from_rotvec(s * h * w) for s in (1, -1)}
     moved = {s: turn * step[s] if axes == "body" else step[s] * turn for s in step}
@@ -120,7 +120,7 @@ def test_the_rate_of_a_quaternion_is_its_derivative(axes: str) -> None:
     near = {s: moved[s].as_quat(scalar_first=True) for s in moved}
     near = {s: value if value @ q > 0 else -value for s, value in near.items()}
     expected = (near[1] - near[-1]) / (2 * h)
-    # central difference: h^2 and rounding / h
+    # error of the central difference: h^2 and rounding / h
     assert evaluate(QuaternionRate(axes=axes), q, w)["y"] == pytest.approx(expected, abs=1e-9)
 
 
@@ -149,7 +149,7 @@ def test_poses_compose_and_invert() -> None:
     assert evaluate(Skew(), a)["S"] @ b == pytest.approx(np.cross(a, b), rel=1e-13)
 
 
-def test_twists_are_moved_by_the_adjoint() -> None:
+def test_twists_are_transformed_by_the_adjoint() -> None:
     T, V = random_pose(), RANDOM.normal(size=6)
 
     def hat(V: np.ndarray) -> np.ndarray:
@@ -160,13 +160,13 @@ def test_twists_are_moved_by_the_adjoint() -> None:
     assert hat(found) == pytest.approx(T @ hat(V) @ np.linalg.inv(T), abs=1e-13)
 
 
-def test_small_steps_of_both_releases() -> None:
+def test_differential_motion_of_both_toolbox_releases() -> None:
     T1 = random_pose()
     d = RANDOM.normal(size=6) * 1e-6
     step = evaluate(Delta2Tr(), d)["T"]
-    # release 10: in the axes of the first pose
+    # release 10: along the axes of the first pose
     assert evaluate(Tr2Delta(), T1, T1 @ step)["dx"] == pytest.approx(d, abs=1e-15)
-    # up to release 9: in world axes; vex(R2 R1' - I) by the cross products of the axes
+    # up to release 9: along the world axes; vex(R2 R1' - I) from the cross products of the axes
     T2 = T1.copy()
     T2[:3, :3] = step[:3, :3] @ T1[:3, :3]
     T2[:3, 3] += d[:3]

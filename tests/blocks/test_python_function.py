@@ -1,4 +1,4 @@
-"""Blocks whose equation is a Python function: traced, compiled, differentiated, kept in files."""
+"""Blocks whose equation is a Python function: traced, compiled, differentiated, saved in files."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_matrices_and_several_results() -> None:
 
 
 @pytest.mark.parametrize(("solver", "step"), [("rk45", None), ("rk4", 0.01)])
-def test_it_is_the_same_as_an_expression(solver: str, step: float | None) -> None:
+def test_a_python_function_agrees_with_the_equal_expression(solver: str, step: float | None) -> None:
     def rate(u):  # type: ignore[no-untyped-def]
         return casadi.if_else(u > 0.5, u**2, casadi.fabs(u) / (1 + np.exp(-u)))
 
@@ -93,7 +93,7 @@ def test_a_file_names_the_function_and_needs_trust(tmp_path: Path) -> None:
     result = run(diagram)
     expected = 2.0 * np.sin(np.sin(result.time)) + result.time
     np.testing.assert_allclose(result["f/y"], expected, atol=1e-14)
-    # and back: the same text, and the same diagram
+    # saved again: the same text and the same diagram
     again = ab.save_diagram(diagram, tmp_path / "e.json")
     assert '"function": "control.py:law"' in again.read_text()
     assert ab.load_diagram(again, trust=True) == diagram
@@ -108,7 +108,7 @@ def test_a_file_names_the_function_and_needs_trust(tmp_path: Path) -> None:
         ("broken.py:law", r"the code of broken\.py fails: ZeroDivisionError"),
     ],
 )
-def test_functions_that_are_none(reference: str, says: str, tmp_path: Path) -> None:
+def test_invalid_references_to_functions_are_refused(reference: str, says: str, tmp_path: Path) -> None:
     (tmp_path / "control.py").write_text(CODE)
     (tmp_path / "broken.py").write_text("1 / 0\n")
     document = ab.save_diagram(fed(PythonFunction(), SineWave()), tmp_path / "d.json")
@@ -126,7 +126,7 @@ def test_a_function_of_a_session_cannot_be_saved(tmp_path: Path) -> None:
         diagram_to_python(fed(PythonFunction(function=lambda u: 2 * u), SineWave()))
 
 
-def test_what_cannot_be_traced_says_so() -> None:
+def test_functions_that_cannot_be_traced_are_refused() -> None:
     def decides(u):  # type: ignore[no-untyped-def]
         return u if u > 0 else 0.0
 

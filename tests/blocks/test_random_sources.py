@@ -1,7 +1,6 @@
-"""Random numbers: the generator bit for bit against whole numbers, then what statistics says of them.
+"""Random numbers: the generator compared bit for bit with integer arithmetic, and statistical tests.
 
-The bounds are those of a 0.1 % test; with fixed seeds the numbers are always the same, so that none fails by
-chance.
+The bounds are those of tests at the 0.1 % level. The seeds are fixed, so that no test fails by chance.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ A2 = ((0, 1, 0), (0, 0, 1), (-1370589, 0, 527612))
 
 
 def power(matrix: tuple[tuple[int, ...], ...], exponent: int, modulus: int) -> np.ndarray:
-    """A matrix power modulo, in whole numbers of any size."""
+    """A matrix power modulo m, in integers of any size."""
     found, square = np.eye(3, dtype=object), np.array(matrix, dtype=object)
     while exponent:
         if exponent & 1:
@@ -41,7 +40,7 @@ def power(matrix: tuple[tuple[int, ...], ...], exponent: int, modulus: int) -> n
 
 
 def reference(seed: int, element: int, count: int) -> list[float]:
-    """MRG32k3a in Python's whole numbers, from the start of a stream."""
+    """MRG32k3a in Python's integers, from the start of a stream."""
     jump = seed * 2**127 + element * 2**76
     first, second = (
         list(power(matrix, jump, modulus).dot([12345] * 3) % modulus)
@@ -56,39 +55,39 @@ def reference(seed: int, element: int, count: int) -> list[float]:
 
 
 def drawn(block: Block, count: int, period: float = 0.001) -> np.ndarray:
-    """The outputs at the first ticks, by native code."""
+    """Return the outputs at the first ticks, computed by native code."""
     builder = DiagramBuilder("d")
     builder.add("noise", block)
     options = SimulationOptions(stop_time=(count - 1) * period, sample_time=period)
     return simulate(compiled(builder.build()), options)["noise/y"]
 
 
-def test_the_generator_is_mrg32k3a_to_the_last_bit() -> None:
+def test_the_generator_agrees_with_mrg32k3a_to_the_last_bit() -> None:
     block = UniformRandomNumber(minimum=[0.0, 0.0, 0.0], seed=54321, sample_time=0.001)
     expected = [reference(54321, element, 2000) for element in range(3)]
     assert drawn(block, 2000).T.tolist() == expected
-    # the first numbers that L'Ecuyer's own program gives from its default start
+    # the first numbers of L'Ecuyer's program with its default seed
     assert reference(0, 0, 3) == pytest.approx([0.127011122, 0.318527565, 0.309186015], abs=1e-9)
 
 
-def test_matrices_have_a_stream_for_each_element_row_by_row() -> None:
+def test_each_matrix_element_has_its_own_stream_row_by_row() -> None:
     values = drawn(UniformRandomNumber(minimum=np.zeros((2, 2)), seed=7, sample_time=0.001), 5)
     for element in range(4):
         assert values[:, element // 2, element % 2].tolist() == reference(7, element, 5)
 
 
-def test_the_normal_quantile_is_that_of_scipy() -> None:
+def test_the_normal_quantile_agrees_with_scipy() -> None:
     p = SX.sym("p")
     quantile = Function("f", [p], [normal_quantile(p)])
     tails = 10.0 ** -np.linspace(0.5, 9.0, 60)
     points = np.concatenate([np.linspace(1e-3, 1.0 - 1e-3, 997), tails, 1.0 - tails[tails > 1e-6]])
     found = np.array([float(quantile(point)) for point in points])
-    # AS 241 promises 1e-16; SciPy rounds too
+    # AS 241 has an error of 1e-16; SciPy's own rounding adds to it
     np.testing.assert_allclose(found, special.ndtri(points), rtol=1e-14, atol=1e-15)
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2, 65535])
-def test_normal_numbers_have_the_distribution_and_no_memory(seed: int) -> None:
+def test_normal_numbers_are_normally_distributed_and_uncorrelated(seed: int) -> None:
     count = 20_000
     values = drawn(RandomNumber(mean=3.0, variance=4.0, seed=seed, sample_time=0.001), count)
     normal = (values - 3.0) / 2.0
@@ -109,7 +108,7 @@ def test_streams_are_independent() -> None:
         assert abs(np.mean(left * right)) < 3.3 / np.sqrt(count)
 
 
-def test_uniform_numbers_fill_the_interval() -> None:
+def test_uniform_numbers_are_uniformly_distributed() -> None:
     values = drawn(UniformRandomNumber(minimum=-2.0, maximum=5.0, seed=9, sample_time=0.001), 20_000)
     assert -2.0 < values.min() < -1.99 < 4.99 < values.max() < 5.0
     assert stats.kstest((values + 2.0) / 7.0, "uniform").pvalue > 1e-3
@@ -125,7 +124,7 @@ def test_the_seed_is_tunable() -> None:
 
 
 @pytest.mark.parametrize("solver", ["rk45", "rk4"])
-def test_what_a_lag_makes_of_white_noise_has_the_variance_of_theory(solver: str) -> None:
+def test_white_noise_after_a_lag_has_the_theoretical_variance(solver: str) -> None:
     """x' = (n - x) / tau with noise of power P has variance P / (2 tau) as T goes to 0.
 
     With n held for T it is exactly (P / T) (1 - a) / (1 + a), a = exp(-T / tau).
@@ -141,6 +140,6 @@ def test_what_a_lag_makes_of_white_noise_has_the_variance_of_theory(solver: str)
     a = np.exp(-period / tau)
     exact = power / period * (1 - a) / (1 + a)
     assert exact == pytest.approx(power / (2 * tau), rel=1e-3)
-    # samples 0.05 s = tau apart: correlation 1/e, so that the count of independent ones is count tanh(1)
+    # samples are 0.05 s = tau apart with correlation 1/e: the number of independent samples is count tanh(1)
     independent = len(values) * np.tanh(1.0)
     assert values.var() == pytest.approx(exact, rel=3.3 * np.sqrt(2.0 / independent))

@@ -1,4 +1,4 @@
-"""Periodic sources, and lags after them, against closed forms, in fixed and adaptive runs."""
+"""Periodic sources, and lags after them, compared with closed forms, with fixed and adaptive steps."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ SOLVERS = pytest.mark.parametrize(("solver", "step"), [("rk45", None), ("rk4", 0
 def run(
     source: Block, *chain: Block, solver: str = "auto", step: float | None = None, stop: float = 5.0
 ) -> tuple[np.ndarray, list[np.ndarray]]:
-    """The time and the outputs of a source and of the blocks that stand behind it, one after the other."""
+    """Return the times and the outputs of a source and of the blocks in series after it."""
     builder = DiagramBuilder("d")
     last = builder.add("b0", source)
     for k, block in enumerate(chain, 1):
@@ -53,13 +53,13 @@ def test_a_sawtooth_falls_and_jumps(solver: str, step: float | None) -> None:
     t, (y, area) = run(block, Integrator(), solver=solver, step=step)
     s = 0.7 * t - np.floor(0.7 * t * (1 + 1e-14))
     np.testing.assert_allclose(y, np.outer(1.0 - 2.0 * s, [2.0, -1.0]), atol=1e-12)
-    # each step ends at an edge, and a straight line is integrated exactly by any of these methods
+    # steps end at the edges, and all these methods integrate a linear function exactly
     np.testing.assert_allclose(area, np.outer((s - s**2) / 0.7, [2.0, -1.0]), atol=1e-12)
 
 
 @SOLVERS
 @pytest.mark.parametrize(("units", "frequency"), [("Hz", 0.5), ("rad/s", np.pi)])
-def test_a_square_begins_low(units: str, frequency: float, solver: str, step: float | None) -> None:
+def test_a_square_wave_starts_low(units: str, frequency: float, solver: str, step: float | None) -> None:
     block = SignalGenerator(waveform="square", amplitude=3.0, frequency=frequency, units=units)
     t, (y, area) = run(block, Integrator(), solver=solver, step=step)
     high = np.floor(t * (1 + 1e-14)) % 2
@@ -68,7 +68,7 @@ def test_a_square_begins_low(units: str, frequency: float, solver: str, step: fl
     np.testing.assert_allclose(area, 3.0 * np.abs(into - 1.0) - 3.0, atol=1e-12)
 
 
-def test_a_generated_sine() -> None:
+def test_a_sine_of_the_signal_generator() -> None:
     t, (y,) = run(SignalGenerator(amplitude=3.0, frequency=0.5))
     np.testing.assert_allclose(y, 3.0 * np.sin(np.pi * t), atol=1e-13)
     t, (y,) = run(SignalGenerator(amplitude=3.0, frequency=0.5, units="rad/s"))
@@ -76,7 +76,7 @@ def test_a_generated_sine() -> None:
 
 
 @SOLVERS
-def test_a_polygon_repeats_itself(solver: str, step: float | None) -> None:
+def test_a_repeating_sequence_is_periodic(solver: str, step: float | None) -> None:
     corners, values = [0.0, 0.3, 0.4, 0.9], [1.0, -2.0, 5.0, 2.0]
     block = RepeatingSequence(times=corners, values=values)
     t, (y, area) = run(block, Integrator(), solver=solver, step=step)
@@ -93,7 +93,7 @@ def test_a_polygon_repeats_itself(solver: str, step: float | None) -> None:
 @pytest.mark.parametrize(
     ("method", "kind"), [("linear", "linear"), ("nearest", "nearest-up"), ("flat", "previous")]
 )
-def test_a_sampled_course_repeats_itself(method: str, kind: str) -> None:
+def test_an_interpolated_repeating_sequence_is_periodic(method: str, kind: str) -> None:
     corners, values = [0.0, 0.1, 0.5, 0.6, 1.0], [3.0, 1.0, 4.0, 2.0, 1.5]
     block = RepeatingSequenceInterpolated(times=corners, values=values, method=method, sample_time=0.0625)
     t, (y,) = run(block)
@@ -110,7 +110,7 @@ def test_stairs_and_counters_count_ticks() -> None:
 
 
 @pytest.mark.parametrize("kind", [RepeatingSequence, RepeatingSequenceInterpolated])
-def test_a_sequence_begins_at_zero(kind: type[Block]) -> None:
+def test_a_sequence_that_does_not_start_at_time_zero_is_refused(kind: type[Block]) -> None:
     with pytest.raises(InputError, match=r"the first of the times is 0\.5\. Allowed: times that start at 0"):
         kind(times=[0.5, 1.0], values=[0.0, 1.0])
 
@@ -124,12 +124,12 @@ def test_a_sequence_begins_at_zero(kind: type[Block]) -> None:
         (LeadLag(gain=2.0, lead_time=0.5, lag_time=0.2), [1.0, 2.0], [0.2, 1.0]),
     ],
 )
-def test_lags_answer_a_step_as_their_transfer_function(
+def test_step_responses_of_lags_agree_with_their_transfer_functions(
     block: Block, numerator: list[float], denominator: list[float], solver: str, step: float | None
 ) -> None:
     t, (_, y) = run(Step(time=0.0), block, solver=solver, step=step)
     _, expected = signal.step((numerator, denominator), T=t)
-    # fourth order at 0.01 s: (5 * 0.01)^4 / 120 over the run
+    # error of a fourth-order method at 0.01 s: (5 * 0.01)^4 / 120 over the run
     np.testing.assert_allclose(y, expected, atol=1e-6 if step else 1e-8)
 
 
@@ -141,7 +141,7 @@ def test_lags_answer_a_step_as_their_transfer_function(
         (TransferFunctionRealZero(zero=0.6, sample_time=0.1), [1.0, -0.6], [1.0, 0.0]),
     ],
 )
-def test_sampled_lags_filter_as_their_transfer_function(
+def test_outputs_of_sampled_lags_agree_with_their_transfer_functions(
     block: Block, numerator: list[float], denominator: list[float]
 ) -> None:
     t, (u, y) = run(SineWave(frequency=3.0, phase=0.4), block)
@@ -150,7 +150,7 @@ def test_sampled_lags_filter_as_their_transfer_function(
     np.testing.assert_allclose(y[at_ticks], signal.lfilter(numerator, denominator, u[at_ticks]), atol=1e-13)
 
 
-def test_what_was_before_the_first_tick() -> None:
+def test_initial_values_of_sampled_transfer_functions() -> None:
     _, (u, y) = run(
         SineWave(phase=0.4),
         TransferFunctionLeadOrLag(pole=0.9, zero=0.5, initial=2.0, initial_input=3.0, sample_time=0.1),

@@ -1,4 +1,4 @@
-"""The robot blocks give what the dynamics give, and say which robot does not fit."""
+"""Robot blocks: agreement with the dynamics functions, units, and errors about unsuitable robots."""
 
 from __future__ import annotations
 
@@ -40,16 +40,18 @@ RANDOM = np.random.default_rng(11)
         (RobotPlot, "link_poses", 1),
     ],
 )
-def test_a_block_is_its_quantity(kind: type[Block], quantity: str, count: int, puma560: Robot) -> None:
+def test_a_robot_block_agrees_with_the_dynamics_function(
+    kind: type[Block], quantity: str, count: int, puma560: Robot
+) -> None:
     inputs = RANDOM.uniform(-1, 1, (count, puma560.n))
     (found,) = evaluate(kind(robot=puma560), *inputs).values()
     (expected,) = dynamics.TRACES[quantity](puma560)(*inputs)
     assert found.shape == expected.shape
-    # the same operations; common subexpressions may be found in another order
+    # same operations; common subexpressions may be evaluated in another order
     assert found == pytest.approx(expected, rel=1e-13, abs=1e-12)
 
 
-def test_forward_dynamics_accelerates_by_its_equation(puma560: Robot) -> None:
+def test_forward_dynamics_outputs_states_and_acceleration(puma560: Robot) -> None:
     q, qd, tau = RANDOM.uniform(-1, 1, (3, 6))
     block = ForwardDynamics(robot=puma560, q0=0.1)
     found = evaluate(block, tau, x=np.concatenate([q, qd]))
@@ -59,7 +61,7 @@ def test_forward_dynamics_accelerates_by_its_equation(puma560: Robot) -> None:
     assert found["qdd"] == pytest.approx(expected, rel=1e-12)
 
 
-def test_a_trajectory_is_the_papers_polynomial() -> None:
+def test_a_trajectory_is_the_polynomial_of_the_paper() -> None:
     q0, qf = np.array([0.1, 0.2]), np.array([3.14, -1.0])
     for t in (0.0, 2.5, 10.0):
         s = t / 10
@@ -69,12 +71,12 @@ def test_a_trajectory_is_the_papers_polynomial() -> None:
         assert found["qd"] == pytest.approx(speed, rel=1e-14, abs=1e-15)
 
 
-def test_after_its_end_a_trajectory_stands_still() -> None:
+def test_a_trajectory_stands_still_after_its_end() -> None:
     found = evaluate(JTraj(q0=[0.0], qf=[1.0], tmax=2.0), t=2.5)
     assert [float(found[name][0]) for name in ("q", "qd", "qdd")] == [1.0, 0.0, 0.0]
 
 
-def test_units_follow_the_joints(puma560: Robot) -> None:
+def test_units_depend_on_the_joint_types(puma560: Robot) -> None:
     assert [port.unit for port in Rne(robot=puma560).input_ports()] == ["rad", "rad/s", "rad/s2"]
     assert Rne(robot=puma560).output_ports()[0].unit == "N m"
     slide = Robot(name="slide", links=serial_chain([standard_dh("rail", sigma=1, mass=1.0)]))
@@ -93,21 +95,21 @@ def test_a_robot_plot_shows_its_robot(puma560: Robot) -> None:
     assert view.subject is puma560
 
 
-def test_start_values_have_one_number_for_each_joint(puma560: Robot) -> None:
+def test_start_values_of_the_wrong_length_are_refused(puma560: Robot) -> None:
     with pytest.raises(
         InputError, match=r"ForwardDynamics.q0: q0 has 2 joints. Allowed: 6, one for each joint of 'puma560'"
     ):
         ForwardDynamics(robot=puma560, q0=[0.0, 0.0])
 
 
-def test_a_robot_of_another_size_is_refused_with_both_ends(puma560: Robot) -> None:
+def test_a_robot_of_another_size_is_refused_with_both_ports_of_the_connection(puma560: Robot) -> None:
     builder = DiagramBuilder("d")
     builder.add("fkine", Fkine(robot=puma560), builder.add("traj", JTraj(q0=[0] * 4, qf=[1] * 4))["q"])
     with pytest.raises(DiagramError, match=r"'traj/q' gives shape \(4,\) but 'fkine/q' takes shape \(6,\)"):
         builder.build()
 
 
-def test_a_robot_that_cannot_be_accelerated_names_the_block() -> None:
+def test_a_robot_without_mass_is_refused_with_the_name_of_the_block() -> None:
     ghost = Robot(name="ghost", links=serial_chain([standard_dh("nothing", a=1.0)]))
     builder = DiagramBuilder("d")
     builder.add("arm", ForwardDynamics(robot=ghost), builder.add("tau", Constant(value=[0.0])))

@@ -1,4 +1,4 @@
-"""Zeros, poles and filters against SciPy: designs, and step responses in fixed and adaptive runs."""
+"""Zeros, poles and filters compared with SciPy: designs, and step responses with fixed and adaptive steps."""
 
 from __future__ import annotations
 
@@ -47,14 +47,14 @@ def test_step_responses(
     zeros: list[complex], poles: list[complex], gain: float, solver: str, step: float | None
 ) -> None:
     t, _, y = run(ZeroPole(zeros=zeros, poles=poles, gain=gain), Step(time=0.0), 0.02, solver, step)
-    # an independent realisation: the polynomials, in controllable form
+    # an independent realisation: the polynomials in controllable canonical form
     _, expected = signal.step(signal.ZerosPolesGain(zeros, poles, gain).to_tf(), T=t)
-    # of the fixed steps: (|pole| h)^5 / 120 a step, the fastest pole is 20
+    # error of the fixed steps: (|pole| h)^5 / 120 per step; the fastest pole is 20 rad/s
     np.testing.assert_allclose(y, expected, atol=2e-4 if step and max(map(abs, poles)) > 10 else 2e-8)
 
 
 @pytest.mark.parametrize(("zeros", "poles", "gain"), SYSTEMS)
-def test_the_chain_has_the_frequency_response_of_the_roots(
+def test_the_realised_chain_has_the_frequency_response_of_the_roots(
     zeros: list[complex], poles: list[complex], gain: float
 ) -> None:
     system = realised(ZeroPoleGain(zeros=np.array(zeros, complex), poles=np.array(poles, complex), gain=gain))
@@ -64,8 +64,9 @@ def test_the_chain_has_the_frequency_response_of_the_roots(
         assert chain == pytest.approx(direct, rel=1e-11)
 
 
-def test_poles_of_high_order_are_not_spoilt() -> None:
-    """Thirty poles in a narrow band: multiplied out, their polynomial does not know where they are."""
+def test_thirty_close_poles_are_realised_accurately() -> None:
+    """Thirty poles in a narrow band: the coefficients of their polynomial are too inaccurate to recover
+    them."""
     z, p, k = signal.butter(15, [100.0, 110.0], "bandpass", analog=True, output="zpk")
     points = 1j * np.linspace(90.0, 120.0, 31)
     expected = np.array([k * np.prod(s - z) / np.prod(s - p) for s in points])
@@ -100,7 +101,7 @@ def response(block: Block, points: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("order", [1, 2, 3, 4, 7])
 @pytest.mark.parametrize("kind", ["low_pass", "high_pass", "band_pass", "band_stop"])
 @pytest.mark.parametrize("design", ["butterworth", "chebyshev1", "chebyshev2"])
-def test_filters_are_those_of_scipy(design: str, kind: str, order: int) -> None:
+def test_filters_agree_with_scipy(design: str, kind: str, order: int) -> None:
     scipy_kind = kind.replace("_", "")
     band = kind.startswith("band")
     design_of = {
@@ -132,7 +133,7 @@ def test_a_filter_in_a_run(solver: str, step: float | None) -> None:
     np.testing.assert_allclose(y, signal.lfilter(*signal.butter(3, 0.1), u), atol=1e-12)
 
 
-def test_roots_survive_a_file(tmp_path: Path) -> None:
+def test_a_file_keeps_zeros_and_poles(tmp_path: Path) -> None:
     builder = DiagramBuilder("roots")
     builder.add("none", ZeroPole(zeros=[], poles=[-1 + 2j, -1 - 2j]), builder.add("u", Step()))
     diagram = builder.build()
@@ -141,7 +142,7 @@ def test_roots_survive_a_file(tmp_path: Path) -> None:
     assert diagram.blocks["none"].parameter_value("poles") == ((-1.0, 2.0), (-1.0, -2.0))
 
 
-def test_systems_that_are_none_are_refused() -> None:
+def test_invalid_zeros_poles_and_filters_are_refused() -> None:
     with pytest.raises(InputError, match=r"ZeroPole: there are 2 zeros and 1 poles.*is not causal"):
         ZeroPole(zeros=[1.0, 2.0], poles=[-1.0])
     with pytest.raises(InputError, match="complex numbers in conjugate pairs"):
