@@ -18,7 +18,7 @@ from armblocks.equations import TracedFunction, signature
 
 
 def traced(equations: Callable[..., Any], *sizes: int, name: str = "f") -> TracedFunction:
-    """A function of vectors ``a, b, …`` of these sizes whose result is one column ``y``."""
+    """A traced function of vectors ``a, b, …`` of these sizes with one output, the column ``y``."""
     letters = "abcdefgh"[: len(sizes)]
     symbols = [SX.sym(letter, size) for letter, size in zip(letters, sizes)]
     rows = SX(equations(*symbols)).shape[0]
@@ -27,7 +27,7 @@ def traced(equations: Callable[..., Any], *sizes: int, name: str = "f") -> Trace
 
 
 def mixed() -> TracedFunction:
-    """Some arithmetic, functions and choices of two vectors of three: eleven results."""
+    """A function of two vectors of length 3 with arithmetic, functions and conditions: eleven results."""
 
     def equations(a: SX, b: SX) -> SX:
         angle = a[0] * b[1] - a[1]
@@ -57,7 +57,7 @@ def single_operation(opcode: Opcode) -> Tape:
 
 
 def native(tape: Tape, lanes: int) -> Callable[..., np.ndarray]:
-    """A tape of scalar inputs and one scalar output as a function of equally long vectors."""
+    """Compile a tape with scalar inputs and one scalar output to a function of vectors of equal length."""
     count = len(tape.input_sizes)
     layout = BatchLayout(inputs=(Layout.ROWS,) * count, outputs=(Layout.ROWS,))
 
@@ -74,13 +74,13 @@ def native(tape: Tape, lanes: int) -> Callable[..., np.ndarray]:
         arrays = [np.ascontiguousarray(value, dtype=np.float64) for value in values]
         result = np.empty_like(arrays[0])
         function(0, result.size, result.size, *(array.ctypes.data for array in (*arrays, result)))
-        assert code  # the function runs in it
+        assert code  # keeps the machine code alive during the call
         return result
 
     return call
 
 
 def same_bits(a: np.ndarray, b: np.ndarray) -> bool:
-    """Whether two arrays hold the same bits, any NaN being like any other."""
+    """Return whether two arrays are equal bit for bit; all NaNs count as equal."""
     both_nan = np.isnan(a) & np.isnan(b)
     return bool(np.all((np.asarray(a).view(np.int64) == np.asarray(b).view(np.int64)) | both_nan))

@@ -1,4 +1,4 @@
-"""What kernels refuse, and what they say."""
+"""Arguments that kernels refuse, and their messages."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def kernel() -> Kernel:
 GOOD = np.ones(3)
 
 
-def test_the_count_of_arguments(kernel: Kernel) -> None:
+def test_a_wrong_number_of_arguments_is_refused(kernel: Kernel) -> None:
     with pytest.raises(
         InputError, match=r"mixed: 1 arguments were given. Allowed: a \(3,\), b \(3,\). Fix: call mixed"
     ):
@@ -25,7 +25,7 @@ def test_the_count_of_arguments(kernel: Kernel) -> None:
 
 
 @pytest.mark.parametrize("shape", [(2,), (5, 4), (3, 5), (), (1, 1, 3)])
-def test_a_wrong_shape(kernel: Kernel, shape: tuple[int, ...]) -> None:
+def test_an_array_of_the_wrong_shape_is_refused(kernel: Kernel, shape: tuple[int, ...]) -> None:
     with pytest.raises(InputError) as caught:
         kernel(GOOD, np.ones(shape))
     assert str(caught.value).startswith(
@@ -33,7 +33,7 @@ def test_a_wrong_shape(kernel: Kernel, shape: tuple[int, ...]) -> None:
     )
 
 
-def test_a_wrong_shape_of_a_number() -> None:
+def test_a_matrix_in_place_of_a_scalar_is_refused() -> None:
     kernel = compile_function(
         TracedFunction.trace("square", signature(("t", ())), signature(("s", ())), lambda t: t * t)
     )
@@ -54,19 +54,19 @@ def test_a_wrong_shape_of_a_number() -> None:
         (np.zeros(3, [("x", float)]), r"\[\('x', '<f8'\)\]"),
     ],
 )
-def test_what_is_no_real_number(kernel: Kernel, value: np.ndarray, found: str) -> None:
+def test_arrays_that_are_not_real_are_refused(kernel: Kernel, value: np.ndarray, found: str) -> None:
     with pytest.raises(
         InputError, match=f"mixed: 'a' holds {found}. Allowed: real numbers: any float or integer type"
     ):
         kernel(value, GOOD)
 
 
-def test_what_is_no_array(kernel: Kernel) -> None:
+def test_a_ragged_list_is_refused(kernel: Kernel) -> None:
     with pytest.raises(InputError, match=r"mixed: 'a' cannot be read as an array: .*inhomogeneous"):
         kernel([[1.0], [1.0, 2.0, 3.0]], GOOD)
 
 
-def test_different_numbers_of_samples(kernel: Kernel) -> None:
+def test_different_numbers_of_samples_are_refused(kernel: Kernel) -> None:
     with pytest.raises(
         InputError,
         match=r"the inputs hold different numbers of samples: 'a' 4, 'b' 5. Allowed: one number of samples",
@@ -91,14 +91,14 @@ def read_only() -> np.ndarray:
         (read_only(), "is read-only"),
     ],
 )
-def test_an_array_for_the_result_that_cannot_take_it(kernel: Kernel, out: object, found: str) -> None:
+def test_an_unsuitable_array_for_out_is_refused(kernel: Kernel, out: object, found: str) -> None:
     with pytest.raises(InputError) as caught:
         kernel(np.ones((2, 3)), GOOD, out=out)
     assert caught.match(f"mixed: out= for 'y' {found}. Allowed: a writable C-contiguous float64 array")
     assert "of shape (2, 11). Fix: omit out=, or allocate it with numpy.empty." in str(caught.value)
 
 
-def test_the_count_of_arrays_for_results(kernel: Kernel) -> None:
+def test_a_wrong_number_of_arrays_for_out_is_refused(kernel: Kernel) -> None:
     with pytest.raises(InputError, match=r"mixed: out= holds 2 arrays. Allowed: one per output: y \(11,\)"):
         kernel(GOOD, GOOD, out=(np.empty(11), np.empty(11)))
     out = np.empty(11)
@@ -106,7 +106,7 @@ def test_the_count_of_arrays_for_results(kernel: Kernel) -> None:
 
 
 @pytest.mark.parametrize("threads", [0, -1, 1.5, "two", None, True])
-def test_the_number_of_threads(kernel: Kernel, threads: object) -> None:
+def test_an_invalid_number_of_threads_is_refused(kernel: Kernel, threads: object) -> None:
     with pytest.raises(InputError, match=r"mixed: threads=.*Allowed: a positive integer"):
         kernel(GOOD, GOOD, threads=threads)
     assert kernel(GOOD, GOOD, threads=np.int64(2)).shape == (11,)
@@ -124,7 +124,7 @@ def test_a_scalar_result_can_be_written_into_an_array() -> None:
     assert many.tolist() == [0.0, 1.0, 8.0, 27.0]
 
 
-def test_two_outputs_may_not_share_memory_with_each_other_silently() -> None:
+def test_two_outputs_in_the_same_array_are_written_in_order() -> None:
     kernel = compile_function(
         TracedFunction.trace(
             "pair", signature(("a", (2,))), signature(("x", (2,)), ("y", (2,))), lambda a: [a + 1, a * 2]
@@ -133,6 +133,6 @@ def test_two_outputs_may_not_share_memory_with_each_other_silently() -> None:
     out = np.empty(2)
     x, y = kernel(np.array([1.0, 5.0]), out=(out, out))
     assert x is out
-    assert y is out  # written in order: the last one stays
+    assert y is out  # the second output overwrites the first
     assert out.tolist() == [2.0, 10.0]
     assert compile_function(traced(lambda a: a, 2))([1, 2]).tolist() == [1.0, 2.0]

@@ -1,4 +1,4 @@
-"""Batches on several threads: late, busy and interrupted helpers."""
+"""Batches on several threads: late, busy and interrupted helper threads."""
 
 import ctypes
 import threading
@@ -12,7 +12,7 @@ from armblocks.compiler import batch_threads, compile_function
 
 
 class Later:
-    """Helpers that do their work when they are told to."""
+    """Helper threads whose work the test runs later."""
 
     def __init__(self) -> None:
         self.work: list[Callable[[], None]] = []
@@ -21,7 +21,7 @@ class Later:
         self.work.append(work)
 
 
-def test_a_helper_that_comes_late_is_not_waited_for_and_writes_nothing(
+def test_a_call_does_not_wait_for_a_late_helper_which_then_writes_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     later = Later()
@@ -35,7 +35,7 @@ def test_a_helper_that_comes_late_is_not_waited_for_and_writes_nothing(
     assert same_bits(out, expected)
     assert len(later.work) == 3
     out[:] = 5.0
-    del kernel  # the machine code stays as long as a helper may enter it
+    del kernel  # the machine code stays in memory while a helper may still run it
     for work in later.work:
         work()
     assert (out == 5.0).all()
@@ -47,7 +47,7 @@ def test_every_sample_is_evaluated_once(samples: int) -> None:
     lock = threading.Lock()
 
     def shares(job: ctypes.Array[ctypes.c_int64], hold: int, patience: int) -> None:
-        """What the native code does with a job."""
+        """Process a job as the native code does."""
         with lock:
             job[1] += 1
         while True:
@@ -64,7 +64,9 @@ def test_every_sample_is_evaluated_once(samples: int) -> None:
     assert (taken == 1).all()
 
 
-def test_an_interrupt_is_raised_when_no_helper_writes_any_more(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupt_is_raised_after_all_helpers_have_stopped_writing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     running: list[int] = []
 
     def sleep(seconds: float) -> None:
@@ -80,7 +82,7 @@ def test_an_interrupt_is_raised_when_no_helper_writes_any_more(monkeypatch: pyte
     def shares(given: ctypes.Array[ctypes.c_int64], hold: int, patience: int) -> None:
         nonlocal job
         job = given
-        job[1] = 1  # a helper is at work when the caller has finished
+        job[1] = 1  # a helper is still working when the caller has finished
 
     job: ctypes.Array[ctypes.c_int64]
     with pytest.raises(KeyboardInterrupt):
@@ -88,7 +90,7 @@ def test_an_interrupt_is_raised_when_no_helper_writes_any_more(monkeypatch: pyte
     assert running == [1, 1, 1]
 
 
-def test_as_many_threads_as_are_busy_at_once() -> None:
+def test_helper_threads_are_reused_and_limited_in_number() -> None:
     helpers = batch_threads._Helpers(limit=3)
     begun, go_on, done = threading.Semaphore(0), threading.Event(), threading.Semaphore(0)
 
@@ -105,7 +107,7 @@ def test_as_many_threads_as_are_busy_at_once() -> None:
     go_on.set()
     for _ in range(5):
         assert done.acquire(timeout=60)
-    for _ in range(20):  # one after the other: no more threads than there are
+    for _ in range(20):  # jobs in sequence start no new threads
         helpers.give(done.release)
         assert done.acquire(timeout=60)
     assert helpers._threads == 3

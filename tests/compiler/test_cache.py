@@ -1,4 +1,4 @@
-"""The disk cache: whole files or none, whoever writes; damage and refusals only cost time."""
+"""The disk cache: atomic writes, damaged files, folders that cannot be written, and pruning."""
 
 import multiprocessing
 import os
@@ -39,7 +39,7 @@ def counting(calls: list[str]) -> TracedFunction:
     return function()
 
 
-def test_the_second_time_nothing_is_traced(folder: Path) -> None:
+def test_a_cached_function_is_not_traced_again(folder: Path) -> None:
     calls: list[str] = []
     for _ in range(3):
         kernel = recall("my key", lambda: counting(calls))
@@ -50,12 +50,12 @@ def test_the_second_time_nothing_is_traced(folder: Path) -> None:
         assert kernel.count.function_calls == 6
         assert kernel.name == "cached"
     assert calls == ["traced"]
-    assert len(files(folder)) == 4  # record, tape, single, batch
+    assert len(files(folder)) == 4  # record, tape, code for one sample, code for batches
     recall("another key", lambda: counting(calls))
     assert calls == ["traced", "traced"]
 
 
-def test_code_from_disk_is_used(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cached_code_is_loaded_without_compilation(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     first = compile_function(function())(A)
 
     def refuse(*_: object, **__: object) -> bytes:
@@ -83,7 +83,7 @@ def flip(data: bytes) -> bytes:
     ],
     ids=["empty", "head only", "cut short", "one bit", "longer", "other content"],
 )
-def test_damaged_files_are_made_anew(folder: Path, damage: object) -> None:
+def test_damaged_files_are_written_again(folder: Path, damage: object) -> None:
     calls: list[str] = []
     before = recall("key", lambda: counting(calls))(A)
     whole = {path: path.read_bytes() for path in files(folder)}
@@ -109,7 +109,7 @@ def test_a_missing_tape_is_traced_again_when_it_is_needed(folder: Path) -> None:
     assert calls == ["traced", "traced"]
 
 
-def test_a_tape_or_record_of_another_make_is_made_anew(folder: Path) -> None:
+def test_a_tape_or_record_of_another_version_is_written_again(folder: Path) -> None:
     calls: list[str] = []
     kernel = recall("key", lambda: counting(calls))
     kernel(A)
@@ -124,7 +124,9 @@ def test_a_tape_or_record_of_another_make_is_made_anew(folder: Path) -> None:
     assert calls == ["traced", "traced"]
 
 
-def test_a_folder_that_cannot_be_written_is_no_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_that_cannot_be_written_does_not_raise_an_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     blocked = tmp_path / "file"
     blocked.write_text("not a folder")
     monkeypatch.setenv("ARMBLOCKS_CACHE_DIR", str(blocked / "cache"))
@@ -132,7 +134,7 @@ def test_a_folder_that_cannot_be_written_is_no_error(tmp_path: Path, monkeypatch
     assert blocked.read_text() == "not a folder"
 
 
-def test_a_full_disk_leaves_no_remains(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_leaves_no_files(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(self: Path, target: Path) -> Path:
         raise OSError(28, "No space left on device")
 
@@ -141,7 +143,7 @@ def test_a_full_disk_leaves_no_remains(folder: Path, monkeypatch: pytest.MonkeyP
     assert files(folder) == []
 
 
-def test_an_empty_name_switches_the_cache_off(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_empty_variable_switches_the_cache_off(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ARMBLOCKS_CACHE_DIR", "")
     assert cache.folder() is None
     np.testing.assert_allclose(recall("key", function)(A), EXPECTED, rtol=1e-15)
@@ -149,7 +151,7 @@ def test_an_empty_name_switches_the_cache_off(monkeypatch: pytest.MonkeyPatch) -
     assert cache.load("0" * 64) is None
 
 
-def test_the_system_has_a_place(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_default_folder_is_the_cache_folder_of_the_user(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("ARMBLOCKS_CACHE_DIR")
     assert cache.folder() == user_folders.cache_folder()
 
@@ -161,7 +163,7 @@ def test_without_a_home_there_is_no_cache(monkeypatch: pytest.MonkeyPatch) -> No
     assert cache.folder() is None
 
 
-def test_what_was_used_least_recently_is_pruned_first(folder: Path) -> None:
+def test_the_least_recently_used_files_are_pruned_first(folder: Path) -> None:
     names = [f"{k:064x}" for k in range(10)]
     for age, name in enumerate(reversed(names)):
         cache.store(name, bytes(1000))
@@ -175,10 +177,12 @@ def test_what_was_used_least_recently_is_pruned_first(folder: Path) -> None:
     assert len(files(folder)) == 10
     cache.prune(folder, limit=6000)
     kept = {path.stem for path in files(folder)}
-    assert kept == set(names[-4:])  # four of 1050 bytes fit into three quarters of 6000
+    assert kept == set(names[-4:])  # four files of 1050 bytes fit into three quarters of 6000 bytes
 
 
-def test_the_folder_is_pruned_after_a_while(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_folder_is_pruned_at_most_every_ten_minutes(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     pruned: list[Path] = []
     monkeypatch.setattr(cache, "prune", pruned.append)
     for moment, times in (
@@ -194,7 +198,7 @@ def test_the_folder_is_pruned_after_a_while(folder: Path, monkeypatch: pytest.Mo
         assert pruned == [folder] * times
 
 
-def test_use_keeps_a_file_young(folder: Path) -> None:
+def test_loading_a_file_renews_its_modification_time(folder: Path) -> None:
     cache.store("ab" * 32, b"content")
     path = next(folder.glob("??/*"))
     os.utime(path, (1000, 1000))
@@ -202,7 +206,7 @@ def test_use_keeps_a_file_young(folder: Path) -> None:
     assert time.time() - path.stat().st_mtime < 60
 
 
-def test_edited_sources_change_every_name(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_edited_sources_change_the_names_of_records_and_code(monkeypatch: pytest.MonkeyPatch) -> None:
     record, code = cache.record_name("key"), cache.object_name(("a", "b"))
     assert code != cache.object_name(("ab", ""))
     monkeypatch.setattr(cache, "package_fingerprint", lambda: "edited")
@@ -211,7 +215,7 @@ def test_edited_sources_change_every_name(monkeypatch: pytest.MonkeyPatch) -> No
     assert cache.object_name(("a", "b")) != code
 
 
-def test_the_fingerprint_sees_edits(tmp_path: Path) -> None:
+def test_the_fingerprint_changes_with_edits_of_python_files(tmp_path: Path) -> None:
     source = tmp_path / "sub" / "module.py"
     source.parent.mkdir()
     source.write_text("a = 1")
@@ -224,7 +228,7 @@ def test_the_fingerprint_sees_edits(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("folder", ["compiler", "routines", "integration"])
-def test_machine_code_is_made_anew_after_edits_of_all_that_writes_it(
+def test_edits_of_each_package_that_generates_code_change_the_fingerprint(
     folder: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in ("compiler", "routines", "integration"):
@@ -245,7 +249,7 @@ def _work(folder: str, results: "multiprocessing.Queue[list[float]]") -> None:
     results.put(kernel(A).tolist())
 
 
-def test_processes_that_write_at_once_do_not_meet_half_files(folder: Path) -> None:
+def test_processes_that_write_at_the_same_time_read_complete_files(folder: Path) -> None:
     context = multiprocessing.get_context("spawn")
     results: multiprocessing.Queue[list[float]] = context.Queue()
     workers = [context.Process(target=_work, args=(str(folder), results)) for _ in range(3)]

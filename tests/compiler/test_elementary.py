@@ -1,7 +1,8 @@
-"""Elementary functions: accuracy in units in the last place, special values, the same bits for any lanes.
+"""Elementary functions: accuracy in units in the last place, special values, equal bits for all lane counts.
 
-The reference is NumPy in extended precision (64-bit mantissa) where the platform has it: its own error then
-does not show. Elsewhere it is the C library's double precision, whose error of up to one unit is granted.
+The reference is NumPy in extended precision (64-bit mantissa) where the platform has it; its error is then
+negligible. Elsewhere the reference is the C library in double precision, and its error of up to one unit is
+added to the bound.
 """
 
 import math
@@ -26,7 +27,7 @@ ENDLESS = (np.inf, -np.inf, np.nan)
 
 
 def powers(low: float, high: float) -> Values:
-    """Numbers of both signs, spread evenly over exponents."""
+    """Numbers of both signs with uniformly distributed exponents."""
     return 2.0 ** RNG.uniform(low, high, COUNT) * RNG.choice([-1.0, 1.0], COUNT)
 
 
@@ -78,7 +79,7 @@ CASES: dict[str, tuple[Opcode, Callable[..., Any], tuple[Values, ...], float]] =
 
 
 def units_off(got: Values, reference: NDArray[np.longdouble]) -> Values:
-    """Errors in units in the last place of the result."""
+    """Return errors in units in the last place of the result."""
     size = np.spacing(np.abs(reference).astype(np.float64))
     return np.abs((got.astype(np.longdouble) - reference) / size).astype(np.float64)
 
@@ -87,7 +88,9 @@ def units_off(got: Values, reference: NDArray[np.longdouble]) -> Values:
 def test_errors_stay_below_two_units_in_the_last_place(name: str) -> None:
     opcode, reference, arguments, allowed = CASES[name]
     extended = reference(*(argument.astype(np.longdouble) for argument in arguments))
-    ordinary = np.abs(extended) > 1e-300  # below, a unit is larger than the result's own precision
+    ordinary = (
+        np.abs(extended) > 1e-300
+    )  # smaller results are close to the subnormal range, where a unit is relatively large
     got = native(single_operation(opcode), 8)(*arguments)
     error = units_off(got, extended)[ordinary]
     assert error.max() < allowed + (0.0 if EXTENDED else 1.0)
@@ -110,8 +113,8 @@ def test_powers_are_within_one_unit() -> None:
     assert error.max() < (1.0 if EXTENDED else 2.0)
 
 
-def test_angles_next_to_a_multiple_of_a_right_angle_are_reduced_honestly() -> None:
-    # Of all doubles the nearest to a multiple of pi/2 (Muller, Elementary Functions, 2016, chapter 11).
+def test_angles_next_to_a_multiple_of_a_right_angle_are_reduced_exactly() -> None:
+    # The double nearest to a multiple of pi/2 (Muller, Elementary Functions, 2016, chapter 11).
     worst = np.array([6381956970095103.0 * 2.0**797])
     cosine = native(single_operation(Opcode.COS), 1)(worst)
     np.testing.assert_allclose(cosine, [-4.6871659242546277e-19], rtol=2e-16)
@@ -121,7 +124,7 @@ def test_angles_next_to_a_multiple_of_a_right_angle_are_reduced_honestly() -> No
 
 
 @pytest.mark.parametrize("opcode", sorted(ELEMENTARY), ids=lambda opcode: opcode.name)
-def test_special_values_are_those_of_numpy(opcode: Opcode) -> None:
+def test_special_values_agree_with_numpy(opcode: Opcode) -> None:
     reference = SPECIAL[opcode]
     tiny = 5e-324
     values = np.array(
@@ -186,14 +189,14 @@ def test_remainders_of_division_are_exact(pairs: list[tuple[float, float]]) -> N
     assert same_bits(native(single_operation(Opcode.REMAINDER), 8)(x, y), _remainder(x, y))
 
 
-def test_remainders_settle_ties_as_ieee_says() -> None:
+def test_remainders_round_ties_to_even_as_in_ieee_754() -> None:
     x = np.array([1.0, 3.0, 5.0, -3.0, 2.5, 7.5, 5e-324, 1.5e-323, 1e300, 2.0**1023])
     y = np.array([2.0, 2.0, 2.0, 2.0, 5.0, 5.0, 1e-323, 1e-323, 3.0, 2.0**1023 * 1.5])
     assert same_bits(native(single_operation(Opcode.REMAINDER), 2)(x, y), _remainder(x, y))
 
 
 @pytest.mark.parametrize("opcode", sorted(ELEMENTARY), ids=lambda opcode: opcode.name)
-def test_the_number_of_lanes_changes_no_bit(opcode: Opcode) -> None:
+def test_the_number_of_lanes_does_not_change_the_bits(opcode: Opcode) -> None:
     numbers = np.concatenate([powers(-30, 30), powers(-1074, 1023), powers(29, 33), [np.inf, np.nan, 0.0]])
     arguments = [RNG.permutation(numbers)[:2003] for _ in range(opcode.arity)]
     one = native(single_operation(opcode), 1)(*arguments)

@@ -1,4 +1,4 @@
-"""The builtin: the kernel's own answers and refusals, and no reference lost or kept."""
+"""The builtin of a kernel: results and errors equal to those of the kernel, and reference counts."""
 
 import gc
 import sys
@@ -38,14 +38,14 @@ def arguments(seed: int) -> tuple[np.ndarray, np.ndarray]:
     return rng.normal(size=3), rng.normal(size=3)
 
 
-def test_it_is_a_builtin_that_explains_itself(kernel: Kernel) -> None:
+def test_the_entry_is_a_builtin_with_name_signature_and_docstring(kernel: Kernel) -> None:
     assert isinstance(kernel.entry, BuiltinFunctionType)
     assert kernel.entry.__name__ == "mixed"
     assert kernel.entry.__text_signature__ == "(a, b, *, out=None, threads=1)"
     assert kernel.entry.__doc__ == "a (3,), b (3,) -> y (11,); or N samples of each."
 
 
-def test_it_gives_the_kernels_bits(kernel: Kernel) -> None:
+def test_results_of_the_builtin_equal_those_of_the_kernel_bit_for_bit(kernel: Kernel) -> None:
     for seed in range(30):
         a, b = arguments(seed)
         assert same_bits(kernel.entry(a, b), kernel(a, b))
@@ -54,7 +54,7 @@ def test_it_gives_the_kernels_bits(kernel: Kernel) -> None:
 
 
 class Subclass(np.ndarray):
-    """An array of another class."""
+    """A subclass of ndarray."""
 
 
 def odd_arguments() -> dict[str, object]:
@@ -81,7 +81,7 @@ def odd_arguments() -> dict[str, object]:
 
 
 @pytest.mark.parametrize("kind", odd_arguments())
-def test_whatever_the_kernel_takes_the_builtin_takes(kernel: Kernel, kind: str) -> None:
+def test_the_builtin_accepts_all_arguments_that_the_kernel_accepts(kernel: Kernel, kind: str) -> None:
     value = odd_arguments()[kind]
     b = arguments(1)[1]
     assert same_bits(np.asarray(kernel.entry(value, b)), np.asarray(kernel(value, b)))
@@ -109,7 +109,7 @@ def test_whatever_the_kernel_takes_the_builtin_takes(kernel: Kernel, kind: str) 
     ],
     ids=lambda value: f"{type(value).__name__} {value!r}".split(" at 0x")[0],
 )
-def test_whatever_the_kernel_refuses_the_builtin_refuses(kernel: Kernel, value: object) -> None:
+def test_the_builtin_refuses_all_arguments_that_the_kernel_refuses(kernel: Kernel, value: object) -> None:
     b = arguments(1)[1]
     with pytest.raises(InputError) as expected:
         kernel(value, b)
@@ -118,7 +118,7 @@ def test_whatever_the_kernel_refuses_the_builtin_refuses(kernel: Kernel, value: 
     assert str(found.value) == str(expected.value)
 
 
-def test_counts_and_keywords_reach_the_kernel(kernel: Kernel) -> None:
+def test_wrong_counts_and_keywords_are_refused_with_the_message_of_the_kernel(kernel: Kernel) -> None:
     a, b = arguments(3)
     for wrong in ((), (a,), (a, b, a)):
         with pytest.raises(InputError, match="arguments were given"):
@@ -132,7 +132,7 @@ def test_counts_and_keywords_reach_the_kernel(kernel: Kernel) -> None:
     assert same_bits(kernel.entry(np.tile(a, (9, 1)), b, threads=2)[8], out)
 
 
-def test_scalars_come_and_go_as_numbers(several: Kernel) -> None:
+def test_scalars_are_passed_and_returned_as_numbers(several: Kernel) -> None:
     A = np.arange(4.0).reshape(2, 2)
     for t in (2.0, np.float64(2.0), np.float32(2.0), 2, np.int64(2), np.array(2.0)):
         B, s = several.entry(t, A)
@@ -159,7 +159,7 @@ def test_results_are_new_arrays(kernel: Kernel) -> None:
     assert np.array_equal(first, kept)
 
 
-def test_no_reference_is_lost_or_kept(kernel: Kernel, several: Kernel) -> None:
+def test_calls_neither_lose_nor_leak_references(kernel: Kernel, several: Kernel) -> None:
     a, b = arguments(5)
     A, out, batch, t = np.eye(2), np.empty(11), np.ones((600, 3)), np.ones(9)
     watched = (a, b, A, out, batch, t, np.dtype(np.float64), np.ndarray, np.float64)
@@ -180,17 +180,17 @@ def test_no_reference_is_lost_or_kept(kernel: Kernel, several: Kernel) -> None:
     gc.collect()
     before = [sys.getrefcount(thing) for thing in watched]
     grown: list[int] = []
-    for _ in range(3):  # others in this process allocate too, now and then; a leak would show every time
+    for _ in range(3):  # other threads may allocate as well; a leak shows in every repetition
         blocks = sys.getallocatedblocks()
         exercise()
         gc.collect()
         grown.append(abs(sys.getallocatedblocks() - blocks))
     after = [sys.getrefcount(thing) for thing in watched]
     assert [abs(x - y) < 20 for x, y in zip(before, after)] == [True] * len(watched)
-    assert min(grown) < 400  # 500 turns would show ten times that
+    assert min(grown) < 400  # a leak in 500 calls would exceed ten times this bound
 
 
-def test_the_builtin_keeps_its_code_alive_and_lets_it_go() -> None:
+def test_the_builtin_keeps_its_kernel_alive_until_it_is_deleted() -> None:
     kernel = compile_function(traced(lambda a: 3 * a, 2, name="triple"))
     builtin = kernel.entry
     watch = weakref.ref(kernel)
@@ -203,7 +203,7 @@ def test_the_builtin_keeps_its_code_alive_and_lets_it_go() -> None:
     assert watch() is None
 
 
-def test_another_fallback_gets_what_the_fast_path_does_not_serve(kernel: Kernel) -> None:
+def test_arguments_outside_the_fast_path_are_passed_to_the_fallback(kernel: Kernel) -> None:
     seen: list[tuple[object, ...]] = []
 
     def fallback(*arguments: object, **options: object) -> str:
@@ -226,7 +226,9 @@ def test_errors_of_the_fallback_pass_through(kernel: Kernel) -> None:
         kernel.entry_before(fallback)(1)
 
 
-def test_an_unknown_binary_interface_is_left_alone(kernel: Kernel, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_with_an_unknown_binary_interface_the_kernel_itself_is_called(
+    kernel: Kernel, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(entry, "_addresses", lambda: None)
     called = kernel.entry_before(kernel)
     assert called is kernel
@@ -234,7 +236,7 @@ def test_an_unknown_binary_interface_is_left_alone(kernel: Kernel, monkeypatch: 
     assert same_bits(called(a, b), kernel.entry(a, b))
 
 
-def test_offsets_are_compared_with_a_real_array(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_wrong_offsets_of_the_array_structure_are_detected(monkeypatch: pytest.MonkeyPatch) -> None:
     entry._addresses.cache_clear()
     try:
         monkeypatch.setattr(entry, "ARRAY_DATA", 24)
@@ -252,7 +254,7 @@ def test_random_mixtures_of_arguments(kernel: Kernel) -> None:
 
 
 def outcome(call: Callable[..., object], given: Sequence[object], options: dict[str, object]) -> object:
-    """What a call gives, as comparable values: type, shape, bits of each result, or the text of the error."""
+    """Return type, shape and bits of each result of a call, or the text of its error."""
     try:
         result = call(*given, **options)
     except InputError as error:
@@ -263,10 +265,10 @@ def outcome(call: Callable[..., object], given: Sequence[object], options: dict[
 
 
 def call_with_options(shapes: Sequence[tuple[int, ...]], result: tuple[int, ...], seed: int) -> Any:
-    """Random plain inputs, single or in batches, and random options: most of them good, some of them not."""
+    """Random inputs, single or in batches, and random options; most of them are valid."""
     rng = np.random.default_rng(seed)
     samples = int(rng.choice([0, 1, 2, 7, 8, 9, 64, 600]))
-    memory = rng.normal(size=40_000)  # all arrays are pieces of it, so that they may overlap
+    memory = rng.normal(size=40_000)  # all arrays are slices of this memory, so that they may overlap
     place = 0
 
     def piece(shape: tuple[int, ...]) -> np.ndarray:
@@ -305,7 +307,9 @@ def call_with_options(shapes: Sequence[tuple[int, ...]], result: tuple[int, ...]
     return given, options, memory
 
 
-def test_batches_and_options_are_served_as_the_kernel_serves_them(kernel: Kernel, several: Kernel) -> None:
+def test_batches_and_options_give_the_results_and_errors_of_the_kernel(
+    kernel: Kernel, several: Kernel
+) -> None:
     square = compile_function(
         TracedFunction.trace("square", signature(("t", ())), signature(("s", ())), lambda t: t * t)
     )
@@ -321,7 +325,7 @@ def test_batches_and_options_are_served_as_the_kernel_serves_them(kernel: Kernel
             assert same_bits(found[2], expected[2])  # nothing else was written
 
 
-def test_batches_and_options_run_no_python(kernel: Kernel, several: Kernel) -> None:
+def test_batches_and_options_do_not_call_python(kernel: Kernel, several: Kernel) -> None:
     def fallback(*arguments: object, **options: object) -> None:
         raise AssertionError(f"{arguments} {options}")
 
@@ -333,7 +337,7 @@ def test_batches_and_options_run_no_python(kernel: Kernel, several: Kernel) -> N
     for count in (0, 1, 8, 33, 600):
         batch = np.tile(a, (count, 1))
         for given in ((batch, b), (a, np.tile(b, (count, 1))), (batch, np.tile(b, (count, 1)))):
-            expected = kernel(*given)  # the batch function for these inputs is there from now on
+            expected = kernel(*given)  # the first call compiles the batch function for these inputs
             assert same_bits(builtin(*given, threads=1), expected)
             out = np.empty((count, 11))
             assert builtin(*given, out=out) is out
@@ -344,7 +348,7 @@ def test_batches_and_options_run_no_python(kernel: Kernel, several: Kernel) -> N
     assert all(map(same_bits, found, expected))
 
 
-def test_long_batches_leave_other_threads_their_turn(kernel: Kernel) -> None:
+def test_batches_of_several_threads_at_the_same_time(kernel: Kernel) -> None:
     a, b = (np.random.default_rng(k).normal(size=(600, 3)) for k in (1, 2))
     expected = kernel(a, b)
     found: list[np.ndarray] = []
@@ -361,7 +365,7 @@ def test_long_batches_leave_other_threads_their_turn(kernel: Kernel) -> None:
     assert all(same_bits(result, expected) for result in found)
 
 
-def test_batches_of_kernels_with_many_inputs_are_left_to_python() -> None:
+def test_batches_of_a_kernel_with_nine_inputs_are_evaluated() -> None:
     shapes = [(name, (1,)) for name in "abcdefghi"]
     kernel = compile_function(
         TracedFunction.trace("nine", signature(*shapes), signature(("s", (1,))), lambda *x: sum(x))
@@ -371,7 +375,7 @@ def test_batches_of_kernels_with_many_inputs_are_left_to_python() -> None:
     assert np.array_equal(kernel.entry(*single[:8], np.zeros((3, 1))), np.full((3, 1), 28.0))
 
 
-def test_matrices_in_column_order_are_read_as_what_they_are() -> None:
+def test_matrices_in_column_major_order_are_read_correctly() -> None:
     kernel = compile_function(
         TracedFunction.trace(
             "transpose", signature(("A", (2, 3))), signature(("B", (3, 2))), lambda A: SX(A.T)

@@ -1,4 +1,4 @@
-"""Every operation that CasADi's scalar graphs can hold arrives on the tape with its meaning."""
+"""Conversion of every operation of CasADi's scalar graphs to the tape."""
 
 from collections.abc import Callable, Sequence
 from functools import cache
@@ -75,35 +75,35 @@ VALUES = np.array(
 
 @cache
 def all_of(arity: int) -> tuple[TracedFunction, Kernel]:
-    """All operations on one or two numbers, as one function: one result each, in their order."""
+    """All operations with one or two operands as one function with one result per operation."""
     operations = (UNARY if arity == 1 else BINARY).values()
     function = traced(lambda *ends: casadi.vertcat(*(one(*ends) for one in operations)), *[1] * arity)
     return function, compile_function(function)
 
 
 def means_what_casadi_means(names: Sequence[str], *columns: np.ndarray) -> None:
-    """Native code for one sample and for lanes, and the interpreter, against CasADi at many points."""
+    """Compare native code for one sample and for lanes, and the interpreter, with CasADi at many points."""
     (function, kernel), samples = all_of(len(columns)), [column[:, None] for column in columns]
-    # CasADi takes one sample in each column.
+    # CasADi expects one sample per column.
     expected = np.asarray(function.casadi_function()(*(column[None] for column in columns))).T
     singles = np.array([kernel(*sample) for sample in zip(*samples)])
     for found in (singles, kernel(*samples), interpret(kernel.tape, samples)[0]):
         for name, one, other in zip(names, found.T, expected.T, strict=True):
-            # CasADi calls the C library; ours may differ by its error and our own.
+            # CasADi calls the C library: results may differ by the errors of both.
             np.testing.assert_allclose(one, other, rtol=1e-15, err_msg=name)
 
 
-def test_unary_operations_mean_what_casadi_means() -> None:
+def test_unary_operations_agree_with_casadi() -> None:
     means_what_casadi_means(list(UNARY), np.append(VALUES, np.nan))
 
 
-def test_binary_operations_mean_what_casadi_means() -> None:
+def test_binary_operations_agree_with_casadi() -> None:
     x, y = np.meshgrid(VALUES, VALUES)
     means_what_casadi_means(list(BINARY), x.ravel(), y.ravel())
 
 
-def test_nan_is_handed_on() -> None:
-    """CasADi's fmin and fmax drop a NaN; a limiter would then hide the first bad signal."""
+def test_minimum_and_maximum_propagate_nan() -> None:
+    """CasADi's fmin and fmax ignore a NaN: a limiter would then hide an invalid signal."""
     names = ["fmin", "fmax", "add", "divide", "fmod", "remainder", "atan2", "hypot", "power"]
     places = [list(BINARY).index(name) for name in names]
     _, kernel = all_of(2)
@@ -112,7 +112,7 @@ def test_nan_is_handed_on() -> None:
         assert np.isnan(kernel([[x]] * 9, [[y]] * 9)[:, places]).all()
 
 
-def test_the_branch_not_taken_has_no_influence() -> None:
+def test_the_branch_that_is_not_selected_does_not_affect_the_result() -> None:
     kernel = compile_function(traced(lambda x, y: casadi.if_else(x > 0, y, casadi.log(x)), 1, 1))
     assert kernel([1.0], [5.0])[0] == 5.0
     assert kernel([2.0], [-np.inf])[0] == -np.inf

@@ -1,4 +1,5 @@
-"""Kernels: the same bits as the interpreter, whatever the number of samples, the layout and the threads."""
+"""Kernels: results equal to the interpreter's for any number of samples, memory layout and number of
+threads."""
 
 import threading
 
@@ -29,13 +30,13 @@ def test_compiled_code_agrees_with_interpreter_and_casadi(kernel: Kernel) -> Non
     a, b = samples(40)
     function = mixed()
     for x, y in zip(a, b):
-        # Functions differ by a unit or two in the last place, which sums of order one may show.
+        # Functions differ by one or two units in the last place, which is visible in sums of order one.
         np.testing.assert_allclose(kernel(x, y), interpret(kernel.tape, [x, y])[0], rtol=1e-14, atol=1e-15)
         np.testing.assert_allclose(kernel(x, y), function(x, y)[0], rtol=1e-13, atol=1e-15)
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 3, 7, 8, 9, 15, 16, 17, 100])
-def test_a_batch_gives_the_bits_of_single_calls(kernel: Kernel, count: int) -> None:
+def test_a_batch_equals_single_calls_bit_for_bit(kernel: Kernel, count: int) -> None:
     a, b = samples(count)
     together = kernel(a, b)
     assert together.shape == (count, 11)
@@ -45,7 +46,7 @@ def test_a_batch_gives_the_bits_of_single_calls(kernel: Kernel, count: int) -> N
     assert same_bits(kernel.columns(a, b), together.T.copy())
 
 
-def test_a_huge_angle_or_a_nan_does_not_touch_its_neighbours(kernel: Kernel) -> None:
+def test_a_huge_angle_or_a_nan_does_not_affect_other_samples(kernel: Kernel) -> None:
     a, b = samples(64)
     clean = kernel(a, b)
     a[5, 0], a[20, 1], b[33, 2], a[50, 2] = 1e300, np.nan, np.inf, 1e18
@@ -56,7 +57,7 @@ def test_a_huge_angle_or_a_nan_does_not_touch_its_neighbours(kernel: Kernel) -> 
         assert same_bits(mixed_up[k], kernel(a[k], b[k]))
 
 
-def test_threads_change_no_bit(kernel: Kernel) -> None:
+def test_the_number_of_threads_does_not_change_the_bits(kernel: Kernel) -> None:
     a, b = samples(20_011)
     once = kernel(a, b)
     for threads in (2, 3, 8):
@@ -77,7 +78,7 @@ def test_calls_from_many_threads_at_once_are_safe() -> None:
     assert all(same_bits(result, kernel(a)) for result in found)
 
 
-def test_an_input_without_samples_serves_all(kernel: Kernel) -> None:
+def test_an_input_of_one_sample_is_broadcast(kernel: Kernel) -> None:
     a, b = samples(21)
     shared = kernel(a, b[0])
     assert same_bits(shared, kernel(a, np.tile(b[0], (21, 1))))
@@ -85,7 +86,7 @@ def test_an_input_without_samples_serves_all(kernel: Kernel) -> None:
     assert same_bits(kernel.columns(a, b[0]), shared.T.copy())
 
 
-def test_column_layout_takes_transposed_inputs_in_place(kernel: Kernel) -> None:
+def test_columns_accepts_arrays_in_column_major_order(kernel: Kernel) -> None:
     a, b = samples(37)
     turned = np.asfortranarray(a)
     assert same_bits(kernel.columns(turned, b), kernel.columns(a, b))
@@ -95,14 +96,14 @@ def test_column_layout_takes_transposed_inputs_in_place(kernel: Kernel) -> None:
 @pytest.mark.parametrize(
     "dtype", [np.float32, np.float16, np.int64, np.int8, np.uint16, ">f8", "<f8", np.longdouble]
 )
-def test_any_real_dtype_is_taken(kernel: Kernel, dtype: str) -> None:
+def test_any_real_dtype_is_accepted(kernel: Kernel, dtype: str) -> None:
     a = (np.arange(30).reshape(10, 3) % 5 + 1).astype(dtype)
     b = np.ones((10, 3))
     assert same_bits(kernel(a, b), kernel(a.astype(np.float64), b))
     assert same_bits(kernel.entry(a[0], b[0]), kernel(a[0].astype(np.float64), b[0]))
 
 
-def test_any_strides_are_taken(kernel: Kernel) -> None:
+def test_any_strides_are_accepted(kernel: Kernel) -> None:
     wide = np.random.default_rng(3).normal(size=(40, 9))
     b = np.ones((20, 3))
     views = [wide[::2, ::3], wide[:20, 2:5], wide[::-2, 4:1:-1], np.asfortranarray(wide)[:20, :3]]
@@ -117,7 +118,7 @@ def test_any_strides_are_taken(kernel: Kernel) -> None:
 
 
 @pytest.mark.parametrize("size", [1, 2, 3, 4, 5, 7, 8, 9, 12, 16, 17, 24])
-def test_rows_of_every_width_find_their_lanes(size: int) -> None:
+def test_rows_of_every_width_are_transposed_into_lanes(size: int) -> None:
     def equations(a: SX) -> SX:
         return casadi.vertcat(*(a[(k + 1) % size] for k in range(size)))
 
@@ -131,7 +132,7 @@ def test_rows_of_every_width_find_their_lanes(size: int) -> None:
         assert np.array_equal(kernel.columns(a), np.roll(a, -1, axis=1).T)
 
 
-def test_several_outputs_and_matrices() -> None:
+def test_a_kernel_with_several_outputs_and_matrices() -> None:
     inputs = signature(("t", ()), ("A", (2, 3)), ("none", (0,)))
     outputs = signature(("B", (3, 2)), ("s", ()), ("empty", (0,)), ("stack", (2, 1, 3)))
 
@@ -189,7 +190,7 @@ EXPRESSIONS = st.recursive(
 
 
 def symbolic(tree: object, a: SX, b: SX) -> SX:
-    """A random tree of operations that IEEE 754 defines to the bit, as a CasADi expression."""
+    """A random CasADi expression of operations whose results IEEE 754 defines exactly."""
     if isinstance(tree, str):
         return (a if tree[0] == "a" else b)[int(tree[1])]
     if not isinstance(tree, tuple):
@@ -217,7 +218,7 @@ def symbolic(tree: object, a: SX, b: SX) -> SX:
 
 @given(st.lists(EXPRESSIONS, min_size=8, max_size=20))
 @settings(max_examples=12, deadline=None, derandomize=True)
-def test_random_arithmetic_gives_the_interpreters_bits(trees: list[object]) -> None:
+def test_random_arithmetic_equals_the_interpreter_bit_for_bit(trees: list[object]) -> None:
     kernel = compile_function(
         traced(lambda a, b: casadi.vertcat(*(symbolic(tree, a, b) for tree in trees)), 3, 2, name="random")
     )

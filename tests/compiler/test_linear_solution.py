@@ -1,4 +1,4 @@
-"""Linear equations on the tape: accuracy, the bits of every lane, and exact derivatives."""
+"""Linear equations on the tape: accuracy, equal bits in every lane, and exact derivatives."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def solver(n: int) -> TracedFunction:
 
 
 def matrices(n: int, random: np.random.Generator) -> list[np.ndarray]:
-    """Easy ones, of zero pivots, of rows and columns in very different units, and nearly singular."""
+    """Well-conditioned matrices, matrices with zero pivots, badly scaled ones, and nearly singular ones."""
     dense = random.normal(size=(n, n))
     triangle = np.triu(dense) + 3.0 * np.eye(n)
     scales = 10.0 ** random.uniform(-9.0, 9.0, (2, n))
@@ -45,13 +45,13 @@ def test_solutions_are_as_accurate_as_the_matrix_allows_in_every_lane(n: int) ->
     kernel = compile_function(solver(n))
     x = kernel(A, b)
     for matrix, right, found in zip(A, b, x):
-        # Skeel's condition, which no scaling of rows changes; of columns neither, element by element.
+        # Skeel's condition number is invariant under row scaling, and elementwise under column scaling.
         known = np.linalg.solve(matrix, right) if np.linalg.cond(matrix) < 1e6 else found
         inverse = np.abs(np.linalg.inv(matrix)) if np.linalg.cond(matrix) < 1e15 else None
         if inverse is not None:
             bound = inverse @ (np.abs(matrix) @ np.abs(found))
             assert (np.abs(found - known) <= 20.0 * n * EPS * bound).all()
-        # Every equation holds to rounding beside its own terms.
+        # The residual of every equation is a rounding error relative to its terms.
         left = np.abs(matrix @ found - right)
         assert (left <= 8.0 * n * EPS * (np.abs(matrix) @ np.abs(found) + np.abs(right))).all()
     single = np.array([kernel(matrix, right) for matrix, right in zip(A, b)])
@@ -61,8 +61,8 @@ def test_solutions_are_as_accurate_as_the_matrix_allows_in_every_lane(n: int) ->
     assert Tape.from_bytes(kernel.tape.to_bytes()) == kernel.tape
 
 
-def test_equations_longer_than_a_stack_are_solved_in_lanes() -> None:
-    """300 unknowns over eight lanes take 12 MB of work space."""
+def test_300_equations_are_solved_in_lanes_with_a_work_space_beyond_the_stack() -> None:
+    """300 unknowns in eight lanes need 12 MB of work space, more than the stack of a thread."""
     n = 300
     random = np.random.default_rng(2)
     A, exact = random.normal(size=(9, n, n)), random.normal(size=(9, n))
@@ -74,14 +74,14 @@ def test_equations_longer_than_a_stack_are_solved_in_lanes() -> None:
     np.testing.assert_array_equal(kernel.columns(A, b)[:, 4], x[4])
 
 
-def test_a_singular_matrix_gives_no_finite_numbers() -> None:
+def test_a_singular_matrix_gives_values_that_are_not_finite() -> None:
     kernel = compile_function(solver(3))
     for matrix in (np.zeros((3, 3)), np.ones((3, 3)), np.full((3, 3), np.nan)):
         assert not np.isfinite(kernel(matrix, [1.0, 2.0, 3.0])).all()
         assert not np.isfinite(solver(3)(matrix, [1.0, 2.0, 3.0])).all()
 
 
-def test_derivatives_of_first_and_second_order_are_those_of_the_inverse() -> None:
+def test_first_and_second_derivatives_agree_with_closed_forms() -> None:
     """x = A^-1 b with A = A0 + s A1: x' = -A^-1 A1 x, x'' = 2 A^-1 A1 A^-1 A1 x, dx/db = A^-1."""
     n, random = 4, np.random.default_rng(3)
     A0, A1, b0 = random.normal(size=(n, n)), random.normal(size=(n, n)), random.normal(size=n)

@@ -1,4 +1,4 @@
-"""Matrices times vectors on the tape: found where they stand, with the bits of the sums as written."""
+"""Matrix-vector products on the tape: detection, and results equal to the sums of the traced operations."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SHAPES = ((16, 16), (33, 8), (7, 50), (2, 128))
 
 
 def traced(m: int, n: int) -> TracedFunction:
-    """Products by inputs and by signals, with terms before and behind; numbers stand around the matrix."""
+    """Products with inputs and with signals, with added terms; the input ``p`` contains the matrix."""
     inputs = Signature((Slot("x", (n,)), Slot("p", (m * n + 3,)), Slot("c", (m,))))
     outputs = Signature(tuple(Slot(name, (m,)) for name in ("plain", "added", "bent", "twice")))
 
@@ -35,7 +35,8 @@ def traced(m: int, n: int) -> TracedFunction:
 
 
 def chained(A: np.ndarray, x: np.ndarray, start: np.ndarray | None) -> np.ndarray:
-    """``start + A x`` term by term; without a start the first product is rounded alone, as -0 leaves it."""
+    """``start + A x`` term by term; without a start value the sum begins with -0, which leaves the first
+    product."""
     total = np.full(len(A), -0.0) if start is None else start
     for j, factor in enumerate(x):
         total = multiply_add(A[:, j].copy(), np.full(len(A), factor), total)
@@ -43,7 +44,7 @@ def chained(A: np.ndarray, x: np.ndarray, start: np.ndarray | None) -> np.ndarra
 
 
 @pytest.mark.parametrize(("m", "n"), SHAPES)
-def test_a_product_has_the_bits_of_its_terms_one_after_the_other(m: int, n: int) -> None:
+def test_a_product_equals_the_sum_of_its_terms_in_order_bit_for_bit(m: int, n: int) -> None:
     random = np.random.default_rng(m + n)
     kernel = compile_function(traced(m, n))
     found = [operation.opcode for operation in kernel.tape.operations].count(Opcode.PRODUCT)
@@ -73,7 +74,7 @@ def test_a_product_has_the_bits_of_its_terms_one_after_the_other(m: int, n: int)
     np.testing.assert_array_equal(read[1], added)
 
 
-def test_small_matrices_stay_as_they_are() -> None:
+def test_small_matrices_are_not_replaced_by_products() -> None:
     n = 15
     assert n * n < FEWEST_ENTRIES
     ends = Signature((Slot("A", (n, n)), Slot("x", (n,)))), Signature((Slot("y", (n,)),))
@@ -83,7 +84,7 @@ def test_small_matrices_stay_as_they_are() -> None:
     assert kernel.tape.count.fused_multiply_adds == n * (n - 1)
 
 
-def test_a_tall_matrix_is_multiplied_in_several_parts() -> None:
+def test_a_tall_matrix_is_split_into_several_products() -> None:
     m, n = MOST_ROWS + 9, 30
     ends = Signature((Slot("A", (m, n)), Slot("x", (n,)))), Signature((Slot("y", (m,)),))
     kernel = compile_function(TracedFunction.trace("tall", *ends, lambda A, x: [mtimes(A, x)]))
@@ -93,7 +94,7 @@ def test_a_tall_matrix_is_multiplied_in_several_parts() -> None:
     np.testing.assert_array_equal(kernel(A, x), chained(A, x, None))
 
 
-def test_a_product_counts_as_its_multiply_adds_and_lines_of_a_matrix_are_one_operation() -> None:
+def test_the_operation_count_of_a_product_is_that_of_its_multiply_adds() -> None:
     m, n = 100, 120
     ends = Signature((Slot("A", (m, n)), Slot("x", (n,)))), Signature((Slot("y", (m,)),))
     tape = compile_function(TracedFunction.trace("large", *ends, lambda A, x: [mtimes(A, x)])).tape

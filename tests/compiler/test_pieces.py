@@ -1,4 +1,4 @@
-"""Long tapes are cut into functions without changing a bit."""
+"""Long tapes are split into several functions without a change of the results."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from armblocks.equations import TracedFunction, signature
 from armblocks.errors import InputError
 
 BACK = 300
-"""Values in a row that are still in use: some pieces long."""
+"""Distance to the oldest value that the recursion uses: longer than several pieces."""
 
 
 @cache
 def long_function(count: int) -> TracedFunction:
-    """A recursion that keeps old values in use, with conditions, functions and outputs all along its way."""
+    """A recursion that uses old values, with conditions, elementary functions and outputs throughout."""
 
     def equations(x: SX, u: SX) -> tuple[SX, SX]:
         values = [x[0], x[1]]
@@ -49,7 +49,7 @@ def long_function(count: int) -> TracedFunction:
 
 @cache
 def function_in_pieces() -> Kernel:
-    """A long function compiled as usual."""
+    """The long function, compiled in several pieces."""
     return compile_function(long_function(600))
 
 
@@ -58,13 +58,13 @@ def _count(count: int) -> list[int]:
     return [*range(0, total, 7), -1, -2]
 
 
-def test_a_long_function_gives_the_bits_that_it_has_in_one_piece(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_long_function_in_pieces_equals_the_uncut_one_bit_for_bit(monkeypatch: pytest.MonkeyPatch) -> None:
     traced = long_function(600)
     tape = tape_from(traced)
     assert is_long(tape)
     rng = np.random.default_rng(0)
     x, u = rng.normal(size=(21, 2)), rng.normal(size=(21, 3))
-    # An angle so huge that lanes leave it to the one-lane code.
+    # A huge angle, for which the vector code calls the scalar code.
     x[20, 0] = 1e200
     in_pieces = function_in_pieces()
     found = in_pieces(x, u)
@@ -76,12 +76,12 @@ def test_a_long_function_gives_the_bits_that_it_has_in_one_piece(monkeypatch: py
     for slot in (0, 1):
         np.testing.assert_array_equal(found[slot], whole[slot])
         np.testing.assert_array_equal(found[slot], [single[slot] for single in singles])
-        # Functions differ by a unit or two in the last place; the recursion damps what came before.
+        # Functions differ by one or two units in the last place; the recursion damps earlier differences.
         wanted = [values[slot] for values in told]
         np.testing.assert_allclose(found[slot][[0, 7, 19]], wanted, rtol=1e-12, atol=1e-13)
 
 
-def test_every_operation_and_store_is_in_one_piece_and_no_piece_is_long() -> None:
+def test_every_operation_and_store_is_in_one_piece_of_limited_length() -> None:
     tape = tape_from(long_function(1500))
     stores = {
         k: (register,) for k, register in enumerate(register for part in tape.outputs for register in part)
@@ -92,12 +92,12 @@ def test_every_operation_and_store_is_in_one_piece_and_no_piece_is_long() -> Non
     assert sorted(k for piece in done.pieces for k in piece.stores) == sorted(stores)
     for piece in done.pieces:
         assert piece.last - piece.first + ACCESS_WEIGHT * len(piece.stores) <= 2 * LENGTH
-    # Places are used again: 300 values back are in use, not all 1500.
+    # Storage is reused: the last 300 values are in use, not all 1500.
     assert done.room < 2 * BACK + LENGTH
 
 
 @pytest.mark.parametrize("effort", ["LONG", "VERY_LONG"])
-def test_less_optimisation_changes_no_bit(effort: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_less_optimisation_does_not_change_the_bits(effort: str, monkeypatch: pytest.MonkeyPatch) -> None:
     traced = long_function(600)
     x, u = np.random.default_rng(1).normal(size=(2, 11, 3))
     expected = function_in_pieces()(x[:, :2], u)
@@ -110,7 +110,7 @@ def test_less_optimisation_changes_no_bit(effort: str, monkeypatch: pytest.Monke
         np.testing.assert_array_equal(one, other)
 
 
-def test_code_for_a_few_calls_gives_the_bits_of_code_for_many() -> None:
+def test_all_optimisation_efforts_give_the_same_bits() -> None:
     tape = tape_from(long_function(300))
     vectors = [np.random.default_rng(2).normal(size=size) for size in (*tape.input_sizes, *tape.output_sizes)]
 
@@ -133,7 +133,7 @@ def test_code_for_a_few_calls_gives_the_bits_of_code_for_many() -> None:
         np.testing.assert_allclose(np.frombuffer(given), expected, rtol=1e-12, atol=1e-13)
 
 
-def test_the_effort_is_limited_by_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_environment_variable_limits_the_optimisation_effort(monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[Effort] = []
 
     def compiled(text: str, target: Target, *, effort: Effort) -> bytes:
@@ -153,5 +153,5 @@ def test_the_effort_is_limited_by_the_environment(monkeypatch: pytest.MonkeyPatc
         load_code(("empty",), lambda: "")
 
 
-def test_length_of_the_longest_uncut_function_is_above_that_of_a_piece() -> None:
+def test_the_longest_uncut_function_is_at_least_twice_as_long_as_a_piece() -> None:
     assert pieces.LONGEST >= 2 * LENGTH

@@ -1,4 +1,4 @@
-"""Memory of large results: used again when no array refers to it, never before, and never much of it."""
+"""Memory pool of large results: reuse only when no array refers to the memory, and bounded size."""
 
 import gc
 import threading
@@ -16,7 +16,7 @@ def address(array: np.ndarray) -> int:
     return array.__array_interface__["data"][0]
 
 
-def test_memory_is_used_again_once_no_array_refers_to_it() -> None:
+def test_memory_is_reused_once_no_array_refers_to_it() -> None:
     pool = ResultMemory(limit=1 << 20)
     first = pool.new_array((50, 4, 5))
     assert first.shape == (50, 4, 5)
@@ -37,28 +37,28 @@ def test_memory_is_used_again_once_no_array_refers_to_it() -> None:
     assert address(pool.new_array((25, 40))) == place
 
 
-def test_memory_of_another_size_is_not_used() -> None:
+def test_idle_memory_of_another_size_is_not_reused() -> None:
     pool = ResultMemory(limit=1 << 20)
     kept = pool.new_array((1000,))
     del kept
-    assert pool.new_array((2000,)).size == 2000  # too small for it
-    assert pool.new_array((100,)).size == 100  # a waste
+    assert pool.new_array((2000,)).size == 2000  # the idle memory is too small
+    assert pool.new_array((100,)).size == 100  # the idle memory is much larger
     assert pool.idle > 8 * 3000
 
 
-def test_what_is_kept_is_bounded_and_can_be_freed() -> None:
+def test_idle_memory_is_bounded_and_can_be_freed() -> None:
     pool = ResultMemory(limit=50_000)
     results = [pool.new_array((1000,)) for _ in range(20)]
     results.clear()
     assert 40_000 < pool.idle <= 50_000
-    assert pool.new_array((10_000,)).size == 10_000  # does not fit into what is there
-    assert pool.idle <= 50_000  # and is more than may be kept
+    assert pool.new_array((10_000,)).size == 10_000  # larger than the idle memory
+    assert pool.idle <= 50_000  # and above the limit of the pool
     pool.clear()
     assert pool.idle == 0
 
 
 def test_no_two_results_share_memory() -> None:
-    """Random sizes, taken and dropped by four threads at random, each result checked when it is dropped."""
+    """Four threads allocate and drop results of random size; each result is checked when it is dropped."""
     pool = ResultMemory(limit=200_000)
     wrong: list[float] = []
 
@@ -89,14 +89,14 @@ def test_small_results_own_their_memory() -> None:
 
 @pytest.fixture
 def no_collection() -> Iterator[None]:
-    """A full garbage collection would free what the test expects to find."""
+    """Disable garbage collection, which would free the idle memory that the test expects."""
     gc.disable()
     yield
     gc.enable()
 
 
 @pytest.mark.usefixtures("no_collection")
-def test_large_batches_are_those_of_small_ones() -> None:
+def test_large_batches_in_pool_memory_are_correct() -> None:
     kernel = compile_function(mixed())
     rng = np.random.default_rng(1)
     count = LARGE // 11 + 100

@@ -1,4 +1,4 @@
-"""Indexed reads: the interpreter, native code in every layout, and CasADi's numbers say the same."""
+"""Indexed reads: agreement of the interpreter, native code in every layout, and CasADi."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def traced(count: int) -> TracedFunction:
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 7, 8, 1000])
-def test_all_agree_with_numpy(count: int) -> None:
+def test_reads_of_all_implementations_agree_with_numpy(count: int) -> None:
     function = traced(count)
     table = np.sort(RANDOM.uniform(0.0, count, count))
     u = np.concatenate(
@@ -58,17 +58,17 @@ def test_each_sample_may_have_its_own_table() -> None:
     np.testing.assert_array_equal(kernel(u, tables)[0], tables[np.arange(19), u.astype(int)])
 
 
-def test_a_nan_reads_inside_the_table() -> None:
+def test_a_nan_index_reads_an_entry_of_the_table() -> None:
     kernel = compile_function(traced(3))
     entries = kernel(np.full(11, np.nan), [1.0, 2.0, 3.0])[0]
     assert set(entries) <= {1.0, 2.0, 3.0}
 
 
-def test_a_large_table_costs_no_more_to_compile() -> None:
+def test_the_tape_of_a_large_table_is_short() -> None:
     assert len(compile_function(traced(100_000)).tape.operations) < 200
 
 
-def test_a_table_that_is_worked_out_is_refused() -> None:
+def test_a_computed_table_is_refused() -> None:
     def equations(u: SX, table: SX) -> SX:
         return read_entry(2.0 * table, u)
 

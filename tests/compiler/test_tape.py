@@ -1,4 +1,4 @@
-"""Tapes: what they are, how they are built, how they are written."""
+"""Tapes: representation, simplification, serialisation and interpretation."""
 
 import math
 from fractions import Fraction
@@ -33,7 +33,7 @@ def test_registers_are_numbered_inputs_constants_operations() -> None:
     assert str(tape) == ("inputs (2, 1)\nr3 = 2.5\nr4 = add r1 r3\nr5 = divide r4 r2\noutput 0: r5 r4")
 
 
-def test_a_product_of_one_use_is_fused_and_of_two_or_a_rounded_one_is_not() -> None:
+def test_only_a_product_that_is_used_once_without_rounding_is_fused() -> None:
     builder = TapeBuilder([4])
     a, b, c, d = (builder.input(0, place) for place in range(4))
     product = builder.add(Opcode.MULTIPLY, a, b)
@@ -48,7 +48,7 @@ def test_a_product_of_one_use_is_fused_and_of_two_or_a_rounded_one_is_not() -> N
     assert both.operations == (Operation(Opcode.MULTIPLY, (0, 1)), Operation(Opcode.FNMA, (2, 3, 4)))
 
 
-def test_common_subexpressions_are_worked_out_once_in_either_order() -> None:
+def test_common_subexpressions_are_evaluated_once_in_either_operand_order() -> None:
     builder = TapeBuilder([2])
     a, b = builder.input(0, 0), builder.input(0, 1)
     assert builder.add(Opcode.ADD, a, b) == builder.add(Opcode.ADD, b, a)
@@ -56,14 +56,14 @@ def test_common_subexpressions_are_worked_out_once_in_either_order() -> None:
     assert builder.constant(0.0) != builder.constant(-0.0)
 
 
-def test_dead_code_is_dropped() -> None:
+def test_dead_code_is_removed() -> None:
     builder = TapeBuilder([1])
     builder.add(Opcode.SIN, builder.input(0, 0))
     builder.constant(3.0)
     assert builder.build([[builder.input(0, 0)]]) == Tape((1,), (), (), ((0,),))
 
 
-def test_a_choice_becomes_one_selection() -> None:
+def test_the_two_terms_of_if_else_become_one_selection() -> None:
     builder = TapeBuilder([3])
     zero = builder.constant(0.0)
     condition, yes, no = (builder.input(0, place) for place in range(3))
@@ -75,7 +75,7 @@ def test_a_choice_becomes_one_selection() -> None:
 
 @pytest.mark.parametrize("opcode", [Opcode.ADD, Opcode.SUBTRACT, Opcode.MULTIPLY, Opcode.DIVIDE])
 @given(x=NUMBERS, c=st.one_of(NUMBERS, st.sampled_from([0.0, -0.0, 1.0, -1.0, 2.0, 0.25, 2.0**-1074])))
-def test_simplification_changes_no_bit(opcode: Opcode, x: float, c: float) -> None:
+def test_simplification_does_not_change_the_bits(opcode: Opcode, x: float, c: float) -> None:
     for left in (False, True):
         builder = TapeBuilder([1])
         operands = (builder.constant(c), builder.input(0, 0))
@@ -115,7 +115,7 @@ def test_damaged_bytes_are_refused(cut: int) -> None:
         Tape.from_bytes(tape_from(mixed()).to_bytes()[:cut])
 
 
-def test_the_count_names_the_work() -> None:
+def test_the_operation_count_of_a_tape() -> None:
     tape = tape_from(mixed())
     count = tape.count
     assert dict(count.functions) == {
@@ -141,13 +141,13 @@ def test_the_count_names_the_work() -> None:
 
 
 @given(st.tuples(NUMBERS, NUMBERS, NUMBERS))
-def test_the_interpreter_rounds_a_multiply_add_once(numbers: tuple[float, float, float]) -> None:
+def test_the_interpreter_rounds_a_multiply_add_only_once(numbers: tuple[float, float, float]) -> None:
     a, b, c = numbers
     with np.errstate(all="ignore"):
         got = float(multiply_add(*(np.array([number]) for number in numbers))[0])
         plain = float(np.float64(a) * b + c)
     if not all(map(math.isfinite, numbers)):
-        # An infinite addend wins over a product that only overflows by rounding.
+        # With an infinite addend the sum is the addend, even where the rounded product would overflow.
         expected = c if math.isfinite(a) and math.isfinite(b) else plain
     elif (exact := Fraction(a) * Fraction(b) + Fraction(c)) == 0:
         expected = plain if 0.0 in numbers else 0.0
@@ -160,7 +160,7 @@ def test_the_interpreter_rounds_a_multiply_add_once(numbers: tuple[float, float,
     assert same_bits(np.array([got]), np.array([expected]))
 
 
-def test_the_interpreter_broadcasts_and_checks_sizes() -> None:
+def test_the_interpreter_broadcasts_inputs_and_checks_their_sizes() -> None:
     tape = tape_from(mixed())
     many = interpret(tape, [np.ones((4, 3)), np.arange(3.0)])[0]
     assert many.shape == (4, 11)
@@ -171,7 +171,7 @@ def test_the_interpreter_broadcasts_and_checks_sizes() -> None:
     np.testing.assert_allclose(plain, interpret(tape, [np.full(3, 1 / 3), np.full(3, 1 / 7)])[0], rtol=1e-14)
 
 
-def test_the_magnitude_of_a_number_with_another_sign_is_its_own() -> None:
+def test_the_absolute_value_of_copysign_ignores_the_sign() -> None:
     builder = TapeBuilder([2])
     a, b = (builder.input(0, place) for place in range(2))
     signed = builder.add(Opcode.COPY_SIGN, builder.constant(-2.2), b)

@@ -1,4 +1,4 @@
-"""Other processors: code assembles for them, and gives the same bits where it can be run here."""
+"""Code for other processors: it assembles, and gives the same bits where this machine can run it."""
 
 import ctypes
 import platform
@@ -56,7 +56,7 @@ def test_code_assembles_for_other_systems(triple: str, cpu: str, lanes: int) -> 
 @pytest.mark.parametrize(("cpu", "lanes"), [("x86-64", 1), ("x86-64", 2), ("haswell", 4)])
 @pytest.mark.skipif(platform.machine().lower() not in ("x86_64", "amd64"), reason="runs x86-64 code")
 def test_older_processors_give_the_same_bits(cpu: str, lanes: int) -> None:
-    """Without fused multiply-add in hardware the C library's exact one is called."""
+    """Without a fused multiply-add instruction, the exact function of the C library is called."""
     if cpu == "haswell" and not llvm.get_host_cpu_features().get("avx2"):
         pytest.skip("this processor has no AVX2")
     target = replace(host_target(), cpu=cpu, features="", lanes=lanes)
@@ -80,7 +80,9 @@ def test_older_processors_give_the_same_bits(cpu: str, lanes: int) -> None:
         ("arm64-apple-darwin", {"neon": True}, 2),
     ],
 )
-def test_lanes_follow_the_vector_registers(triple: str, features: dict[str, bool], lanes: int) -> None:
+def test_the_number_of_lanes_depends_on_the_vector_registers(
+    triple: str, features: dict[str, bool], lanes: int
+) -> None:
     assert vector_lanes(triple, features) == lanes
 
 
@@ -93,12 +95,12 @@ def test_lanes_follow_the_vector_registers(triple: str, features: dict[str, bool
         ("arm64-apple-darwin", "+avx2"),
     ],
 )
-def test_only_x86_64_is_told_not_to_prefer_256_bits(triple: str, features: str) -> None:
+def test_only_x86_64_targets_disable_the_preference_for_256_bits(triple: str, features: str) -> None:
     assert target_features(triple, "+avx2") == features
 
 
 def negations(a: SX, b: SX) -> SX:
-    """Multiply-adds whose sum is exactly zero for a = 3, b = 2, each negated in another way."""
+    """Multiply-adds whose sum is exactly zero for a = 3, b = 2, with each kind of negation."""
     rest = [a[k] * b[k] - 6 for k in range(4)]
     return casadi.vertcat(
         -rest[0],
@@ -109,7 +111,7 @@ def negations(a: SX, b: SX) -> SX:
 
 
 def test_a_negated_multiply_add_keeps_the_sign_of_zero_in_every_row() -> None:
-    count = 19  # rows in whole vectors, and a tail of single rows
+    count = 19  # rows in full vectors, and a remainder of single rows
     result = compile_function(traced(negations, 5, 5))(np.full((count, 5), 3.0), np.full((count, 5), 2.0))
     assert same_bits(result, np.tile([-0.0, -0.0, -0.0, -np.pi], (count, 1)))
 
@@ -129,7 +131,7 @@ def test_arm64_code_has_no_negated_multiply_add(effort: Effort) -> None:
     assert not np.any((words & 0xFFE08000) == 0x1F600000)
 
 
-def test_the_host_is_known_once() -> None:
+def test_the_host_target_is_detected_once() -> None:
     target = host_target()
     assert isinstance(target, Target)
     assert target is host_target()
@@ -146,7 +148,7 @@ def test_an_unknown_symbol_has_no_address() -> None:
         code.address("unknown")
 
 
-def test_no_c_library_is_called_where_the_processor_has_fused_multiply_add() -> None:
+def test_code_for_processors_with_fused_multiply_add_does_not_call_the_c_library() -> None:
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
     names = (b"sin", b"cos", b"tan", b"atan2", b"exp", b"fmod", b"pow", b"log", b"fma", b"floor")

@@ -1,4 +1,4 @@
-"""Contract tests of all blocks of the library; new blocks are tested automatically."""
+"""Contract tests of all blocks of the library; a new block is tested automatically."""
 
 from __future__ import annotations
 
@@ -56,11 +56,11 @@ ROBOT = Robot(
 
 KINDS = list(BLOCKS.values())
 each_kind = pytest.mark.parametrize("kind", KINDS, ids=BLOCKS)
-"""For laws that take long; those that take next to no time go through all blocks in one test."""
+"""Parametrizes slow tests by block type; fast tests loop over all block types in one test."""
 
 
 def make(kind: type[Block], **values: object) -> Block:
-    """A block with its defaults, and the little robot where it needs one."""
+    """Return a block with default parameters, and with ``ROBOT`` for parameters that are robots."""
     robots = {rule.name: ROBOT for rule in kind.parameters() if rule.kind is ParameterKind.ROBOT}
     return kind(**(robots | values))
 
@@ -72,14 +72,14 @@ def test_every_block_is_pickled() -> None:
 
 
 def fitting_shapes(block: Block) -> Iterator[Shapes]:
-    """Input shapes that the block takes, of a few that are tried; one set where no port is open."""
+    """Yield the candidate input shapes that the block accepts; one set if all ports have fixed shapes."""
     ports = block.input_ports()
     is_open = any(port.shape is None for port in ports)
     lengths: list[int] = []
     for open_shape in ((), (2,), (4,), (3, 3)) if is_open else ((),):
         shapes = {port.name: open_shape if port.shape is None else port.shape for port in ports}
         if len(open_shape) == 1 and lengths:
-            continue  # one length of vectors is enough
+            continue  # one vector length is enough
         try:
             block.output_shapes(shapes)
         except InputError:
@@ -89,7 +89,7 @@ def fitting_shapes(block: Block) -> Iterator[Shapes]:
 
 
 def all_equations(block: Block, shapes: Shapes) -> Function:
-    """All that the block's equations give, as a function of t, x, u, e and p."""
+    """Return all values of the block's equations as a function of t, x, u, e and p."""
     states = (*block.states(shapes), *block.discrete_states(shapes), *block.modes(shapes))
     states += (*block.conditions(shapes), *block.delay_lines(shapes))
     rates = [Slot(f"{name}'", shapes[name]) for name in block.rated_inputs]
@@ -113,7 +113,7 @@ def all_equations(block: Block, shapes: Shapes) -> Function:
 
 
 def numbers(equations: Function, values: Block, least: float = 0.1) -> list[np.ndarray]:
-    """What equations give at fixed pseudo-random t, x, u and the parameters of the block ``values``.
+    """Evaluate equations at fixed pseudo-random t, x, u and the parameters of the block ``values``.
 
     States and inputs lie between ``least`` and ``least + 0.8``.
     """
@@ -124,7 +124,7 @@ def numbers(equations: Function, values: Block, least: float = 0.1) -> list[np.n
     return [np.asarray(value) for value in equations.call([np.asarray(point) for point in points])]
 
 
-def test_it_says_what_it_is() -> None:
+def test_every_block_has_a_title_and_a_summary_of_one_line() -> None:
     for kind in KINDS:
         assert kind.summary().endswith((".", "…")), kind
         assert "\n" not in kind.summary(), kind
@@ -132,18 +132,18 @@ def test_it_says_what_it_is() -> None:
         assert BLOCKS[kind.type_name()] is kind
 
 
-def test_it_is_imported_by_its_name() -> None:
+def test_every_block_is_exported_by_its_name() -> None:
     for kind in KINDS:
         assert kind.type_name() in blocks.__all__
         assert getattr(blocks, kind.type_name()) is kind
 
 
-def test_type_checkers_know_its_name() -> None:
+def test_the_type_stub_lists_all_block_names() -> None:
     script = runpy.run_path(str(Path(__file__).parents[2] / "scripts" / "block_names.py"))
     assert script["STUB"].read_text(encoding="utf-8") == script["stub"](), "run scripts/block_names.py"
 
 
-def test_its_folder_is_its_family() -> None:
+def test_the_folder_of_every_block_is_its_family() -> None:
     for kind in KINDS:
         if kind.__module__.startswith("armblocks.blocks."):
             assert kind.__module__.split(".")[2] == BLOCKS.family_of(kind)
@@ -151,8 +151,8 @@ def test_its_folder_is_its_family() -> None:
     assert folders == set(BLOCKS.families)
 
 
-def test_it_is_final_and_frozen() -> None:
-    # Between a kind and Block stands at most what several kinds of one file have in common.
+def test_every_block_is_immutable_and_has_no_subclasses() -> None:
+    # A block type derives from Block, or from one common base class of several types in one file.
     for kind in KINDS:
         (base,) = kind.__bases__
         assert base is Block or (base.__bases__ == (Block,) and base not in KINDS), kind
@@ -162,7 +162,7 @@ def test_it_is_final_and_frozen() -> None:
             block.anything = 1  # pyright: ignore[reportAttributeAccessIssue]
 
 
-def test_it_is_a_value() -> None:
+def test_blocks_with_equal_parameters_are_equal_and_have_equal_hashes() -> None:
     for kind in KINDS:
         one, other = make(kind), make(kind)
         assert one == other
@@ -170,7 +170,7 @@ def test_it_is_a_value() -> None:
         assert dataclasses.replace(one) == one
 
 
-def test_its_ports_and_parameters_are_documented() -> None:
+def test_ports_and_parameters_of_every_block_are_documented() -> None:
     for kind in KINDS:
         block = make(kind)
         for ports in (block.input_ports(), (*block.output_ports(), *block.record_ports())):
@@ -181,7 +181,7 @@ def test_its_ports_and_parameters_are_documented() -> None:
         assert all(port.shape is not None for port in block.record_ports()), kind
 
 
-def test_its_parameters_survive_being_read_and_given_again() -> None:
+def test_a_block_built_from_its_parameter_values_is_equal() -> None:
     for kind in KINDS:
         block = make(kind)
         values = {rule.name: block.parameter_value(rule.name) for rule in kind.parameters()}
@@ -189,11 +189,11 @@ def test_its_parameters_survive_being_read_and_given_again() -> None:
 
 
 @each_kind
-def test_its_equations_have_the_shapes_that_it_infers(kind: type[Block]) -> None:
+def test_equations_have_the_inferred_shapes(kind: type[Block]) -> None:
     block = make(kind)
     tried = list(fitting_shapes(block))
     assert tried, "no input shapes fit"
-    if kind.virtual:  # it is wires: what it leads where is tested in diagram/test_hierarchy.py
+    if kind.virtual:  # a virtual block has no equations; diagram/test_hierarchy.py tests its connections
         assert numbers(all_equations(block, tried[0]), block) == []
         return
     for shapes in tried:
@@ -211,7 +211,7 @@ def test_its_equations_have_the_shapes_that_it_infers(kind: type[Block]) -> None
 
 
 @each_kind
-def test_its_equations_are_pure_and_read_tunable_parameters_from_p_only(kind: type[Block]) -> None:
+def test_equations_are_pure_and_read_tunable_parameters_only_from_p(kind: type[Block]) -> None:
     block = make(kind)
     other = make(
         kind,
@@ -231,7 +231,7 @@ def test_its_equations_are_pure_and_read_tunable_parameters_from_p_only(kind: ty
 
 
 @each_kind
-def test_its_start_values_fit_its_states(kind: type[Block]) -> None:
+def test_initial_values_have_the_shapes_of_the_states(kind: type[Block]) -> None:
     block = make(kind)
     slots = list(tunable_slots(block))
     p = natural(slots, SX.sym("p", sum(slot.size for slot in slots)))
@@ -245,12 +245,12 @@ def test_its_start_values_fit_its_states(kind: type[Block]) -> None:
 
 
 @each_kind
-def test_every_choice_has_equations(kind: type[Block]) -> None:
+def test_every_choice_of_a_parameter_has_finite_equations(kind: type[Block]) -> None:
     for rule in kind.parameters():
         for choice in rule.choices:
             block = make(kind, **{rule.name: choice})
             for shapes in fitting_shapes(block):
-                # acosh, for one, has no value below 1 and asin none above
+                # acosh is not defined below 1, asin not above
                 equations = all_equations(block, shapes)
                 tried = (numbers(equations, block, least) for least in (0.1, 1.1))
                 assert any(all(np.isfinite(value).all() for value in values) for values in tried)
@@ -259,20 +259,20 @@ def test_every_choice_has_equations(kind: type[Block]) -> None:
 WITHOUT_JUMPS = {
     "MathFunction": "the cube root has the sign of its argument",
     "Sqrt": "the signed root has the sign of its argument",
-    "T2AngleAxis": "the same angle and axis from the largest of the diagonal",
-    "T2Quaternion": "the same quaternion from the largest of its entries",
-    "T2eul": "of the two sets of angles, where the middle one is 0",
-    "T2rpy": "of the two sets of angles, where the middle one is 90 degrees",
-    "JacobianInverse": "the greatest pivot",
+    "T2AngleAxis": "the same angle and axis from the largest diagonal entry",
+    "T2Quaternion": "the same quaternion from its largest entry",
+    "T2eul": "selects one of two sets of angles where the middle angle is 0",
+    "T2rpy": "selects one of two sets of angles where the middle angle is 90 degrees",
+    "JacobianInverse": "selects the greatest pivot",
     "InterpolationUsingPrelookup": "its indices change at events of Prelookup",
     "VariableTransportDelay": "a transit time that is not above 0 ends the run",
 }
-"""Blocks without events whose equations compare, and what they compare for."""
+"""Blocks without events whose equations contain comparisons, and the reason why no jump results."""
 
 
 @each_kind
-def test_what_its_outputs_compare_changes_at_events_or_breakpoints(kind: type[Block]) -> None:
-    """A jump that no event locates is leapt over by steps, without a word."""
+def test_comparisons_in_outputs_change_only_at_events_or_breakpoints(kind: type[Block]) -> None:
+    """The integrator would step across a jump without an event, and the error would not be reported."""
     if (
         kind.breakpoints is not Block.breakpoints
         or kind.sampled
@@ -291,7 +291,7 @@ def test_what_its_outputs_compare_changes_at_events_or_breakpoints(kind: type[Bl
 
 
 def compares_what_moves(group: Group, equations: BlockEquations, shapes: Shapes) -> bool:
-    """Whether outputs or derivatives go through a comparison of the time, of states or of inputs."""
+    """Return whether outputs or derivatives depend on a comparison of time, states or inputs."""
     if not {slot.kind for slot in group.slots} & {SlotKind.OUTPUT, SlotKind.DERIVATIVE}:
         return False
     sizes = {state.name: math.prod(state.shape) for state in (*equations.states, *equations.discrete)}
@@ -302,7 +302,7 @@ def compares_what_moves(group: Group, equations: BlockEquations, shapes: Shapes)
     return steps_with(group.expression, vertcat(group.t, *map(parts.get, (*group.states, *group.inputs))))
 
 
-def test_its_views_show_signals_that_exist() -> None:
+def test_views_of_every_block_show_existing_signals() -> None:
     for block in map(make, KINDS):
         ports = (*block.input_ports(), *block.output_ports(), *block.record_ports())
         for view in block.views():
@@ -312,11 +312,11 @@ def test_its_views_show_signals_that_exist() -> None:
 
 
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind.output_rates])
-def test_outputs_that_are_said_to_be_rates_are_rates(
+def test_outputs_declared_as_derivatives_of_others_are_their_derivatives(
     kind: type[Block], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     claims, block, random = kind.output_rates, make(kind), np.random.default_rng(2)
-    monkeypatch.setattr(kind, "output_rates", {})  # so that the derivative is worked out
+    monkeypatch.setattr(kind, "output_rates", {})  # so that the derivative is computed
     for port, rate in claims.items():
         builder = DiagramBuilder("d")
         shapes = next(fitting_shapes(block))
@@ -329,11 +329,11 @@ def test_outputs_that_are_said_to_be_rates_are_rates(
         x = random.uniform(0.1, 0.9, system.states.size)
         (y,) = system.signals(0.37, x, (), (), system.parameter_values)
         signals = system.signals_layout.unpack(y)
-        # the same quantity by another order of operations
+        # the same quantity with another order of operations
         assert signals["derivative/y"] == pytest.approx(signals[f"block/{rate}"], rel=1e-13)
 
 
-def test_the_shape_of_a_default_is_the_shape_of_its_symbol() -> None:
+def test_default_values_have_the_shapes_of_their_symbols() -> None:
     for block in map(make, KINDS):
         for slot in tunable_slots(block):
             assert slot.shape == shape_of(block.parameter_value(slot.name)), block
@@ -342,10 +342,10 @@ def test_the_shape_of_a_default_is_the_shape_of_its_symbol() -> None:
 @pytest.mark.parametrize(
     "kind", [kind for kind in BLOCKS.values() if kind.breakpoints is not Block.breakpoints]
 )
-def test_at_a_breakpoint_signals_are_what_they_are_just_after(kind: type[Block]) -> None:
-    """The instant and the condition of the outputs are one number, whatever the parameters are rounded to.
+def test_signals_at_a_breakpoint_equal_those_just_after_it(kind: type[Block]) -> None:
+    """The breakpoint and the condition in the outputs use the same rounded number for all parameter values.
 
-    A run goes on from a breakpoint with the values there, and a sensitivity takes the jump from them.
+    A run continues from a breakpoint with the values at that time, and sensitivities use their jump.
     """
     system = compile_diagram(worked_example(kind)).compiled
     random, near = np.random.default_rng(3), 2.0**-46

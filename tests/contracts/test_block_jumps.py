@@ -1,6 +1,8 @@
-"""Where its inputs jump, a block that switches goes from its old output to its new one.
+"""When the inputs of a switching block jump, its output changes from the old to the new value without
+overshoot.
 
-At a jump modes find their values in turns. What an output is on the way must not be seen by an event.
+At a jump, the mode iteration updates the modes in several passes. Events must not see the outputs between the
+passes.
 """
 
 from __future__ import annotations
@@ -30,7 +32,7 @@ from armblocks.face.block_examples import example_block
 
 
 def switching() -> list[str]:
-    """Blocks with modes whose ports take scalars, by name."""
+    """Return the names of blocks with modes whose ports take scalars."""
     found: list[str] = []
     for name, kind in BLOCKS.items():
         block = example_block(kind)
@@ -38,14 +40,14 @@ def switching() -> list[str]:
         scalars = dict.fromkeys((port.name for port in ports), ())
         scalar = bool(ports) and all(port.shape in (None, ()) for port in ports)
         if scalar and not block.sampled and not block.virtual:
-            with suppress(InputError):  # some take vectors only
+            with suppress(InputError):  # some blocks take only vectors
                 block.output_shapes(scalars)
                 found += [name] * bool(block.modes(scalars))
     return found
 
 
 def jump(builder: ab.DiagramBuilder, name: str, by: str, before: float, after: float) -> BlockHandle:
-    """A signal that jumps at 1 s, at a breakpoint, a tick or an event."""
+    """Add a signal that jumps at 1 s, at a breakpoint, a tick or an event."""
     if by == "breakpoint":
         return builder.add(name, Step(time=1.0, initial=before, final=after))
     if by == "tick":
@@ -59,7 +61,7 @@ def jump(builder: ab.DiagramBuilder, name: str, by: str, before: float, after: f
 def diagram_of(
     kinds: list[str], by: str, random: np.random.Generator
 ) -> tuple[ab.DiagramBuilder, dict[str, Block]]:
-    """All of them, each fed by signals that jump at 1 s."""
+    """A diagram with all these blocks; their input signals jump at 1 s."""
     builder = ab.DiagramBuilder("jumps")
     blocks = {name: example_block(BLOCKS[name]) for name in kinds}
     for name, block in blocks.items():
@@ -73,7 +75,7 @@ def diagram_of(
 
 
 def ranges(diagram: Diagram, blocks: dict[str, Block]) -> dict[str, tuple[float, float]]:
-    """Middle and half of the range of each scalar output."""
+    """Return the middle and half the width of the range of each scalar output."""
     result = ab.simulate(diagram, stop_time=1.25, sample_time=0.005)
     found: dict[str, tuple[float, float]] = {}
     for name, block in blocks.items():
@@ -87,7 +89,7 @@ def ranges(diagram: Diagram, blocks: dict[str, Block]) -> dict[str, tuple[float,
 
 @pytest.mark.parametrize("by", ["breakpoint", "tick", "event"])
 @pytest.mark.parametrize("seed", range(2))
-def test_no_event_sees_an_output_on_its_way_to_its_value(seed: int, by: str) -> None:
+def test_no_event_sees_an_output_during_the_mode_iteration(seed: int, by: str) -> None:
     builder, blocks = diagram_of(switching(), by, np.random.default_rng(seed))
     found = ranges(builder.build(), blocks)
     assert len(found) > 30

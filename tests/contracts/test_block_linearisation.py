@@ -1,4 +1,4 @@
-"""Every block that flows is linearised exactly: its slopes are those of finite differences."""
+"""The linearisation of every continuous block agrees with finite differences."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from armblocks.face.model import compile_diagram
 from worked_examples import worked_example
 
 TIME = 1.7
-"""s: no worked example is at a kink there."""
+"""Time of the linearisation, s. No worked example has a kink at this time."""
 
 FLOWING = {
     name: kind
     for name, kind in BLOCKS.items()
     if not kind.sampled
     and not kind.virtual
-    and kind.delay_lines is Block.delay_lines  # a dead time has no finite linear system: it is refused
+    and kind.delay_lines is Block.delay_lines  # a dead time has no finite linear system and is refused
     and example_block(kind).input_ports()
     and example_block(kind).output_ports()
 }
 
 
 def nudged(diagram: Diagram) -> Diagram:
-    """The worked example with a constant 0 added to what feeds the first input of its block."""
+    """The worked example with a Constant of 0 added to the signal at the first input of its block."""
     target = PortRef(diagram.name, diagram.blocks[diagram.name].input_ports()[0].name)
     source = diagram.drivers[target]
     wires = [wire for wire in diagram.connections if wire.target != target]
@@ -43,32 +43,32 @@ def nudged(diagram: Diagram) -> Diagram:
 
 
 def packed(layout: Signature, values: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Values by name as the flat vector of a layout."""
+    """Return named values as the flat vector of a layout."""
     return np.concatenate([np.zeros(0), *(np.ravel(values[slot.name]) for slot in layout)])
 
 
 def slope(f: Callable[[float], np.ndarray]) -> np.ndarray:
-    """df/ds at s = 0 by central differences of fourth order: 1e-3 leaves 1e-12 of the fifth derivative."""
+    """Return df/ds at s = 0 by fourth-order central differences: h = 1e-3 s has an error of order 1e-12."""
     h = 1e-3
     return (8 * (f(h) - f(-h)) - (f(2 * h) - f(-2 * h))) / (12 * h)
 
 
 @pytest.mark.filterwarnings("ignore::armblocks.errors.LimitWarning")
 @pytest.mark.parametrize("kind", FLOWING.values(), ids=FLOWING)
-def test_slopes_are_exact(kind: type[Block]) -> None:
+def test_linearisation_agrees_with_finite_differences(kind: type[Block]) -> None:
     example = worked_example(kind)
-    # The nudge has no states and changes nothing: at the end of the example's run it is where the example is.
+    # The added Constant has no states and is 0: the final state of the example is valid for both diagrams.
     state = ab.simulate(example, stop_time=TIME).final_state
     assert state is not None
     diagram = nudged(example)
     outputs = [f"{diagram.name}/{port.name}" for port in diagram.blocks[diagram.name].output_ports()]
     linear = ab.linearize(diagram, inputs="nudge.value", outputs=outputs, at=state)
     if linear.dt:
-        pytest.skip("its example is sampled")
+        pytest.skip("the example is sampled")
     assert linear.point is not None
     system, point = compile_diagram(diagram).system, linear.point
     if system.algebraic.size:
-        pytest.skip("its example has an implicit equation")
+        pytest.skip("the example has an implicit equation")
     x, z = packed(system.states, point.states), packed(system.discrete, point.discrete)
     place = system.parameters.ranges["nudge.value"]
 

@@ -1,8 +1,8 @@
-"""Sensitivities by the tunable parameters of every block, against differences of runs.
+"""Sensitivities to the tunable parameters of every block, compared with differences of runs.
 
-A case is the worked example of a block with random parameters: as it is, with the block in an enabled
-subsystem, or with a delay behind it. Each output is integrated, and the integrals are differentiated. A few
-cases are tried in every run of the tests. With the environment variable ``ARMBLOCKS_LONG=seed`` all are.
+A case is the worked example of a block with random parameters: unchanged, with the block in an enabled
+subsystem, or with a delay after it. Each output is integrated, and the integrals are differentiated. The
+default is a short list of cases; the environment variable ``ARMBLOCKS_LONG=seed`` runs all.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ Array = NDArray[np.float64]
 
 
 def shaken(block: Block, random: np.random.Generator) -> Block:
-    """The block with other values of its tunable parameters, as far as they are allowed."""
+    """Return the block with random changes of its tunable parameters where these are valid."""
     for rule in block.own_parameters():
         value = np.asarray(block.parameter_value(rule.name)) if rule.tunable else np.array("")
         if value.dtype.kind == "f" and np.isfinite(value).all():
@@ -58,12 +58,12 @@ def shaken(block: Block, random: np.random.Generator) -> Block:
                 changed = value * (1.0 + 0.15 * random.uniform(-1.0, 1.0, value.shape))
                 block = block.with_parameters(**{rule.name: changed if value.ndim else float(changed)})
             except ArmblocksError:
-                continue  # parameters that belong together
+                continue  # the parameter cannot change alone
     return block
 
 
 def enabled(name: str, block: Block) -> Block:
-    """A subsystem with the block of this name in it, and with ports of the same names."""
+    """An enabled subsystem that contains the named block and has ports of the same names."""
     inside = DiagramBuilder("inside")
     inside.add(name, block)
     for port in block.input_ports():
@@ -74,7 +74,7 @@ def enabled(name: str, block: Block) -> Block:
 
 
 def case(kind: str, place: str, seed: int) -> tuple[Diagram, str, Sequence[str]]:
-    """The diagram, the path of the block, and the integrals of its outputs."""
+    """Return the diagram, the path of the block, and the integrals of its outputs."""
     random = np.random.default_rng([seed, *map(ord, kind + place)])
     example, name = ab.block_example(kind), block_name(BLOCKS[kind])
     builder = DiagramBuilder("case")
@@ -105,10 +105,10 @@ def case(kind: str, place: str, seed: int) -> tuple[Diagram, str, Sequence[str]]
 def differences(
     diagram: Diagram, parameter: str, value: Array, along: Array, step: float, outputs: Sequence[str]
 ) -> Iterator[list[tuple[Array, Array]]]:
-    """For each output the extrapolated differences along a direction, and what half the step changes.
+    """Yield for each output the extrapolated differences along a direction, and their uncertainty.
 
-    Central ones first, then those to both sides alone: at a kink, as where a limiter begins at its input, the
-    derivative is that of one side.
+    First central differences, then one-sided ones: at a kink, such as the limit of a limiter, the derivative
+    is one-sided.
     """
 
     def run(change: float) -> list[Array]:
@@ -128,7 +128,7 @@ def differences(
 
 
 def extrapolated(plain: Sequence[Sequence[Array]], ratio: int) -> list[tuple[Array, Array]]:
-    """The limit of differences whose errors fall by ``ratio`` from each to the next, and its uncertainty."""
+    """Return the limit of differences whose errors decrease by ``ratio`` per step, and its uncertainty."""
     found: list[tuple[Array, Array]] = []
     for rows in zip(*plain):
         first, second = ((ratio * fine - coarse) / (ratio - 1) for coarse, fine in pairwise(rows))
@@ -139,7 +139,7 @@ def extrapolated(plain: Sequence[Sequence[Array]], ratio: int) -> list[tuple[Arr
 def agree(
     diagram: Diagram, result: ab.SensitivityResult, parameter: str, value: Array, outputs: Sequence[str]
 ) -> bool:
-    """Whether the derivatives are the differences, or there are no differences to compare with."""
+    """Return whether the derivatives agree with the differences, or no differences can be computed."""
     random = np.random.default_rng(len(parameter))
     along = random.uniform(0.5, 1.0, value.shape) * np.maximum(np.abs(value), 0.1)
     judged = False
@@ -154,18 +154,18 @@ def agree(
                 if not wrong:
                     return True
         except ArmblocksError:
-            continue  # at the border of what is allowed
+            continue  # a changed parameter is outside its bounds
     return not judged
 
 
 @pytest.mark.parametrize(("kind", "place"), CASES)
-def test_sensitivities_by_a_blocks_parameters_are_differences_of_runs(kind: str, place: str) -> None:
+def test_sensitivities_agree_with_differences_of_runs(kind: str, place: str) -> None:
     try:
         diagram, path, outputs = case(kind, place, SEED)
         ab.simulate(diagram, **SETTINGS)
     except ArmblocksError:
-        assert LONG, "a case of the short list can be built and run"
-        pytest.skip("no such case")
+        assert LONG, "a case of the short list cannot be built or run"
+        pytest.skip("the case cannot be built or run")
     system = ab.compile_diagram(diagram).system
     values = system.parameters.unpack(system.parameter_values)
     names = [
@@ -181,7 +181,7 @@ def test_sensitivities_by_a_blocks_parameters_are_differences_of_runs(kind: str,
 def sensitivities(
     diagram: Diagram, names: Sequence[str], outputs: Sequence[str]
 ) -> Iterator[ab.SensitivityResult]:
-    """By all parameters at once, or one by one where some are refused."""
+    """Yield the sensitivities to all parameters at once, or to single parameters where some are refused."""
     if not names or not outputs:
         return
     try:

@@ -1,6 +1,6 @@
-"""Invalid or implausible diagrams and robots: one message for each case.
+"""Messages about invalid or implausible diagrams and robots, one per case.
 
-The settings of a run and sample times have a table of their own, ``test_run_input``.
+``test_run_input`` covers the settings of runs and sample times.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ MOST_CHARACTERS = 400
 
 
 def message(error: ArmblocksError, folder: Path | None = None) -> str:
-    """The text of an error: it says where and what to do, and is short but for the folder that it names."""
+    """Return the text of an error, which must name the place and a fix and be short apart from ``folder``."""
     assert error.where
     assert error.fix
     text = str(error) if folder is None else str(error).replace(f"{folder}/", "")
@@ -90,8 +90,8 @@ def deep(builder: ab.DiagramBuilder) -> None:
     builder.add("s", bl.Subsystem(diagram=diagram))
 
 
-def doubled_forever(builder: ab.DiagramBuilder) -> None:
-    """2^60 blocks in 60 subsystems: what holds them is small."""
+def doubled_sixty_times(builder: ab.DiagramBuilder) -> None:
+    """A diagram of 2^60 blocks, built from 60 nested subsystems that occur twice each."""
     inner = ab.DiagramBuilder("leaf")
     inner.add("c", bl.Constant())
     diagram = inner.draft()
@@ -106,7 +106,7 @@ def doubled_forever(builder: ab.DiagramBuilder) -> None:
 DIAGRAMS: list[tuple[str, Callable[[ab.DiagramBuilder], None], str]] = [
     ("an unconnected input", open_input, "1 unconnected input: x/u"),
     ("two drivers", two_drivers, "input 'x/u' has two drivers, 'a/y' and 'b/y'"),
-    ("a dangling line", dangling_line, "there is no block named 'nowhere'"),
+    ("a connection from a missing block", dangling_line, "there is no block named 'nowhere'"),
     ("widths that differ", widths, "'u1' has shape (2,) and 'u2' has shape (3,)"),
     ("a loop without state", loop_without_state, "first/y -> second/y -> first/y"),
     ("a name that differs by case", named("Motor", "motor"), "'motor': a block is named 'Motor'"),
@@ -121,13 +121,13 @@ DIAGRAMS: list[tuple[str, Callable[[ab.DiagramBuilder], None], str]] = [
     ("a name of 10 000 characters", named("a" * 10_000), "has 10000 characters"),
     ("an empty name", named(" "), "a block has an empty name"),
     ("a formula that is code", code, "is not a formula"),
-    ("subsystems without end", deep, "subsystems are nested more than 100 levels deep"),
-    ("more blocks than there are", doubled_forever, f"Allowed: at most {MOST_BLOCKS}"),
+    ("101 nested subsystems", deep, "subsystems are nested more than 100 levels deep"),
+    ("2^60 blocks", doubled_sixty_times, f"Allowed: at most {MOST_BLOCKS}"),
 ]
 
 
 @pytest.mark.parametrize(("build", "words"), [case[1:] for case in DIAGRAMS], ids=[c[0] for c in DIAGRAMS])
-def test_a_diagram_that_cannot_be_is_refused_by_one_message(
+def test_an_invalid_diagram_is_refused_with_one_message(
     build: Callable[[ab.DiagramBuilder], None], words: str
 ) -> None:
     builder = ab.DiagramBuilder("case")
@@ -137,7 +137,7 @@ def test_a_diagram_that_cannot_be_is_refused_by_one_message(
     assert words in message(refused.value)
 
 
-def test_a_loop_lists_its_chain() -> None:
+def test_the_error_about_an_algebraic_loop_lists_its_signals() -> None:
     builder = ab.DiagramBuilder("case")
     loop_without_state(builder)
     with pytest.raises(AlgebraicLoopError) as refused:
@@ -146,7 +146,7 @@ def test_a_loop_lists_its_chain() -> None:
 
 
 @pytest.mark.parametrize("name", ['"quoted"', "<script>alert(1)", "it's", "\u0645\u062d\u0631\u0643", "a b"])
-def test_other_names_are_names_and_go_to_a_file_and_back(name: str, tmp_path: Path) -> None:
+def test_unusual_block_names_are_allowed_and_kept_in_files(name: str, tmp_path: Path) -> None:
     builder = ab.DiagramBuilder("case")
     builder.add("x", bl.Integrator(), builder.add(name, bl.Constant(value=2.0)))
     path = tmp_path / "case.json"
@@ -166,7 +166,7 @@ def test_a_million_blocks_are_refused_while_they_are_built() -> None:
 
 
 def test_a_file_of_very_many_blocks_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(structure, "MOST_BLOCKS", 1_000)  # the limit itself is reached in the test above
+    monkeypatch.setattr(structure, "MOST_BLOCKS", 1_000)  # the test above covers the actual limit
     blocks: dict[str, Any] = {f"c{k}": {"type": "Ground"} for k in range(1_001)}
     path = tmp_path / "case.json"
     path.write_text(json.dumps({"format": 1, "name": "case", "blocks": blocks}), encoding="utf-8")
@@ -175,7 +175,9 @@ def test_a_file_of_very_many_blocks_is_refused(tmp_path: Path, monkeypatch: pyte
     assert "at most 1000" in message(refused.value)
 
 
-def test_a_library_that_leads_to_itself_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_library_block_that_contains_itself_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     linked = {"s": {"type": "Subsystem", "library": "circle.json#a"}}
     (tmp_path / "circle.json").write_text(
@@ -193,7 +195,7 @@ def test_a_library_that_leads_to_itself_is_refused(tmp_path: Path, monkeypatch: 
 
 
 def arm(*, joint: Any = None, length: float = 1.0, motor: Motor | None = None, **fields: Any) -> Robot:
-    """A bar of 1 kg on one joint."""
+    """A bar of 1 kg with one joint."""
     inertia = fields.pop("inertia", (0.0, 0.1, 0.1))
     link = Link(
         name="bar",
@@ -218,7 +220,7 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
 
 
 @pytest.mark.parametrize(("fields", "words"), REFUSED, ids=["gear 0", "qlim reversed", "gravity nan"])
-def test_a_robot_that_cannot_be_is_refused_by_one_message(fields: dict[str, Any], words: str) -> None:
+def test_an_invalid_robot_is_refused_with_one_message(fields: dict[str, Any], words: str) -> None:
     with pytest.raises(RobotError) as refused:
         arm(**fields)
     assert words in message(refused.value)
@@ -229,7 +231,7 @@ def test_a_motor_without_a_gear_has_the_ratio_1() -> None:
     assert arm().gear_ratios.tolist() == [1.0]
 
 
-def test_negative_viscous_friction_is_warned_of_as_a_source_of_energy() -> None:
+def test_negative_viscous_friction_raises_a_warning() -> None:
     with pytest.warns(ArmblocksWarning, match="friction accelerates the joint instead of braking"):
         arm(motor=Motor(viscous_friction=-0.1))
 
@@ -248,7 +250,7 @@ DOUBTFUL: list[tuple[dict[str, Any], str]] = [
     DOUBTFUL,
     ids=["degrees", "millimetres", "millimetres of travel", "kg mm2", "gravity up"],
 )
-def test_what_looks_like_another_unit_or_sign_is_asked_about(
+def test_a_probable_error_of_unit_or_sign_raises_a_warning(
     fields: dict[str, Any], words: str, tmp_path: Path
 ) -> None:
     (text,) = map(str, doubts(arm(**fields)))
@@ -260,7 +262,7 @@ def test_what_looks_like_another_unit_or_sign_is_asked_about(
     assert text in [str(one.message) for one in caught]
 
 
-def test_sound_robots_raise_no_doubts() -> None:
+def test_plausible_robots_raise_no_warnings() -> None:
     assert doubts(arm(joint=limited(-2 * math.pi, 2 * math.pi))) == ()
     assert doubts(arm(length=5.0, gravity=(0.0, 0.0, -1.62))) == ()
     assert doubts(arm(gravity=np.zeros(3))) == ()

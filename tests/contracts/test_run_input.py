@@ -1,4 +1,4 @@
-"""Input of runs: one message for each invalid value, and behaviour at the limits."""
+"""Settings of runs: messages about invalid values, and behaviour at the limits."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ MOST_CHARACTERS = 400
 
 
 def ramp() -> ab.Diagram:
-    """The integral of 1."""
+    """A diagram that integrates 1."""
     builder = ab.DiagramBuilder("ramp")
     builder.add("x", bl.Integrator(), builder.add("one", bl.Constant()))
     return builder.build()
 
 
 def message(error: ArmblocksError) -> str:
-    """The text of an error, of which every part has to be there and all has to be short."""
+    """Return the text of an error after checks: all its parts are present, and it is short."""
     assert error.what
     assert error.where
     assert error.fix
@@ -57,28 +57,28 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
 @pytest.mark.parametrize(
     ("settings", "words"), REFUSED, ids=[" ".join(f"{k}={v}" for k, v in s.items()) for s, _ in REFUSED]
 )
-def test_a_setting_that_cannot_be_is_refused_by_one_message(settings: dict[str, Any], words: str) -> None:
+def test_an_invalid_setting_is_refused_with_one_message(settings: dict[str, Any], words: str) -> None:
     given: dict[str, Any] = {"stop_time": 1.0, **settings}
     with pytest.raises(ArmblocksError) as refused:
         ab.simulate(ramp(), **given)
     assert words in message(refused.value)
 
 
-def test_a_run_of_no_length_gives_one_row() -> None:
+def test_a_run_with_stop_time_0_records_one_sample() -> None:
     found = ab.simulate(ramp(), stop_time=0.0)
     assert found.time.tolist() == [0.0]
     assert found["x"].tolist() == [0.0]
 
 
 @pytest.mark.parametrize("stop", [1e-320, 1e-9, 1e15, 1e308, np.float32(2.0), np.int64(2)])
-def test_any_length_of_time_is_a_run(stop: float) -> None:
+def test_runs_of_any_duration_and_number_type(stop: float) -> None:
     found = ab.simulate(ramp(), stop_time=stop)
     assert found.time[-1] == stop
-    # some hundred steps, each rounded
+    # rounding errors of some hundred steps
     assert found["x"][-1] == pytest.approx(float(stop), rel=1e-12)
 
 
-def test_a_run_has_to_end_after_the_state_that_it_goes_on_from() -> None:
+def test_a_stop_time_before_the_initial_state_is_refused() -> None:
     state = ab.simulate(ramp(), stop_time=1.0).final_state
     for stop in (0.5, 1.0):
         with pytest.raises(ArmblocksError) as refused:
@@ -86,7 +86,7 @@ def test_a_run_has_to_end_after_the_state_that_it_goes_on_from() -> None:
         assert "the run goes on from 1 s" in message(refused.value)
 
 
-def test_a_state_of_another_length_is_refused() -> None:
+def test_an_initial_state_of_another_diagram_is_refused() -> None:
     builder = ab.DiagramBuilder("three")
     builder.add("x", bl.Integrator(), builder.add("one", bl.Constant(value=[1.0, 2.0, 3.0])))
     state = ab.simulate(builder.build(), stop_time=0.5).final_state
@@ -115,7 +115,7 @@ SAMPLE_TIMES: list[tuple[Any, str]] = [
 
 
 @pytest.mark.parametrize(("sample_time", "words"), SAMPLE_TIMES)
-def test_a_sample_time_that_cannot_be_is_refused_by_one_message(sample_time: Any, words: str) -> None:
+def test_an_invalid_sample_time_is_refused_with_one_message(sample_time: Any, words: str) -> None:
     with pytest.raises(ArmblocksError) as refused:
         builder = ab.DiagramBuilder("sampled")
         builder.add("hold", bl.ZeroOrderHold(sample_time=sample_time), builder.add("t", bl.Clock()))

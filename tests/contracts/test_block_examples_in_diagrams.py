@@ -1,6 +1,7 @@
-"""What every block promises within a diagram: its worked example is kept, run, retuned and refused alike.
+"""Contract tests of blocks in diagrams: worked examples in files, runs with changed parameters, refused
+values.
 
-The diagrams are the worked examples, so that a new block is tested by existing.
+The diagrams are the worked examples of the blocks, so that a new block is tested automatically.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ SI_UNIT = re.compile(
 
 
 def changed(rule: Parameter, value: object) -> np.ndarray:
-    """Another value of a tunable parameter, within its bounds and of the same order; no limit stays none."""
+    """Return a slightly changed value of a tunable parameter within its bounds; infinite limits stay
+    infinite."""
     given = np.asarray(value, dtype=np.float64)
     finite = np.where(np.isfinite(given), given, 0.0)
     return np.where(
@@ -39,7 +41,7 @@ def changed(rule: Parameter, value: object) -> np.ndarray:
     )
 
 
-def test_its_units_are_those_of_si() -> None:
+def test_units_of_ports_and_parameters_are_si_units() -> None:
     for kind in BLOCKS.values():
         block = example_block(kind)
         ports = (*block.input_ports(), *block.output_ports(), *block.record_ports())
@@ -48,7 +50,7 @@ def test_its_units_are_those_of_si() -> None:
 
 
 @each_kind
-def test_its_example_survives_a_file(kind: type[Block]) -> None:
+def test_a_file_keeps_the_worked_example(kind: type[Block]) -> None:
     diagram = worked_example(kind)
     data = diagram_to_bytes(diagram, load_robot)
     again = diagram_from_bytes(data, "example", BLOCKS, load_robot)
@@ -57,7 +59,7 @@ def test_its_example_survives_a_file(kind: type[Block]) -> None:
 
 
 @each_kind
-def test_a_retuned_run_is_that_of_the_diagram_built_with_the_values(kind: type[Block]) -> None:
+def test_a_run_with_changed_parameters_equals_that_of_the_rebuilt_diagram(kind: type[Block]) -> None:
     diagram = worked_example(kind)
     block = diagram.blocks[diagram.name]
     values = {
@@ -74,7 +76,7 @@ def test_a_retuned_run_is_that_of_the_diagram_built_with_the_values(kind: type[B
 
 
 def rebuilt_with(diagram: Diagram, values: dict[str, np.ndarray]) -> Diagram:
-    """The diagram with a new block in place of the old one, which knows no other values."""
+    """The diagram with its block rebuilt with the given parameter values."""
     block = diagram.blocks[diagram.name]
     own = {path.rpartition(".")[2]: value for path, value in values.items()}
     return dataclasses.replace(
@@ -83,7 +85,7 @@ def rebuilt_with(diagram: Diagram, values: dict[str, np.ndarray]) -> Diagram:
 
 
 def wrong_values(rule: Parameter) -> Iterator[object]:
-    """Values that the rule of a parameter forbids, one of each sort."""
+    """Yield values that the rule of a parameter forbids, one for each part of the rule."""
     numeric = rule.kind in (ParameterKind.NUMBER, ParameterKind.ARRAY, ParameterKind.INTEGER)
     yield object()
     if numeric:
@@ -101,7 +103,7 @@ def wrong_values(rule: Parameter) -> Iterator[object]:
         yield 1.5
     if rule.kind is ParameterKind.ARRAY:
         yield np.zeros((1,) * (max(rule.dimensions) + 1))
-        if not rule.roots:  # a polynomial may have none
+        if not rule.roots:  # a list of roots may be empty
             yield []
     if rule.kind is ParameterKind.CHOICE:
         yield "no such choice"
@@ -110,7 +112,7 @@ def wrong_values(rule: Parameter) -> Iterator[object]:
 
 
 @each_kind
-def test_a_wrong_value_is_refused_by_the_parameters_name(kind: type[Block]) -> None:
+def test_a_wrong_value_is_refused_with_the_name_of_the_parameter(kind: type[Block]) -> None:
     block = example_block(kind)
     for rule in kind.parameters():
         for value in wrong_values(rule):
