@@ -13,7 +13,7 @@ from armblocks.errors import DiagramError, InputError, UnknownNameError
 
 
 def oscillator(order: tuple[str, ...] = ("force", "speed", "angle")) -> Diagram:
-    """x'' = -x, its blocks added in any order."""
+    """Build x'' = -x with the blocks added in the given order."""
     blocks = {"force": Gain(gain=-1.0), "speed": Integrator(), "angle": Integrator(initial=1.0)}
     builder = DiagramBuilder("oscillator")
     handles = {name: builder.add(name, blocks[name]) for name in order}
@@ -23,13 +23,13 @@ def oscillator(order: tuple[str, ...] = ("force", "speed", "angle")) -> Diagram:
     return builder.build()
 
 
-def test_the_order_of_building_leaves_no_trace() -> None:
+def test_the_order_of_adding_blocks_does_not_change_the_diagram() -> None:
     assert oscillator() == oscillator(("angle", "force", "speed"))
     assert hash(oscillator()) == hash(oscillator(("speed", "angle", "force")))
     assert list(oscillator().blocks) == ["angle", "force", "speed"]
 
 
-def test_inputs_go_by_position_by_name_and_by_connect() -> None:
+def test_inputs_are_connected_by_position_by_name_and_by_connect() -> None:
     builder = DiagramBuilder("d")
     one, two = builder.add("one", Constant()), builder.add("two", Constant(value=2.0))
     builder.add("a", Sum(signs="+-"), one, two)
@@ -43,7 +43,7 @@ def test_inputs_go_by_position_by_name_and_by_connect() -> None:
     assert str(diagram.connections[0]) == "one/y -> a/u1"
 
 
-def test_layout_settings_and_unknown_keys_are_carried() -> None:
+def test_a_built_diagram_has_layout_settings_and_unknown_keys() -> None:
     options = SimulationOptions(stop_time=3.0)
     builder = DiagramBuilder("d", settings=options, extras={"colour": "red"})
     clock = builder.add("clock", Clock())
@@ -70,7 +70,7 @@ def test_layout_settings_and_unknown_keys_are_carried() -> None:
         ("n" * 201, "has 201 characters"),
     ],
 )
-def test_an_illegal_name_is_refused(name: str, message: str) -> None:
+def test_an_invalid_block_name_is_refused(name: str, message: str) -> None:
     with pytest.raises(DiagramError, match=message) as caught:
         DiagramBuilder("d").add(name, Clock())
     assert len(str(caught.value)) < 400
@@ -78,13 +78,13 @@ def test_an_illegal_name_is_refused(name: str, message: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["Größe", "速度", "tool path <b>'\"", "n" * 200])
-def test_other_names_are_legal(name: str) -> None:
+def test_other_block_names_are_accepted(name: str) -> None:
     builder = DiagramBuilder("d")
     builder.add(name, Clock())
     assert name in builder.build().blocks
 
 
-def test_the_same_name_twice_is_refused() -> None:
+def test_a_repeated_block_name_is_refused() -> None:
     builder = DiagramBuilder("d")
     builder.add("clock", Clock())
     with pytest.raises(DiagramError, match=r"two blocks are named 'clock'.*unique names"):
@@ -95,7 +95,7 @@ def test_the_same_name_twice_is_refused() -> None:
     ("first", "second"),
     [("clock", "Clock"), ("é", unicodedata.normalize("NFD", "é")), ("straße", "STRASSE")],
 )
-def test_names_that_look_alike_are_refused(first: str, second: str) -> None:
+def test_names_that_differ_only_in_case_or_encoding_are_refused(first: str, second: str) -> None:
     builder = DiagramBuilder("d")
     builder.add(first, Clock())
     with pytest.raises(DiagramError, match="differs only in case or Unicode encoding"):
@@ -117,7 +117,7 @@ def test_unconnected_inputs_are_all_listed() -> None:
         builder.build()
 
 
-def test_of_very_many_unconnected_inputs_twenty_are_listed() -> None:
+def test_at_most_twenty_unconnected_inputs_are_listed() -> None:
     builder = DiagramBuilder("d")
     builder.add("scope", Scope(inputs=25))
     with pytest.raises(DiagramError, match=r"25 unconnected inputs: scope/u1, .*, scope/u20 and 5 more"):
@@ -128,7 +128,7 @@ def test_of_very_many_unconnected_inputs_twenty_are_listed() -> None:
         single.build()
 
 
-def test_an_unknown_port_says_the_nearest() -> None:
+def test_an_unknown_port_is_refused_with_the_nearest_name() -> None:
     builder = DiagramBuilder("d")
     traj = builder.add("traj", JTraj())
     with pytest.raises(UnknownNameError, match=r"block 'traj' \(jtraj\): there is no port named 'qdddd'"):
@@ -141,7 +141,7 @@ def test_an_unknown_port_says_the_nearest() -> None:
         builder.add("other", Gain(), v=traj["q"])
 
 
-def test_an_unknown_block_says_the_nearest() -> None:
+def test_an_unknown_block_is_refused_with_the_nearest_name() -> None:
     builder = DiagramBuilder("d")
     gain = builder.add("gain", Gain())
     with pytest.raises(UnknownNameError, match=r"there is no block named 'gian'.*did you mean 'gain'"):
@@ -150,7 +150,7 @@ def test_an_unknown_block_says_the_nearest() -> None:
         builder.place("gian", 0, 0)
 
 
-def test_a_block_with_several_outputs_must_say_which() -> None:
+def test_a_block_with_several_outputs_cannot_be_connected_without_a_port() -> None:
     builder = DiagramBuilder("d")
     traj = builder.add("traj", JTraj())
     with pytest.raises(DiagramError, match=r"the block has 3 outputs, so its name alone is ambiguous"):
@@ -168,7 +168,7 @@ def test_too_many_inputs_are_refused() -> None:
         builder.add("constant", Constant(), clock)
 
 
-def test_a_diagram_says_the_nearest_block() -> None:
+def test_an_unknown_block_of_a_diagram_is_refused_with_its_name() -> None:
     diagram = oscillator()
     assert diagram.block("speed") == Integrator()
     with pytest.raises(UnknownNameError, match=r"diagram 'oscillator': there is no block named 'sped'"):
@@ -183,7 +183,7 @@ def test_parameters_can_be_set_by_path() -> None:
     assert diagram == oscillator()
 
 
-def test_setting_parameters_wrongly_is_refused() -> None:
+def test_unknown_parameters_and_wrong_values_are_refused() -> None:
     diagram = oscillator()
     with pytest.raises(UnknownNameError, match=r"there is no block named 'farce'.*did you mean 'force'"):
         with_parameters(diagram, {"farce.gain": 1.0})
@@ -198,7 +198,7 @@ def test_setting_parameters_wrongly_is_refused() -> None:
         with_parameters(builder.build(), {"pair.value": [1.0, 2.0, 3.0]})
 
 
-def test_the_library_says_the_nearest_type() -> None:
+def test_a_block_library_finds_types_families_and_the_nearest_name() -> None:
     library = BlockLibrary({"maths": [Gain], "sources": [Clock, Constant]})
     assert library["Gain"] is Gain
     assert "Clock" in library
@@ -216,6 +216,6 @@ def test_the_library_says_the_nearest_type() -> None:
         library["Gian"]
 
 
-def test_a_block_says_what_contradicts_itself() -> None:
+def test_inconsistent_parameters_of_a_block_are_refused() -> None:
     with pytest.raises(InputError, match=r"JTraj: q0 has 2 joints and qf has 6"):
         JTraj(q0=[0, 0])

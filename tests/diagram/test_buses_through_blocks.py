@@ -1,4 +1,4 @@
-"""Buses through blocks that pass signals on: the same as the diagram written signal by signal."""
+"""Buses through blocks that accept them: equal to a diagram with one block per signal."""
 
 from collections.abc import Callable
 
@@ -43,7 +43,7 @@ Way = Callable[[DiagramBuilder, list[BlockHandle]], BlockHandle]
 
 
 def signals(builder: DiagramBuilder, mark: str, factor: float) -> list[BlockHandle]:
-    """Two scalars and a vector."""
+    """Add two scalar signals and a vector signal."""
     return [
         builder.add(f"{mark} speed", SineWave(amplitude=factor, frequency=2.0)),
         builder.add(f"{mark} angle", Ramp(slope=factor)),
@@ -111,19 +111,19 @@ def controls(builder: DiagramBuilder) -> dict[str, BlockHandle]:
 
 
 @pytest.mark.parametrize("name", BLOCKS)
-def test_a_bus_is_all_of_its_signals(name: str) -> None:
+def test_a_block_with_a_bus_equals_one_block_per_signal(name: str) -> None:
     together, apart = with_bus(*BLOCKS[name]), signal_by_signal(*BLOCKS[name])
     one, each = ab.simulate(together), ab.simulate(apart)
     for port in ("u1", "u2", "u3"):
         np.testing.assert_array_equal(one[f"scope/{port}"], each[f"scope/{port}"])
-    # The signals are found under the block's own name, and its ports'.
+    # The signals have the names of the block and its ports.
     output = together.blocks["block"].output_ports()[0].name
     for element, port in zip(NAMES, ("u1", "u2", "u3")):
         np.testing.assert_array_equal(one[f"block/{output}.{element}"], one[f"scope/{port}"])
-    assert float(np.ptp(one["scope/u1"])) > 0.5, "something moves"
+    assert float(np.ptp(one["scope/u1"])) > 0.5, "the signal changes"
 
 
-def test_merged_action_subsystems_give_the_bus_of_the_one_that_works() -> None:
+def test_merge_gives_the_bus_of_the_action_subsystem_that_executes() -> None:
     builder = DiagramBuilder("merge", settings=OPTIONS)
     chosen = builder.add("if", If(), builder.add("sign", SineWave(frequency=3.0)))
     ends: list[BlockHandle] = []
@@ -140,8 +140,8 @@ def test_merged_action_subsystems_give_the_bus_of_the_one_that_works() -> None:
         np.testing.assert_array_equal(result[f"together/y.{element}"], result[f"apart {k}/y"])
 
 
-def test_a_bus_goes_round_a_loop_through_a_delay() -> None:
-    """The counter of each signal: y(k) = x until the reset falls, then y(k-1)."""
+def test_a_bus_in_a_loop_through_a_delay() -> None:
+    """Track and hold of each signal: y(k) = x during the pulse, then y(k-1)."""
     builder = DiagramBuilder("loop", settings=OPTIONS)
     bus = bus_of(builder, "a", signals(builder, "a", 1.0))
     fresh = builder.add("fresh", PulseGenerator(period=1.0, width=50.0))
@@ -155,13 +155,13 @@ def test_a_bus_goes_round_a_loop_through_a_delay() -> None:
     speed, source, on = (result[name] for name in ("held/y.speed", "a speed/y", "fresh/y"))
     at = np.rint(result.time / 0.05).astype(int)
     assert np.array_equal(speed[on > 0.5], source[on > 0.5])
-    # In the second half of each period the value of the last tick within the first half stands.
+    # In the second half of each period the output has the value of the last tick in the first half.
     held_at = int(np.flatnonzero(at == 10)[0])
     assert np.all(speed[(at > 11) & (at < 20)] == speed[held_at + 2])
     assert result.resolve("kept/u.speed") == "held.speed/y"
 
 
-def test_one_parameter_moves_all_signals() -> None:
+def test_one_parameter_changes_all_signals_of_the_bus() -> None:
     block, inputs = BLOCKS["manual"]
     compiled = ab.compile_diagram(with_bus(block, inputs))
     names = [name for name in compiled.system.parameters.names if name.startswith("block")]
@@ -173,7 +173,7 @@ def test_one_parameter_moves_all_signals() -> None:
         np.testing.assert_array_equal(second[f"scope/{port}"], second[f"b {source}/y"])
 
 
-def test_a_bus_may_end() -> None:
+def test_a_bus_may_be_connected_to_a_terminator() -> None:
     builder = DiagramBuilder("end", settings=OPTIONS)
     builder.add("end", Terminator(), bus_of(builder, "a", signals(builder, "a", 1.0)))
     assert ab.simulate(builder.build()).run.complete
@@ -188,7 +188,7 @@ def two_buses(second: str, width: int = 1) -> DiagramBuilder:
     return builder
 
 
-def test_conflicts_name_both_ends() -> None:
+def test_different_buses_at_the_inputs_are_refused_with_both_ports() -> None:
     said = "'u1' is a bus with p, q, but input 'u2' is "
     with pytest.raises(DiagramError, match=f"{said}a bus with p, r") as caught:
         two_buses("p, r").build()
@@ -198,10 +198,10 @@ def test_conflicts_name_both_ends() -> None:
     builder.add("choose", ManualSwitch(), builder.add("bus", BusCreator(names="p, q"), one, one), one)
     with pytest.raises(DiagramError, match=f"{said}the single signal 'one/y'"):
         builder.build()
-    assert two_buses("p, q", width=3).build()  # a scalar beside a vector is spread, as without buses
+    assert two_buses("p, q", width=3).build()  # a scalar is broadcast to a vector, as without buses
 
 
-def test_dimensions_that_do_not_fit_are_told_at_both_ends() -> None:
+def test_bus_elements_of_different_shape_are_refused_with_both_sources() -> None:
     builder = DiagramBuilder("wide")
     two, three = (
         builder.add("two", Constant(value=(1.0, 2.0))),
@@ -218,7 +218,7 @@ def test_dimensions_that_do_not_fit_are_told_at_both_ends() -> None:
     )
 
 
-def test_a_block_that_calculates_takes_no_bus() -> None:
+def test_a_bus_at_a_block_that_computes_is_refused() -> None:
     builder = DiagramBuilder("gain")
     one = builder.add("one", Constant())
     builder.add("gain", Gain(), builder.add("bus", BusCreator(names="p, q"), one, one))
@@ -226,7 +226,7 @@ def test_a_block_that_calculates_takes_no_bus() -> None:
         builder.build()
 
 
-def test_unknown_elements_behind_a_block_are_refused() -> None:
+def test_an_unknown_element_of_the_bus_after_a_block_is_refused() -> None:
     builder = DiagramBuilder("unknown")
     one = builder.add("one", Constant())
     bus = builder.add("bus", BusCreator(names="p, q"), one, one)

@@ -35,7 +35,7 @@ from worked_examples import worked_example
 
 
 def line(*blocks: Block) -> Diagram:
-    """A chain of blocks after a constant."""
+    """Build a chain of blocks after a Constant."""
     builder = ab.DiagramBuilder("line")
     last = builder.add("start", Constant(value=1.0))
     for k, block in enumerate(blocks):
@@ -51,7 +51,7 @@ def key_of(*blocks: Block) -> str:
 
 
 def others(rule: Parameter, value: Any) -> Iterator[object]:
-    """Values that may stand in the place of a parameter's; not each fits each block."""
+    """Yield other values for a parameter; not every value is valid for every block."""
     match rule.kind:
         case ParameterKind.NUMBER | ParameterKind.ARRAY:
             array = np.asarray(value, dtype=np.float64)
@@ -82,7 +82,7 @@ def others(rule: Parameter, value: Any) -> Iterator[object]:
 
 
 @pytest.mark.parametrize("name", sorted(BLOCKS))
-def test_every_parameter_of_every_block_is_in_the_key(name: str) -> None:
+def test_the_key_contains_every_parameter_of_every_block(name: str) -> None:
     diagram = worked_example(BLOCKS[name])
     for place in [place for place, block in diagram.blocks.items() if type(block) is BLOCKS[name]][:1]:
         block = diagram.blocks[place]
@@ -94,7 +94,7 @@ def test_every_parameter_of_every_block_is_in_the_key(name: str) -> None:
                     checked = rule.check(value, "here")
                 except ArmblocksError:
                     continue
-                # Whether such a block and diagram could be made is no matter here.
+                # The key is also defined if the changed block or diagram is invalid.
                 changed = copy.copy(block)
                 object.__setattr__(changed, rule.name, checked)
                 blocks = {**diagram.blocks, place: changed}
@@ -108,7 +108,9 @@ values = st.floats(allow_nan=False, allow_infinity=False)
 
 
 @given(first=st.lists(values, min_size=1, max_size=3), second=st.lists(values, min_size=1, max_size=3))
-def test_keys_are_equal_where_the_bits_of_all_numbers_are(first: list[float], second: list[float]) -> None:
+def test_keys_are_equal_if_and_only_if_all_numbers_are_equal_bit_for_bit(
+    first: list[float], second: list[float]
+) -> None:
     same = len(first) == len(second) and all(
         a == b and math.copysign(1.0, a) == math.copysign(1.0, b) for a, b in zip(first, second)
     )
@@ -116,7 +118,7 @@ def test_keys_are_equal_where_the_bits_of_all_numbers_are(first: list[float], se
     assert (keys[0] == keys[1]) == same
 
 
-def test_wires_names_and_inner_diagrams_are_in_the_key() -> None:
+def test_the_key_contains_connections_names_and_inner_diagrams() -> None:
     def keyed(swap: bool, name: str, inner: float) -> str | None:
         builder = ab.DiagramBuilder(name)
         one, other = builder.add("one", Constant(value=1.0)), builder.add("other", Constant(value=2.0))
@@ -130,7 +132,7 @@ def test_wires_names_and_inner_diagrams_are_in_the_key() -> None:
     assert None not in keys and len(set(keys)) == 4
 
 
-def test_looks_settings_and_where_a_robot_was_read_are_not_in_the_key() -> None:
+def test_the_key_ignores_layout_settings_and_the_source_of_a_robot() -> None:
     diagram = ab.load_diagram("kr180model")
     arms = {
         name: dataclasses.replace(block, robot=dataclasses.replace(block.robot, source="elsewhere.json"))  # pyright: ignore[reportAttributeAccessIssue, reportUnknownArgumentType, reportUnknownMemberType]
@@ -149,7 +151,7 @@ def test_looks_settings_and_where_a_robot_was_read_are_not_in_the_key() -> None:
     assert content_key(other) == content_key(diagram)
 
 
-def test_a_table_is_known_by_its_content() -> None:
+def test_the_key_contains_the_content_of_a_table() -> None:
     rows = np.array([[0.0, 1.0], [1.0, 3.0], [2.0, -1.0]])
 
     def keyed(rows: np.ndarray[Any, Any]) -> str | None:
@@ -186,7 +188,9 @@ def by_modules(u: Any) -> Any:
     return casadi.fmax(np.sin(u), math.pi) + sum(value for value in (1.0, 2.0))
 
 
-def test_the_code_of_a_function_and_all_it_names_are_in_the_key(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_key_contains_the_code_of_a_function_and_of_all_names_it_uses(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     def keyed(function: Callable[..., Any]) -> str:
         return key_of(PythonFunction(function=function))
 
@@ -211,7 +215,7 @@ def test_the_code_of_a_function_and_all_it_names_are_in_the_key(monkeypatch: pyt
 
 
 class Law:
-    """An object whose content cannot be listed."""
+    """A class whose content the key cannot represent."""
 
     factor = 2.0
 
@@ -235,13 +239,13 @@ def with_chance(u: Any) -> Any:
 
 
 @pytest.mark.parametrize("function", [with_an_object, with_an_import, with_a_file, with_chance])
-def test_what_cannot_be_known_has_no_key(function: Callable[[Any], Any]) -> None:
+def test_a_function_with_an_unknown_dependency_has_no_key(function: Callable[[Any], Any]) -> None:
     assert content_key(line(PythonFunction(function=function))) is None
 
 
-def test_a_block_class_of_somebody_elses_has_no_key() -> None:
+def test_a_block_class_outside_the_package_has_no_key() -> None:
     class Doubled(Gain):
-        """Not of this package."""
+        """A block class outside the package."""
 
     assert content_key(line(Doubled(gain=2.0))) is None
 

@@ -1,4 +1,4 @@
-"""The difference of two diagrams: every change is reported once and exactly, and nothing else is."""
+"""The difference of two diagrams: every change is reported exactly once, and nothing else is reported."""
 
 from __future__ import annotations
 
@@ -35,7 +35,8 @@ from armblocks.diagram import (
 
 
 def loop(names: Mapping[str, str] | None = None, *, inner: str = "law", **blocks: Block) -> Diagram:
-    """A controlled integrator with the controller in a subsystem; ``names`` and ``blocks`` vary it."""
+    """A controlled integrator with the controller in a subsystem; ``names`` and ``blocks`` replace names and
+    blocks."""
     called = {name: name for name in ("wanted", "error", "controller", "plant", "scope")} | dict(names or {})
     builder = DiagramBuilder("loop")
     wanted = builder.add(called["wanted"], blocks.get("wanted", Step(time=0.5)))
@@ -50,13 +51,13 @@ def loop(names: Mapping[str, str] | None = None, *, inner: str = "law", **blocks
 
 
 def only(found: DiagramDifference, *kinds: str) -> None:
-    """Nothing but entries of these kinds was found."""
+    """Check that the difference has entries of exactly these kinds."""
     given = {entry.name for entry in dataclasses.fields(found) if getattr(found, entry.name)}
     assert given == set(kinds)
 
 
 def swapped(found: DiagramDifference) -> DiagramDifference:
-    """The same difference seen from the other diagram, for one without renamings inside changed wires."""
+    """Return the reverse difference; changed connections must not contain renamed blocks."""
 
     def turned(changes: tuple[object, ...]) -> tuple[object, ...]:
         return tuple(
@@ -81,7 +82,7 @@ def swapped(found: DiagramDifference) -> DiagramDifference:
 
 
 @pytest.mark.parametrize("name", ["kr180model", "van_der_pol_pid", "bouncing_ball", "robertson_kinetics"])
-def test_a_diagram_does_not_differ_from_itself_or_from_another_layout(name: str) -> None:
+def test_equal_diagrams_and_other_layouts_have_no_difference(name: str) -> None:
     diagram = ab.load_diagram(name)
     moved = dataclasses.replace(
         diagram,
@@ -116,7 +117,7 @@ def test_every_changed_parameter_is_reported_with_both_values() -> None:
     ]
 
 
-def test_another_type_is_reported_with_the_parameters_of_both() -> None:
+def test_a_changed_block_type_is_reported_with_the_parameters_of_both() -> None:
     found = diagram_difference(loop(), loop(wanted=Constant(value=2.0)))
     only(found, "types", "parameters")
     assert [(c.path, c.before, c.after) for c in found.types] == [("wanted", "Step", "Constant")]
@@ -125,27 +126,27 @@ def test_another_type_is_reported_with_the_parameters_of_both() -> None:
 
 
 @pytest.mark.parametrize("gone", ["wanted", "error", "controller", "plant", "scope"])
-def test_any_block_is_recognised_under_another_name(gone: str) -> None:
+def test_a_renamed_block_is_recognised(gone: str) -> None:
     found = diagram_difference(loop(), loop({gone: "another"}))
     only(found, "renamed")
     assert [(entry.before, entry.after) for entry in found.renamed] == [(gone, "another")]
 
 
-def test_neighbours_renamed_together_are_recognised() -> None:
+def test_connected_blocks_that_are_all_renamed_are_recognised() -> None:
     names = {"wanted": "a", "error": "b", "controller": "c", "plant": "d", "scope": "e"}
     found = diagram_difference(loop(), loop(names))
     only(found, "renamed")
     assert {entry.before: entry.after for entry in found.renamed} == names
 
 
-def test_a_block_renamed_inside_a_subsystem_is_named_by_its_paths() -> None:
+def test_a_renamed_block_in_a_subsystem_is_reported_with_its_paths() -> None:
     found = diagram_difference(loop(), loop(inner="gain"))
     only(found, "renamed")
     assert [(e.before, e.after) for e in found.renamed] == [("controller/law", "controller/gain")]
 
 
 def chains(*names: str) -> Diagram:
-    """Equal sources into equal gains: blocks that only their wires tell apart."""
+    """Equal sources connected to equal gains: only the connections distinguish the blocks."""
     builder = DiagramBuilder("chains")
     for k, name in enumerate(names):
         gain = builder.add(f"{name}_gain", Gain(gain=2.0), builder.add(name, SineWave()))
@@ -153,7 +154,7 @@ def chains(*names: str) -> Diagram:
     return builder.build()
 
 
-def test_equal_blocks_are_told_apart_by_their_wires() -> None:
+def test_equal_blocks_are_distinguished_by_their_connections() -> None:
     found = diagram_difference(chains("a", "b", "c"), chains("z", "y", "x"))
     only(found, "renamed")
     assert {entry.before: entry.after for entry in found.renamed} == {
@@ -161,7 +162,7 @@ def test_equal_blocks_are_told_apart_by_their_wires() -> None:
     }  # fmt: skip
 
 
-def test_blocks_that_nothing_tells_apart_are_paired_once_each() -> None:
+def test_indistinguishable_blocks_are_each_paired_at_most_once() -> None:
     def sources(*names: str) -> Diagram:
         builder = DiagramBuilder("sources")
         for name in names:
@@ -173,7 +174,7 @@ def test_blocks_that_nothing_tells_apart_are_paired_once_each() -> None:
     assert len({entry.after for entry in found.renamed}) == 2
 
 
-def test_another_name_with_another_parameter_is_another_block() -> None:
+def test_a_block_with_other_name_and_other_parameter_is_a_new_block() -> None:
     found = diagram_difference(loop(), loop({"wanted": "target"}, wanted=Step(time=9.0)))
     only(found, "added", "removed", "wires_added", "wires_removed")
     assert [entry.path for entry in found.removed] == ["wanted"]
@@ -182,7 +183,7 @@ def test_another_name_with_another_parameter_is_another_block() -> None:
     assert [str(entry.wire) for entry in found.wires_removed] == ["wanted/y -> error/u1"]
 
 
-def test_a_wire_is_reported_where_it_lies() -> None:
+def test_a_changed_connection_is_reported_with_its_subsystem() -> None:
     def inner(twice: bool) -> Diagram:
         builder = DiagramBuilder("inner")
         entry = builder.add("in", Inport())
@@ -221,7 +222,7 @@ def test_settings_and_description_are_reported() -> None:
     assert [(c.before, c.after) for c in found.descriptions] == [("", "a loop")]
 
 
-def test_outputs_that_are_logged_are_reported_under_their_later_names() -> None:
+def test_logged_outputs_are_reported_with_the_new_block_names() -> None:
     before = dataclasses.replace(loop(), logged=(PortRef("plant", "y"), PortRef("wanted", "y")))
     after = dataclasses.replace(
         loop({"plant": "tank"}), logged=(PortRef("tank", "y"), PortRef("controller", "u"))
@@ -232,7 +233,7 @@ def test_outputs_that_are_logged_are_reported_under_their_later_names() -> None:
     assert [(entry.path, str(entry.port)) for entry in found.logged_removed] == [("", "wanted/y")]
 
 
-def test_words_on_the_sheet_are_reported_and_their_place_is_not() -> None:
+def test_changed_texts_of_notes_are_reported_and_moved_notes_are_not() -> None:
     def noted(**notes: tuple[float, str]) -> Diagram:
         found = {f"/{name}": Note(x=x, y=0.0, text=text) for name, (x, text) in notes.items()}
         return dataclasses.replace(loop(), notes=found)
@@ -259,7 +260,7 @@ def test_words_on_the_sheet_are_reported_and_their_place_is_not() -> None:
     ],
     ids=["renamed", "retuned", "replaced", "unlike", "logged", "example"],
 )
-def test_the_way_back_is_the_way_there_reversed(after: Diagram) -> None:
+def test_the_difference_in_the_other_direction_is_the_reverse(after: Diagram) -> None:
     before = loop()
     there, back = diagram_difference(before, after), diagram_difference(after, before)
     assert swapped(there).added == back.added

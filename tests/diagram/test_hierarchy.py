@@ -1,4 +1,4 @@
-"""Flattening: a hierarchy is equivalent to its blocks in one flat diagram."""
+"""Flattening: a hierarchical diagram is equivalent to a flat diagram of its blocks."""
 
 from __future__ import annotations
 
@@ -44,7 +44,8 @@ from armblocks.errors import AlgebraicLoopError, DiagramError, InputError, Unkno
 
 
 def loop_in_levels() -> Diagram:
-    """A controlled plant: controller and plant are subsystems, the controller has one of its own."""
+    """A controlled plant: controller and plant are subsystems, and the controller contains another
+    subsystem."""
     builder = DiagramBuilder("loop")
     wanted = builder.add("wanted", Step(time=0.5, final=2.0))
     with builder.subsystem("controller", wanted) as controller:
@@ -66,8 +67,8 @@ def loop_in_levels() -> Diagram:
     return builder.build()
 
 
-def loop_side_by_side() -> Diagram:
-    """The same, by hand."""
+def flat_loop() -> Diagram:
+    """The same diagram without subsystems."""
     builder = DiagramBuilder("loop")
     wanted = builder.add("wanted", Step(time=0.5, final=2.0))
     error = builder.add("error", Sum(signs="+-"), wanted)
@@ -95,15 +96,15 @@ PATHS = {
 
 
 @pytest.mark.parametrize("settings", [{"solver": "rk4", "step": 0.01}, {"solver": "rk45", "rtol": 1e-8}])
-def test_flattening_changes_no_signal(settings: dict[str, object]) -> None:
+def test_flattening_does_not_change_the_signals(settings: dict[str, object]) -> None:
     levels = ab.simulate(loop_in_levels(), stop_time=3.0, **settings)
-    by_hand = ab.simulate(loop_side_by_side(), stop_time=3.0, **settings)
+    by_hand = ab.simulate(flat_loop(), stop_time=3.0, **settings)
     assert np.array_equal(levels.time, by_hand.time)
     for path, name in PATHS.items():
         assert np.array_equal(levels[f"{path}/y"], by_hand[f"{name}/y"]), path
 
 
-def test_ports_of_subsystems_are_names_of_the_signals_behind_them() -> None:
+def test_ports_of_subsystems_are_aliases_of_their_signals() -> None:
     result = ab.simulate(loop_in_levels(), stop_time=1.0)
     for alias, signal in {
         "plant/position": "plant/position_/y",
@@ -119,14 +120,14 @@ def test_ports_of_subsystems_are_names_of_the_signals_behind_them() -> None:
         assert result.resolve(alias) == signal
 
 
-def test_a_flat_diagram_is_its_own_flat_form() -> None:
-    diagram = loop_side_by_side()
+def test_flattening_returns_a_flat_diagram_unchanged_and_is_cached() -> None:
+    diagram = flat_loop()
     assert flat_diagram(diagram) is diagram
     nested = loop_in_levels()
     assert flatten_hierarchy(nested) is flatten_hierarchy(nested)
 
 
-def test_parameters_inside_are_changed_by_path_and_nothing_is_compiled_again() -> None:
+def test_parameters_of_inner_blocks_are_changed_by_path_without_compilation() -> None:
     diagram = loop_in_levels()
     model = ab.compile_diagram(diagram)
     before = model.compiled
@@ -143,7 +144,7 @@ def test_parameters_inside_are_changed_by_path_and_nothing_is_compiled_again() -
         with_parameters(diagram, {"controller/law/pid.P": "fast"})
 
 
-def test_a_sink_inside_is_seen_under_its_path() -> None:
+def test_the_view_of_a_sink_in_a_subsystem_has_its_path() -> None:
     builder = DiagramBuilder("top")
     with builder.subsystem("inner", builder.add("clock", Clock())) as inner:
         inner.add("display", Display(), inner.input("t"))
@@ -151,7 +152,7 @@ def test_a_sink_inside_is_seen_under_its_path() -> None:
     assert (name, view.signals) == ("inner/display", ("u",))
 
 
-def test_an_in_block_at_the_top_gives_its_value() -> None:
+def test_an_in_block_at_the_top_level_outputs_its_value() -> None:
     builder = DiagramBuilder("part")
     builder.output("y", builder.add("gain", Gain(gain=3.0), builder.input("u", value=[1.0, 2.0])))
     result = ab.simulate(builder.build(), stop_time=1.0)
@@ -166,7 +167,7 @@ def test_an_in_block_at_the_top_gives_its_value() -> None:
         ab.simulate(odd.build())
 
 
-def test_ports_stand_in_the_order_of_their_numbers() -> None:
+def test_ports_are_ordered_by_their_numbers() -> None:
     builder = DiagramBuilder("inner")
     builder.output("sum", builder.add("s", Sum(signs="+-"), builder.input("b"), builder.input("a")))
     block = Subsystem(diagram=builder.build())
@@ -178,7 +179,7 @@ def test_ports_stand_in_the_order_of_their_numbers() -> None:
         twice.build()
 
 
-def test_dimensions_of_ends_are_checked() -> None:
+def test_wrong_dimensions_of_ports_are_refused() -> None:
     with pytest.raises(InputError, match=r"the dimensions are \[0.0\]"):
         Inport(dimensions=0)
     builder = DiagramBuilder("top")
@@ -188,7 +189,7 @@ def test_dimensions_of_ends_are_checked() -> None:
         builder.build()
 
 
-def test_errors_inside_name_the_path() -> None:
+def test_errors_in_a_subsystem_name_the_path() -> None:
     builder = DiagramBuilder("top")
     inner = DiagramBuilder("inner")
     inner.add("scope", Scope(inputs=2), inner.input("u"))
@@ -206,7 +207,7 @@ def test_errors_inside_name_the_path() -> None:
         builder.build()
 
 
-def test_a_loop_through_levels_is_told_with_its_paths() -> None:
+def test_an_algebraic_loop_across_levels_is_reported_with_its_paths() -> None:
     builder = DiagramBuilder("top")
     with builder.subsystem("sub") as sub:
         sub.output("y", sub.add("one", Gain(gain=1.0), sub.input("u")))
@@ -215,7 +216,7 @@ def test_a_loop_through_levels_is_told_with_its_paths() -> None:
         trace_diagram(builder.build())
 
 
-def test_wires_in_a_circle_without_a_block_are_refused() -> None:
+def test_a_cycle_of_connections_without_a_block_is_refused() -> None:
     builder = DiagramBuilder("top")
     with builder.subsystem("sub") as sub:
         sub.output("y", sub.input("u"))
@@ -235,7 +236,7 @@ def nested(depth: int) -> Diagram:
     return diagram
 
 
-def test_a_hundred_levels_work_and_more_are_refused() -> None:
+def test_a_hundred_levels_are_accepted_and_more_are_refused() -> None:
     builder = DiagramBuilder("top")
     builder.add("sub", Subsystem(diagram=nested(100)), builder.add("c", Constant(value=3.0)))
     assert ab.simulate(builder.build(), stop_time=1.0)["sub"][-1] == 6.0
@@ -248,7 +249,7 @@ def test_a_hundred_levels_work_and_more_are_refused() -> None:
 
 
 def test_thousands_of_blocks_in_fifty_levels_are_flattened() -> None:
-    """50 chains of 60 blocks, each one level deeper than the last: 3000 blocks, 50 deep."""
+    """50 chains of 60 blocks, each one level deeper than the one before: 3000 blocks in 50 levels."""
     builder = DiagramBuilder("inner")
     builder.output("y", builder.input("u"))
     diagram = builder.build()
@@ -276,13 +277,13 @@ def with_goto(visibility: str, place: Callable[[DiagramBuilder, DiagramBuilder],
 
 
 @pytest.mark.parametrize("visibility", ["local", "scoped", "global"])
-def test_a_tag_is_a_wire(visibility: str) -> None:
+def test_a_tag_is_equivalent_to_a_connection(visibility: str) -> None:
     result = ab.simulate(with_goto(visibility, lambda top, sub: top))
     assert np.array_equal(result["gain/y"], 2.0 * result["sine/y"])
     assert result.resolve("from/y") == result.resolve("goto/u") == "sine/y"
 
 
-def test_scoped_and_global_tags_are_known_below() -> None:
+def test_scoped_and_global_tags_are_visible_in_subsystems() -> None:
     for visibility in ("scoped", "global"):
         result = ab.simulate(with_goto(visibility, lambda top, sub: sub))
         assert np.array_equal(result["sub/gain/y"], 2.0 * result["sine/y"])
@@ -292,7 +293,7 @@ def test_scoped_and_global_tags_are_known_below() -> None:
     assert "make the visibility of 'goto' scoped or global" in str(caught.value)
 
 
-def test_a_global_tag_is_known_beside_and_above() -> None:
+def test_a_global_tag_in_a_subsystem_is_visible_at_the_top_level() -> None:
     builder = DiagramBuilder("top")
     with builder.subsystem("sub") as sub:
         sub.add("goto", Goto(tag="speed", visibility="global"), sub.add("sine", SineWave()))
@@ -301,7 +302,7 @@ def test_a_global_tag_is_known_beside_and_above() -> None:
     assert np.array_equal(result["gain/y"], 2.0 * result["sub/sine/y"])
 
 
-def test_tags_that_lead_nowhere_or_are_sent_twice_are_refused() -> None:
+def test_tags_that_are_sent_twice_or_invalid_are_refused() -> None:
     builder = DiagramBuilder("top")
     sine = builder.add("sine", SineWave())
     builder.add("one", Goto(tag="A"), sine)
@@ -329,7 +330,7 @@ def with_bus(element: str = "motor.speed") -> DiagramBuilder:
     return builder
 
 
-def test_a_bus_goes_through_a_subsystem_and_is_taken_apart() -> None:
+def test_elements_of_a_bus_through_a_subsystem_can_be_selected() -> None:
     builder = with_bus()
     chosen = builder.add("chosen", BusSelector(elements="motor"), builder["sub"]["same"])
     builder.add("torque_again", BusSelector(elements="torque"), chosen)
@@ -340,7 +341,7 @@ def test_a_bus_goes_through_a_subsystem_and_is_taken_apart() -> None:
     assert result.resolve("sub/bus.motor.torque") == "torque/y"
 
 
-def test_elements_of_a_bus_are_replaced() -> None:
+def test_bus_assignment_replaces_elements() -> None:
     builder = with_bus()
     changed = builder.add(
         "change",
@@ -353,7 +354,7 @@ def test_elements_of_a_bus_are_replaced() -> None:
     assert ab.simulate(builder.build(), stop_time=1.0)["sum"][-1] == 9.0
 
 
-def test_elements_of_the_same_name_have_longer_port_names() -> None:
+def test_ports_of_elements_with_equal_names_contain_the_parent_name() -> None:
     block = BusSelector(elements="left.speed, right.speed, torque")
     assert [port.name for port in block.output_ports()] == ["left_speed", "right_speed", "torque"]
 
@@ -375,7 +376,7 @@ def test_a_sink_shows_all_signals_of_a_bus() -> None:
     )
 
 
-def test_wrong_uses_of_buses_are_refused() -> None:
+def test_a_bus_at_a_scalar_port_and_invalid_elements_are_refused() -> None:
     builder = with_bus()
     builder.add("gain2", Gain(), builder["sub"]["same"])
     with pytest.raises(DiagramError, match="input 'u' receives a bus with the elements motor, other"):
@@ -393,7 +394,7 @@ def test_wrong_uses_of_buses_are_refused() -> None:
         BusAssignment(elements="bus")
 
 
-def test_names_of_blocks_may_be_the_same_in_different_subsystems() -> None:
+def test_different_subsystems_may_have_blocks_of_the_same_name() -> None:
     builder = DiagramBuilder("top")
     for name, gain in (("one", 2.0), ("two", 3.0)):
         with builder.subsystem(name) as sub:

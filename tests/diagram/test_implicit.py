@@ -1,4 +1,5 @@
-"""Algebraic loops: linear ones are solved exactly, others become equations, impossible ones are refused."""
+"""Algebraic loops: linear loops are solved symbolically, nonlinear loops become implicit equations, singular
+loops are refused."""
 
 from __future__ import annotations
 
@@ -36,7 +37,7 @@ def feedback(builder: DiagramBuilder, gain: float, source: BlockHandle, signs: s
     return total
 
 
-def test_u_is_one_minus_u() -> None:
+def test_a_scalar_linear_loop_is_solved() -> None:
     builder = DiagramBuilder("d")
     feedback(builder, 1.0, builder.add("one", Constant()), "+-")
     system = trace_diagram(builder.build())
@@ -44,7 +45,7 @@ def test_u_is_one_minus_u() -> None:
     assert float(signals_at(system)["sum/y"]) == 0.5
 
 
-def test_a_linear_loop_of_vectors_with_the_time() -> None:
+def test_a_linear_loop_of_vectors_that_depends_on_time() -> None:
     """y = t c - M y, so y = (1 + M)^-1 t c."""
     M, c = np.array([[0.5, 2.0, 0.0], [-1.0, 0.3, 0.7], [0.2, 0.0, 4.0]]), np.array([1.0, -2.0, 3.0])
     builder = DiagramBuilder("d")
@@ -55,12 +56,12 @@ def test_a_linear_loop_of_vectors_with_the_time() -> None:
     system = trace_diagram(builder.build())
     assert system.algebraic.size == 0
     expected = np.linalg.solve(np.eye(3) + M, c)
-    # some ten roundings, with the condition of 1 + M
+    # about ten rounding errors, times the condition number of 1 + M
     assert signals_at(system, 2.0)["y/y"] == pytest.approx(2.0 * expected, rel=1e-14)
     assert signals_at(system, 2.0)["rate/y"] == pytest.approx(expected, rel=1e-14)
 
 
-def test_two_entangled_loops_without_a_pivot() -> None:
+def test_two_coupled_loops_with_a_zero_diagonal() -> None:
     """a = 1 + a + b and b = 2 + a: the diagonal of the equations is zero."""
     builder = DiagramBuilder("d")
     one, two = builder.add("one", Constant()), builder.add("two", Constant(value=2.0))
@@ -73,7 +74,7 @@ def test_two_entangled_loops_without_a_pivot() -> None:
     assert float(signals["b/y"]) == -1.0
 
 
-def test_u_is_cos_u_leaves_an_equation_with_its_exact_derivative() -> None:
+def test_a_nonlinear_loop_becomes_an_equation_with_its_exact_jacobian() -> None:
     builder = DiagramBuilder("d")
     u = builder.add("u", Trigonometry(function="cos"))
     builder.connect(u, u)
@@ -89,7 +90,7 @@ def test_u_is_cos_u_leaves_an_equation_with_its_exact_derivative() -> None:
     assert float(signals_at(system, w=w)["u/y"]) == pytest.approx(0.7390851332151607, abs=1e-15)
 
 
-def test_a_linear_loop_behind_one_that_is_not() -> None:
+def test_a_linear_loop_after_a_nonlinear_one() -> None:
     """v = w + v / 2 with w = cos w: v = 2 w."""
     builder = DiagramBuilder("d")
     w = builder.add("w", Trigonometry(function="cos"))
@@ -97,11 +98,11 @@ def test_a_linear_loop_behind_one_that_is_not() -> None:
     feedback(builder, 0.5, w)
     system = trace_diagram(builder.build())
     assert system.algebraic.size == 1
-    # solved over the unknown, which stands for w or for cos(w)
+    # the unknown is either w or cos(w)
     assert float(signals_at(system, w=[0.25])["sum/y"]) in (0.5, 2.0 * np.cos(0.25))
 
 
-def test_a_loop_without_solution_is_named_block_by_block() -> None:
+def test_a_loop_without_solution_is_refused_with_the_names_of_its_signals() -> None:
     builder = DiagramBuilder("d")
     feedback(builder, 1.0, builder.add("one", Constant()))
     with pytest.raises(AlgebraicLoopError, match="algebraic loop with no solution: ") as caught:
@@ -110,7 +111,7 @@ def test_a_loop_without_solution_is_named_block_by_block() -> None:
     assert "loops whose gain is not 1" in str(caught.value)
 
 
-def test_a_loop_with_infinitely_many_solutions_is_named() -> None:
+def test_a_loop_with_infinitely_many_solutions_is_refused() -> None:
     builder = DiagramBuilder("d")
     u = builder.add("u", Gain())
     builder.connect(u, u)
@@ -118,14 +119,14 @@ def test_a_loop_with_infinitely_many_solutions_is_named() -> None:
         trace_diagram(builder.build())
 
 
-def test_a_singular_loop_that_moves_has_one_or_the_other() -> None:
+def test_a_singular_loop_that_depends_on_time_is_refused() -> None:
     builder = DiagramBuilder("d")
     feedback(builder, 1.0, builder.add("clock", Clock()))
     with pytest.raises(AlgebraicLoopError, match="with no solution or infinitely many: "):
         trace_diagram(builder.build())
 
 
-def test_a_loop_feeds_a_state() -> None:
+def test_a_solved_loop_is_the_derivative_of_a_state() -> None:
     """x' = u with u = -x - u, so x' = -x / 2."""
     builder = DiagramBuilder("d")
     x = builder.add("x", Integrator(initial=1.0))
@@ -136,7 +137,7 @@ def test_a_loop_feeds_a_state() -> None:
     assert system.derivative(0.0, [3.0], (), (), system.parameter_values)[0].tolist() == [-1.5]
 
 
-def test_a_linear_loop_is_solved_at_a_tick_with_what_is_fresh() -> None:
+def test_a_linear_loop_is_solved_at_a_tick_with_the_new_samples() -> None:
     """s = hold(t) - s, sampled again: at the tick the new s is t / 2."""
     builder = DiagramBuilder("d")
     hold = builder.add("hold", ZeroOrderHold(sample_time=0.5), builder.add("t", Clock()))
@@ -147,7 +148,7 @@ def test_a_linear_loop_is_solved_at_a_tick_with_what_is_fresh() -> None:
     assert system.discrete.unpack(z)["again/y"] == 0.75
 
 
-def test_a_nonlinear_loop_that_is_moved_and_sampled_by_one_tick_is_refused() -> None:
+def test_a_nonlinear_loop_between_blocks_of_the_same_clock_is_refused() -> None:
     builder = DiagramBuilder("d")
     hold = builder.add("hold", ZeroOrderHold(sample_time=0.5), builder.add("t", Clock()))
     total = builder.add("sum", Sum(), hold)
@@ -172,7 +173,7 @@ def test_a_nonlinear_loop_of_states_may_be_sampled() -> None:
     assert z[0] == pytest.approx(1.5 + np.cos(z[0]), rel=1e-15)
 
 
-def test_sampled_blocks_that_feed_through_need_a_delay_in_their_loop() -> None:
+def test_a_loop_of_sampled_blocks_with_feedthrough_is_refused() -> None:
     builder = DiagramBuilder("d")
     total = builder.add("sum", Sum(), builder.add("one", Constant()))
     builder.connect(builder.add("hold", ZeroOrderHold(sample_time=1.0), total), total["u2"])
@@ -182,7 +183,7 @@ def test_sampled_blocks_that_feed_through_need_a_delay_in_their_loop() -> None:
 
 
 def test_a_unit_delay_breaks_a_loop() -> None:
-    """y(k) = 1 + y(k-1) counts."""
+    """y(k) = 1 + y(k-1) counts the ticks."""
     builder = DiagramBuilder("d")
     total = builder.add("sum", Sum(), builder.add("one", Constant()))
     builder.connect(builder.add("delay", UnitDelay(sample_time=1.0), total), total["u2"])

@@ -1,4 +1,4 @@
-"""Evaluation order: every loop is printed, every chain is walked without recursion."""
+"""Evaluation order: detection of algebraic loops, and long chains without recursion."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from armblocks.errors import AlgebraicLoopError
 
 
 def loops_of(builder: DiagramBuilder) -> dict[str, tuple[str, ...]]:
-    """The loops of the flow, by the signal at which they are cut."""
+    """Return the algebraic loops of the flow, by the signal at which each is cut."""
     model = diagram_model(builder.build())
     return {loop[-1]: loop for loop in model.flow_order.loops.values()}
 
 
-def test_a_loop_without_a_state_is_known_in_the_direction_of_its_signals() -> None:
+def test_an_algebraic_loop_lists_its_signals_in_evaluation_order() -> None:
     builder = DiagramBuilder("d")
     total = builder.add("sum", Sum(signs="+-"), builder.add("one", Constant()))
     half = builder.add("half", Gain(gain=0.5), total)
@@ -39,14 +39,14 @@ def test_a_loop_without_a_state_is_known_in_the_direction_of_its_signals() -> No
     assert loop[place:] + loop[:place] == ("sum/y", "half/y", "third/y")
 
 
-def test_a_gain_of_zero_does_not_hide_a_loop() -> None:
+def test_a_loop_with_a_gain_of_zero_is_detected() -> None:
     builder = DiagramBuilder("d")
     gain = builder.add("gain", Gain(gain=0.0))
     builder.connect(gain, gain)
     assert loops_of(builder) == {"gain/y": ("gain/y",)}
 
 
-def test_an_integrator_breaks_a_loop_and_a_strictly_proper_filter_does() -> None:
+def test_an_integrator_or_a_strictly_proper_filter_breaks_a_loop() -> None:
     for block in (Integrator(), TransferFunction(), StateSpace()):
         builder = DiagramBuilder("d")
         x = builder.add("x", block)
@@ -57,14 +57,14 @@ def test_an_integrator_breaks_a_loop_and_a_strictly_proper_filter_does() -> None
 @pytest.mark.parametrize(
     "block", [TransferFunction(numerator=(1.0, 0.0)), StateSpace(D=[[1.0]])], ids=["filter", "state space"]
 )
-def test_feedthrough_closes_a_loop(block: TransferFunction | StateSpace) -> None:
+def test_a_block_with_feedthrough_is_part_of_an_algebraic_loop(block: TransferFunction | StateSpace) -> None:
     builder = DiagramBuilder("d")
     x = builder.add("x", block)
     builder.connect(builder.add("back", Gain(gain=-1.0), x), x)
     assert {frozenset(loop) for loop in loops_of(builder).values()} == {frozenset({"x/y", "back/y"})}
 
 
-def test_a_derivative_of_itself_is_a_loop() -> None:
+def test_a_derivative_of_its_own_output_is_refused() -> None:
     builder = DiagramBuilder("d")
     rate = builder.add("rate", Derivative())
     builder.connect(rate, rate)
@@ -72,7 +72,7 @@ def test_a_derivative_of_itself_is_a_loop() -> None:
         builder.build()
 
 
-def test_a_derivative_in_an_algebraic_loop_is_a_loop() -> None:
+def test_a_derivative_in_an_algebraic_loop_is_refused() -> None:
     builder = DiagramBuilder("d")
     total = builder.add("sum", Sum(), builder.add("clock", Clock()))
     builder.connect(builder.add("rate", Derivative(), total), total["u2"])
@@ -80,15 +80,15 @@ def test_a_derivative_in_an_algebraic_loop_is_a_loop() -> None:
         builder.build()
 
 
-def test_a_state_whose_rate_needs_its_own_rate_is_a_loop() -> None:
-    # x' = d2/dt2 x / 2, where the orders would rise for ever
+def test_a_state_derivative_that_depends_on_its_second_derivative_is_refused() -> None:
+    # x' = d2/dt2 x / 2: the order of the derivatives would grow without limit
     builder = DiagramBuilder("d")
     x = builder.add("x", Integrator())
     second = builder.add("second", Derivative(), builder.add("first", Derivative(), x))
     builder.connect(builder.add("back", Gain(gain=0.5), second), x)
     with pytest.raises(AlgebraicLoopError, match=r"diagram 'd': algebraic loop: .*every loop passes through"):
         builder.build()
-    # x' = t + x' / 2: the same order, so x' = 2 t
+    # x' = t + x' / 2 has derivatives of the same order and the solution x' = 2 t
     builder = DiagramBuilder("d")
     x = builder.add("x", Integrator())
     half = builder.add("half", Gain(gain=0.5), builder.add("rate", Derivative(), x))
@@ -97,7 +97,7 @@ def test_a_state_whose_rate_needs_its_own_rate_is_a_loop() -> None:
     assert system.derivative(3.0, [0.0], (), (), system.parameter_values)[0].tolist() == [6.0]
 
 
-def test_higher_derivatives_of_a_state_are_no_loop() -> None:
+def test_higher_derivatives_of_a_state_are_not_a_loop() -> None:
     builder = DiagramBuilder("d")
     x = builder.add("x", Integrator(initial=2.0))
     builder.connect(builder.add("back", Gain(gain=-3.0), x), x)
@@ -110,12 +110,12 @@ def test_higher_derivatives_of_a_state_are_no_loop() -> None:
     assert [float(signals[f"rate{k}/y"]) for k in range(4)] == [-6.0, 18.0, -54.0, 162.0]
 
 
-def test_a_chain_beyond_the_limit_of_recursion_in_the_worst_order() -> None:
+def test_a_chain_longer_than_the_recursion_limit_is_ordered() -> None:
     count = 2 * sys.getrecursionlimit()
     builder = DiagramBuilder("chain")
     last = builder.add("source", Constant(value=0.0))
     for k in range(count):
-        # names fall, so that the sorted order is the reverse of the order of evaluation
+        # descending names: the sorted order is the reverse of the evaluation order
         last = builder.add(f"{count - k:05d}", Gain(gain=1.0), last)
     system = trace_diagram(builder.build())
     assert system.signals_layout.names[0] == "source/y"

@@ -1,4 +1,4 @@
-"""Passes: each resolves one kind of virtual block, and says which blocks of the user its blocks come from."""
+"""Passes: each resolves one kind of virtual block and records the original block of each added block."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from armblocks.diagram.passes.netlist import Netlist, Replacement, Replacements
 
 @dataclass(frozen=True, kw_only=True)
 class Junction(Block):
-    """A virtual block that a pass of this test resolves: both outputs are the input."""
+    """A virtual block that a pass of this test resolves: both outputs equal the input."""
 
     title: ClassVar[str] = "Junction"
     virtual: ClassVar[bool] = True
@@ -55,7 +55,7 @@ def resolve_junctions(net: Netlist) -> Netlist:
     return net.with_replaced(replaced)
 
 
-def test_a_pass_is_one_function_and_its_place_in_the_order(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_new_pass_needs_one_function_and_its_place_in_the_order(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(order, "PASSES", (resolve_junctions, *order.PASSES))
     builder = DiagramBuilder("junctions")
     with builder.subsystem("inside", builder.add("sine", SineWave())) as inside:
@@ -69,7 +69,7 @@ def test_a_pass_is_one_function_and_its_place_in_the_order(monkeypatch: pytest.M
 
 
 def with_added_blocks() -> Diagram:
-    """Controls, held and merged outputs, and copies of a Switch for a bus."""
+    """A diagram with control ports, held and merged outputs, and a Switch that is copied for a bus."""
     builder = DiagramBuilder("added")
     sine = builder.add("sine", SineWave())
     decision = builder.add("if", If(), sine)
@@ -85,7 +85,7 @@ def with_added_blocks() -> Diagram:
     return builder.build()
 
 
-def test_every_flat_block_comes_from_a_block_of_the_hierarchy() -> None:
+def test_every_flat_block_has_an_original_block_in_the_hierarchy() -> None:
     form = flatten_hierarchy(with_added_blocks())
     assert not any(block.virtual for block in form.diagram.blocks.values())
     drawn = {

@@ -1,4 +1,4 @@
-"""Sample times: stated, inherited through wires, and refused where they do not fit."""
+"""Sample times: explicit, inherited through connections, and refused where they are incompatible."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def clocks_of(diagram: Diagram) -> dict[str, SampleClock]:
     return {name: sampling.clocks[clock] for name, clock in sampling.clock_of.items()}
 
 
-def test_a_stated_sample_time_is_taken_and_inherited_through_blocks_that_calculate() -> None:
+def test_an_explicit_sample_time_is_inherited_through_blocks_without_sample_time() -> None:
     builder = DiagramBuilder("d")
     hold = builder.add("hold", ZeroOrderHold(sample_time=(0.2, 0.05)), builder.add("t", Clock()))
     gain = builder.add("gain", Gain(), hold)
@@ -43,8 +43,9 @@ def test_a_stated_sample_time_is_taken_and_inherited_through_blocks_that_calcula
     assert set(clocks) == {"hold", "delay", "again"}
 
 
-def test_answers_of_comparisons_change_at_instants_and_cause_no_further_events() -> None:
-    """A block that only they feed asks its conditions directly; on a loop, it has modes."""
+def test_blocks_fed_by_comparisons_have_no_guards_except_in_a_loop() -> None:
+    """Results of comparisons change only at events. A block with only such inputs needs no modes, except in a
+    loop."""
     builder = DiagramBuilder("d")
     moving = builder.add("moving", CompareToZero(), builder.add("sine", SineWave()))
     gate = builder.add("gate", LogicalOperator(), moving, builder.add("one", Constant()))
@@ -56,7 +57,7 @@ def test_answers_of_comparisons_change_at_instants_and_cause_no_further_events()
 
 
 @pytest.mark.parametrize(("fastest", "other"), [(0.1, 0.3), (1.0 / 6.0, 1.0 / 3.0), (0.1 / 3.0, 0.7)])
-def test_the_fastest_is_inherited_where_periods_are_multiples_but_for_rounding(
+def test_the_shortest_of_periods_that_are_rounded_multiples_is_inherited(
     fastest: float, other: float
 ) -> None:
     builder = DiagramBuilder("d")
@@ -68,14 +69,14 @@ def test_the_fastest_is_inherited_where_periods_are_multiples_but_for_rounding(
     assert trace_diagram(diagram).clocks == (SampleClock(fastest), SampleClock(other))
 
 
-def test_constants_leave_the_choice_to_what_they_feed() -> None:
+def test_a_block_fed_by_constants_inherits_the_sample_time_of_its_target() -> None:
     builder = DiagramBuilder("d")
     delay = builder.add("delay", UnitDelay(), builder.add("one", Constant()))
     builder.add("hold", ZeroOrderHold(sample_time=0.5), builder.add("gain", Gain(), delay))
     assert clocks_of(builder.build())["delay"] == SampleClock(0.5)
 
 
-def test_a_loop_of_delays_inherits() -> None:
+def test_delays_in_a_loop_inherit_their_sample_time() -> None:
     builder = DiagramBuilder("d")
     mux = builder.add("mux", Mux(), builder.add("count", CounterLimited(sample_time=0.5)))
     first = builder.add("first", UnitDelay(initial=[0.0, 0.0]), mux)
@@ -89,7 +90,9 @@ def test_a_loop_of_delays_inherits() -> None:
 
 
 @pytest.mark.parametrize("source", [Clock(), Step(), Integrator()], ids=["clock", "step", "state"])
-def test_what_moves_by_itself_gives_no_sample_time(source: Clock | Step | Integrator) -> None:
+def test_a_sample_time_cannot_be_inherited_from_a_continuous_signal(
+    source: Clock | Step | Integrator,
+) -> None:
     builder = DiagramBuilder("d")
     inputs = [builder.add("one", Constant())] if source.input_ports() else []
     gain = builder.add("gain", Gain(), builder.add("source", source, *inputs))
@@ -98,14 +101,14 @@ def test_what_moves_by_itself_gives_no_sample_time(source: Clock | Step | Integr
         builder.build()
 
 
-def test_a_sample_time_that_nothing_gives_is_asked_for() -> None:
+def test_a_missing_sample_time_is_refused() -> None:
     builder = DiagramBuilder("d")
     builder.add("delay", UnitDelay(), builder.add("one", Constant()))
     with pytest.raises(DiagramError, match=r"none of them is sampled.*give the block a sample_time"):
         builder.build()
 
 
-def test_two_that_do_not_fit_are_named() -> None:
+def test_incompatible_sample_times_are_refused_with_both_blocks() -> None:
     builder = DiagramBuilder("d")
     a = builder.add("a", CounterLimited(sample_time=0.2))
     b = builder.add("b", CounterLimited(sample_time=0.5))
@@ -121,7 +124,7 @@ def test_two_that_do_not_fit_are_named() -> None:
 
 
 @pytest.mark.parametrize("sample_time", [0.0, -2.0, (0.1, 0.1), (0.1, -0.1), (0.1, 0.0, 0.0), (-1.0, 0.1)])
-def test_a_sample_time_that_is_none_is_refused(sample_time: object) -> None:
+def test_an_invalid_sample_time_of_a_block_is_refused(sample_time: object) -> None:
     builder = DiagramBuilder("d")
     builder.add("count", CounterLimited(sample_time=sample_time))  # pyright: ignore
     with pytest.raises(DiagramError, match=r"block 'count', CounterLimited\.sample_time: the sample time is"):
@@ -129,6 +132,6 @@ def test_a_sample_time_that_is_none_is_refused(sample_time: object) -> None:
 
 
 @pytest.mark.parametrize(("period", "offset"), [(0.0, 0.0), (float("inf"), 0.0), (1.0, 1.0), (1.0, -0.1)])
-def test_a_clock_that_cannot_tick_is_refused(period: float, offset: float) -> None:
+def test_an_invalid_period_or_offset_of_a_clock_is_refused(period: float, offset: float) -> None:
     with pytest.raises(InputError, match=r"a clock has the period .* Allowed: a finite period > 0"):
         SampleClock(period, offset)

@@ -1,4 +1,4 @@
-"""Shape inference, also in loops; errors name both ends of a connection."""
+"""Shape inference, including loops; errors name both ends of a connection."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from armblocks.diagram import DiagramBuilder, broadcast, infer_shapes
 from armblocks.errors import DiagramError, InputError
 
 
-def test_scalars_spread_over_anything() -> None:
+def test_scalars_are_broadcast_to_any_shape() -> None:
     assert broadcast({"a": (), "b": (3,)}) == (3,)
     assert broadcast({"a": (2, 2), "b": (), "c": (1,)}) == (2, 2)
     assert broadcast({"a": (), "b": (1,)}) == (1,)
@@ -30,7 +30,7 @@ def test_scalars_spread_over_anything() -> None:
         broadcast({"a": (3,), "b": (), "c": (2,)})
 
 
-def test_an_integrator_in_a_loop_becomes_as_wide_as_the_loop() -> None:
+def test_an_integrator_takes_the_shape_of_its_loop() -> None:
     builder = DiagramBuilder("d")
     x = builder.add("x", Integrator())
     spring = builder.add("spring", Gain(gain=-2.0), x)
@@ -45,14 +45,14 @@ def test_an_integrator_in_a_loop_becomes_as_wide_as_the_loop() -> None:
     }
 
 
-def test_a_matrix_in_a_loop_tells_the_width() -> None:
+def test_a_matrix_gain_in_a_loop_determines_the_shape() -> None:
     builder = DiagramBuilder("d")
     x = builder.add("x", Integrator(initial=0.0))
     builder.connect(builder.add("A", MatrixGain(gain=[[0.0, 1.0], [-1.0, 0.0]]), x), x)
     assert infer_shapes(builder.build()).inputs["A"] == {"u": (2,)}
 
 
-def test_one_element_fits_a_scalar_port_and_the_other_way_round() -> None:
+def test_scalars_and_vectors_of_one_element_are_interchangeable() -> None:
     builder = DiagramBuilder("d")
     one = builder.add("one", Constant(value=[1.0]))
     builder.add("filter", TransferFunction(), one)
@@ -60,7 +60,7 @@ def test_one_element_fits_a_scalar_port_and_the_other_way_round() -> None:
     assert infer_shapes(builder.build()).outputs["matrix"] == {"y": (1,)}
 
 
-def test_both_ends_of_a_mismatch_are_shown() -> None:
+def test_the_error_about_a_shape_mismatch_names_both_ports() -> None:
     builder = DiagramBuilder("d")
     builder.add("xyz", T2xyz(), builder.add("pose", Constant(value=[1.0, 2.0])))
     with pytest.raises(
@@ -69,7 +69,7 @@ def test_both_ends_of_a_mismatch_are_shown() -> None:
         builder.build()
 
 
-def test_inputs_that_do_not_fit_each_other_name_what_feeds_them() -> None:
+def test_the_error_about_inconsistent_inputs_names_their_sources() -> None:
     builder = DiagramBuilder("d")
     two, three = builder.add("two", Constant(value=[1, 2])), builder.add("three", SineWave(bias=[1, 2, 3]))
     builder.add("sum", Sum(), two, three)
@@ -81,7 +81,7 @@ def test_inputs_that_do_not_fit_each_other_name_what_feeds_them() -> None:
         builder.build()
 
 
-def test_routing_refuses_what_it_cannot_route() -> None:
+def test_mux_and_demux_refuse_unsuitable_shapes() -> None:
     builder = DiagramBuilder("d")
     builder.add("mux", Mux(), *[builder.add(name, Constant(value=[[1.0]])) for name in "ab"])
     with pytest.raises(DiagramError, match=r"'u1' has shape \(1, 1\). Allowed: scalars and vectors"):
@@ -100,7 +100,7 @@ def test_matrices_that_cannot_be_multiplied_are_refused() -> None:
         builder.build()
 
 
-def test_a_loop_that_widens_itself_without_end_is_refused() -> None:
+def test_a_loop_whose_width_grows_without_limit_is_refused() -> None:
     builder = DiagramBuilder("d")
     x = builder.add("x", Integrator())
     builder.connect(builder.add("mux", Mux(), x, builder.add("one", Constant())), x)

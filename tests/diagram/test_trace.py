@@ -1,4 +1,4 @@
-"""A diagram as equations: paths, aliases, exact derivatives, and the cost of growing."""
+"""Tracing a diagram to equations: paths, aliases, exact derivatives, units, and cost."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def test_paths_and_aliases() -> None:
     assert system.parameter_values.tolist() == [-9.81, 10.0, 0.0]
 
 
-def test_states_and_parameters_meet_in_the_equations() -> None:
+def test_derivatives_and_initial_states_depend_on_the_parameters() -> None:
     system = trace_diagram(falling())
     (rate,) = system.derivative(0.0, [1.0, 2.0], (), (), system.parameter_values)
     assert rate.tolist() == [2.0, -9.81]
@@ -80,7 +80,7 @@ def test_states_and_parameters_meet_in_the_equations() -> None:
     assert system.breakpoints(system.parameter_values)[0].shape == (0,)
 
 
-def test_signals_stand_in_evaluation_order() -> None:
+def test_signals_are_listed_in_evaluation_order() -> None:
     builder = DiagramBuilder("d")
     z = builder.add("z", Clock())
     y = builder.add("y", Gain(gain=2.0), z)
@@ -88,7 +88,7 @@ def test_signals_stand_in_evaluation_order() -> None:
     assert trace_diagram(builder.build()).signals_layout.names == ("z/y", "y/y", "x/y")
 
 
-def test_matrices_lie_row_by_row_from_parameter_to_signal() -> None:
+def test_matrices_are_stored_in_row_major_order() -> None:
     builder = DiagramBuilder("d")
     matrix = [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]
     builder.add("double", Gain(gain=2.0), builder.add("matrix", Constant(value=matrix)))
@@ -97,7 +97,7 @@ def test_matrices_lie_row_by_row_from_parameter_to_signal() -> None:
     assert np.array_equal(signals_at(system, 0.0)["double/y"], 2 * np.array(matrix))
 
 
-def test_breakpoints_follow_their_parameters() -> None:
+def test_breakpoints_depend_on_their_parameters() -> None:
     builder = DiagramBuilder("d")
     builder.add("step", Step(time=2.0, final=[1.0, 2.0]))
     system = trace_diagram(builder.build())
@@ -114,7 +114,7 @@ def permuted(
     return trace_diagram(builder.build())
 
 
-def test_the_order_of_building_changes_no_signal() -> None:
+def test_the_order_of_adding_blocks_does_not_change_the_signals() -> None:
     blocks: list[tuple[str, Block]] = [
         ("sine", SineWave(frequency=3.0)),
         ("control", PID(P=2.0, I=0.5, D=0.1)),
@@ -147,7 +147,7 @@ def test_the_order_of_building_changes_no_signal() -> None:
 # -- the exact derivative ----------------------------------------------------------------------------------
 
 
-def test_the_derivative_of_a_trajectory_is_its_speed_to_the_last_bit() -> None:
+def test_the_derivative_of_a_trajectory_equals_its_speed_bit_for_bit() -> None:
     builder = DiagramBuilder("d")
     traj = builder.add("traj", JTraj(q0=[0, 0, 0, 0], qf=[3.14, 0, 1.57, 0]))
     speed = builder.add("speed", Derivative(), traj["q"])
@@ -159,8 +159,8 @@ def test_the_derivative_of_a_trajectory_is_its_speed_to_the_last_bit() -> None:
         assert np.array_equal(signals["acceleration/y"], signals["traj/qdd"])
 
 
-def test_the_derivative_goes_through_blocks_and_states() -> None:
-    """y = x^2 sin(t), x' = -3x + t: y' and y'' against the closed form by the chain rule."""
+def test_the_derivative_uses_the_chain_rule_through_blocks_and_states() -> None:
+    """y = x^2 sin(t), x' = -3x + t: y' and y'' are compared with their closed forms."""
     builder = DiagramBuilder("d")
     clock = builder.add("clock", Clock())
     x = builder.add("x", Integrator(initial=1.0))
@@ -176,12 +176,12 @@ def test_the_derivative_goes_through_blocks_and_states() -> None:
         signals = signals_at(system, t, [s])
         one = 2 * s * d * np.sin(t) + s**2 * np.cos(t)
         two = (2 * d * d + 2 * s * dd) * np.sin(t) + 4 * s * d * np.cos(t) - s**2 * np.sin(t)
-        # a handful of roundings each
+        # a few rounding errors each
         assert signals["first/y"] == pytest.approx(one, rel=1e-14, abs=1e-14)
         assert signals["second/y"] == pytest.approx(two, rel=1e-14, abs=1e-14)
 
 
-def test_the_derivative_of_a_vector_goes_element_by_element() -> None:
+def test_the_derivative_of_a_vector_is_taken_by_element() -> None:
     builder = DiagramBuilder("d")
     clock = builder.add("clock", Clock())
     sine = builder.add("sine", Trigonometry(function="sin"), clock)
@@ -190,15 +190,15 @@ def test_the_derivative_of_a_vector_goes_element_by_element() -> None:
     assert signals_at(trace_diagram(builder.build()), 0.4)["rate/y"].tolist() == [np.cos(0.4), 1.0]
 
 
-def test_the_derivative_ignores_a_jump() -> None:
+def test_the_derivative_of_a_step_is_zero() -> None:
     builder = DiagramBuilder("d")
     builder.add("rate", Derivative(), builder.add("step", Step(time=1.0)))
     system = trace_diagram(builder.build())
     assert [float(signals_at(system, t)["rate/y"]) for t in (0.0, 1.0, 2.0)] == [0.0, 0.0, 0.0]
 
 
-def test_a_derivative_may_feed_a_state() -> None:
-    """x' = d/dt sin(t), so x follows the sine."""
+def test_a_derivative_may_be_the_input_of_an_integrator() -> None:
+    """x' = d/dt sin(t), so that x is the sine."""
     builder = DiagramBuilder("d")
     rate = builder.add("rate", Derivative(), builder.add("sine", SineWave(frequency=2.0)))
     builder.add("x", Integrator(), rate)
@@ -210,7 +210,7 @@ def test_a_derivative_may_feed_a_state() -> None:
 # -- units -------------------------------------------------------------------------------------------------
 
 
-def test_units_pass_through_blocks() -> None:
+def test_units_are_propagated_through_blocks() -> None:
     builder = DiagramBuilder("d")
     clock = builder.add("clock", Clock())
     traj = builder.add("traj", JTraj())
@@ -225,7 +225,7 @@ def test_units_pass_through_blocks() -> None:
     assert units["mixed/y"] == ""
 
 
-def test_what_is_added_to_a_speed_is_a_speed() -> None:
+def test_signals_that_are_added_to_a_speed_take_its_unit() -> None:
     builder = DiagramBuilder("d")
     traj, wanted = builder.add("traj", JTraj()), builder.add("wanted", Step())
     builder.add("error", Sum(signs="+-"), wanted, traj["qd"])
@@ -240,7 +240,7 @@ def test_what_is_added_to_a_speed_is_a_speed() -> None:
 @pytest.mark.parametrize(
     ("unit", "rate"), [("m", "m/s"), ("m/s", "m/s2"), ("rad/s2", "rad/s3"), ("", ""), ("N m", "N m/s")]
 )
-def test_units_of_rates_and_integrals_are_inverse(unit: str, rate: str) -> None:
+def test_units_of_derivatives_and_integrals_are_inverse(unit: str, rate: str) -> None:
     assert rate_unit(unit) == rate
     assert integral_unit(rate) == unit
 
@@ -249,7 +249,7 @@ def test_units_of_rates_and_integrals_are_inverse(unit: str, rate: str) -> None:
 
 
 def count_calls(work: Callable[[], object]) -> int:
-    """How many functions are called: a measure of work that no other process disturbs."""
+    """Count function calls: a measure of work that does not depend on other processes."""
     calls = 0
 
     def count(frame: object, event: str, argument: object) -> None:
@@ -273,14 +273,14 @@ def chain(length: int) -> HybridSystem:
     return trace_diagram(builder.build())
 
 
-def test_work_grows_in_step_with_the_diagram() -> None:
-    chain(10)  # the blocks' equations are traced once and for all
+def test_tracing_work_grows_linearly_with_the_diagram() -> None:
+    chain(10)  # traces the equations of the block types, which are then cached
     small, large = count_calls(lambda: chain(50)), count_calls(lambda: chain(500))
-    # sorting grows a little faster than the length
+    # sorting grows slightly faster than linearly
     assert large < 10.5 * small
 
 
-def test_blocks_that_differ_in_tunable_numbers_are_traced_once() -> None:
+def test_blocks_that_differ_only_in_tunable_parameters_are_traced_once() -> None:
     one = block_equations(Gain(gain=2.0), {"u": (3,)})
     assert block_equations(Gain(gain=5.0), {"u": (3,)}) is one
     assert block_equations(Gain(gain=2.0), {"u": ()}) is not one
@@ -290,10 +290,10 @@ def test_blocks_that_differ_in_tunable_numbers_are_traced_once() -> None:
     )
 
 
-def test_equations_that_forget_an_output_are_the_authors_mistake() -> None:
+def test_equations_without_a_declared_output_are_refused() -> None:
     @dataclass(frozen=True, kw_only=True)
     class Forgetful(Block):
-        """Says y and gives z."""
+        """A block that declares the output y and computes z."""
 
         title: ClassVar[str] = "Forgetful"
 

@@ -1,4 +1,4 @@
-"""The native code of every quantity against CasADi's interpreter, over batches."""
+"""Native code of every dynamics function compared with CasADi's interpreter, for batches."""
 
 import numpy as np
 import pytest
@@ -10,14 +10,14 @@ from armblocks.robot import Robot
 from robots_for_tests import RANDOM_ROBOTS, build_puma560, evaluate
 
 BATCH = 11
-"""Not a multiple of any lane count."""
+"""Number of samples; not a multiple of any lane count."""
 PUMA = build_puma560()
 
 
 @pytest.mark.parametrize("robot", [PUMA, RANDOM_ROBOTS[1]], ids=lambda robot: robot.name)
 @pytest.mark.parametrize("name", TRACES)
-def test_kernel_gives_the_traced_numbers(robot: Robot, name: str, monkeypatch: pytest.MonkeyPatch):
-    """For a tree of all joint types as users compile it, for a Puma without optimisation."""
+def test_a_kernel_agrees_with_the_traced_function(robot: Robot, name: str, monkeypatch: pytest.MonkeyPatch):
+    """A tree of all joint types is compiled with full optimisation, a Puma 560 without."""
     if robot is PUMA:
         monkeypatch.setenv("ARMBLOCKS_EFFORT", "little")
     traced = TRACES[name](robot)
@@ -28,7 +28,7 @@ def test_kernel_gives_the_traced_numbers(robot: Robot, name: str, monkeypatch: p
     for k in range(BATCH):
         sample = [values[k] for values in batch]
         expected = evaluate(robot, name, *sample)
-        # Other sin and cos, and fused sums: a few roundings of the largest entry, times the condition of M.
+        # Other sin, cos and fused sums: a few rounding errors of the largest entry, times the condition of M.
         tolerance = 1e-9 if name.startswith("accel") else 1e-12
         size = max(1.0, float(np.abs(expected).max()))
         assert_allclose(together[k], expected, rtol=0, atol=tolerance * size)

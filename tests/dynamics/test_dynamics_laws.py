@@ -1,4 +1,4 @@
-"""What must hold for any arm: over every shipped robot and random trees of all joint types."""
+"""Laws of dynamics for any arm: every shipped robot, and random trees of all joint types."""
 
 from dataclasses import replace
 
@@ -14,17 +14,18 @@ from robots_for_tests import evaluate, random_states
 
 
 def scaled(actual: np.ndarray, expected: np.ndarray, tolerance: float) -> None:
-    """Equal to ``tolerance`` relative to the largest entry (single entries may cancel to nothing)."""
+    """Check equality within ``tolerance`` relative to the largest entry, because single entries may
+    cancel."""
     size = max(1.0, float(np.abs(expected).max(initial=0.0)))
     assert_allclose(actual, expected, rtol=0, atol=tolerance * size)
 
 
-def test_forward_dynamics_undoes_inverse_dynamics(robot: Robot):
+def test_forward_dynamics_is_the_inverse_of_inverse_dynamics(robot: Robot):
     for q, qd, qdd in random_states(robot):
         tau = evaluate(robot, "rne", q, qd, qdd)
         back = evaluate(robot, "accel", q, qd, tau)
         condition = np.linalg.cond(evaluate(robot, "inertia", q))
-        # Rounding of tau grows by the condition of M.
+        # Rounding errors of tau are multiplied by the condition number of M.
         scaled(back, qdd, max(1e-10, 1e3 * condition * np.finfo(float).eps))
 
 
@@ -35,7 +36,7 @@ def test_mass_matrix_is_symmetric_and_positive_definite(robot: Robot):
         assert np.linalg.eigvalsh(M).min() > 0
 
 
-def test_mass_matrix_is_unit_acceleration_torques(robot: Robot):
+def test_columns_of_the_mass_matrix_are_torques_of_unit_accelerations(robot: Robot):
     still = np.zeros(robot.n)
     for q, _, _ in random_states(robot, 2):
         at_rest = evaluate(robot, "rne", q, still, still)
@@ -43,7 +44,7 @@ def test_mass_matrix_is_unit_acceleration_torques(robot: Robot):
         scaled(evaluate(robot, "inertia", q), np.column_stack(columns), 1e-12)
 
 
-def test_mass_matrix_rate_less_twice_coriolis_is_skew(robot: Robot):
+def test_mass_matrix_rate_minus_twice_coriolis_is_skew_symmetric(robot: Robot):
     traced = TRACES["inertia"](robot)
     qd = SX.sym("qd", robot.n)
     rate = Function("Mdot", [traced.arguments[0], qd], [jtimes(traced.results[0], traced.arguments[0], qd)])
@@ -53,7 +54,7 @@ def test_mass_matrix_rate_less_twice_coriolis_is_skew(robot: Robot):
         scaled(N, -N.T, 1e-12)
 
 
-def test_coriolis_and_gravity_are_the_torque_of_unaccelerated_motion(robot: Robot):
+def test_coriolis_and_gravity_are_the_torque_at_zero_acceleration(robot: Robot):
     smooth = robot.nofriction()
     for q, qd, qdd in random_states(robot):
         C = evaluate(robot, "coriolis", q, qd)
@@ -70,14 +71,14 @@ def test_kinetic_energy_is_half_the_quadratic_form_of_the_mass_matrix(robot: Rob
         scaled(evaluate(robot, "kinetic_energy", q, qd), expected, 1e-13)
 
 
-def test_gravity_load_is_the_slope_of_potential_energy(robot: Robot):
+def test_gravity_load_is_the_gradient_of_potential_energy(robot: Robot):
     traced = TRACES["potential_energy"](robot)
     slope = Function("g", [traced.arguments[0]], [jacobian(traced.results[0], traced.arguments[0])])
     for q, _, _ in random_states(robot):
         scaled(evaluate(robot, "gravload", q), np.asarray(slope(q)).ravel(), 1e-12)
 
 
-def test_power_of_the_torques_is_the_rate_of_energy(robot: Robot):
+def test_power_of_the_torques_is_the_time_derivative_of_energy(robot: Robot):
     smooth = robot.nofriction()
     T, V = TRACES["kinetic_energy"](smooth), TRACES["potential_energy"](smooth)
     q, qd = T.arguments
@@ -113,11 +114,11 @@ def test_energy_stays_constant_without_friction(robot: Robot):
         a4, b4 = slope(q + h * a3, qd + h * b3)
         q, qd = q + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4), qd + h / 6 * (b1 + 2 * b2 + 2 * b3 + b4)
         exchanged = max(exchanged, float(evaluate(smooth, "kinetic_energy", q, qd)))
-    # Fourth order at h = 0.5 ms leaves 1e-9 of the energy that moves.
+    # A fourth-order method with h = 0.5 ms has an error of 1e-9 of the exchanged energy.
     assert abs(energy() - start) < 1e-8 * exchanged
 
 
-def test_centre_of_mass_is_where_gravity_pulls(robot: Robot):
+def test_potential_energy_is_that_of_the_total_mass_at_the_centre_of_mass(robot: Robot):
     mass = sum(link.mass for link in robot.links)
     for q, _, _ in random_states(robot):
         expected = -mass * np.array(robot.gravity) @ evaluate(robot, "centre_of_mass", q)
@@ -132,7 +133,7 @@ def test_centre_of_mass_is_the_weighted_mean_of_the_links(robot: Robot):
         scaled(evaluate(robot, "centre_of_mass", q), mass @ centres / mass.sum(), 1e-13)
 
 
-def test_wrench_at_the_tip_is_felt_through_the_jacobian_of_the_last_link(robot: Robot):
+def test_torque_of_a_tip_wrench_is_the_transposed_jacobian_of_the_last_link(robot: Robot):
     at_link = replace(robot, tool=Transform())
     random = np.random.default_rng(5)
     for q, qd, qdd in random_states(robot, 2):
@@ -142,7 +143,7 @@ def test_wrench_at_the_tip_is_felt_through_the_jacobian_of_the_last_link(robot: 
         scaled(load - free, evaluate(at_link, "jacobe", q).T @ wrench, 1e-11)
 
 
-def test_payload_equals_a_link_of_that_mass_on_the_tool(robot: Robot):
+def test_payload_equals_a_fixed_link_of_the_same_mass_at_the_tool(robot: Robot):
     random = np.random.default_rng(6)
     mass, centre = 12.0, random.uniform(-0.2, 0.2, 3)
     second = np.array((0.4, 0.5, 0.6, 0.01, -0.02, 0.03))
@@ -171,7 +172,7 @@ def test_payload_equals_a_link_of_that_mass_on_the_tool(robot: Robot):
         scaled(back, qdd, max(1e-10, 1e3 * condition * np.finfo(float).eps))
 
 
-def test_loaded_forms_without_load_are_the_unloaded_ones(robot: Robot):
+def test_loaded_functions_without_load_equal_the_unloaded_ones(robot: Robot):
     for q, qd, tau in random_states(robot, 2):
         nothing = (np.zeros(6), np.zeros(10))
         scaled(evaluate(robot, "rne_loaded", q, qd, tau, *nothing), evaluate(robot, "rne", q, qd, tau), 1e-11)

@@ -1,4 +1,4 @@
-"""The two algorithms of forward dynamics against each other, and arms that nothing can accelerate."""
+"""The two algorithms of forward dynamics compared with each other, and arms with singular inertia."""
 
 import re
 
@@ -22,7 +22,7 @@ from robots_for_tests import evaluate, random_inertia, random_states, random_tra
 ROD = {"mass": 1.0, "centre_of_mass": (0.5, 0.0, 0.0), "inertia": (0.0, 0.08, 0.08)}
 
 
-def test_articulated_bodies_agree_with_the_factored_matrix(robot: Robot):
+def test_articulated_body_algorithm_agrees_with_the_factored_mass_matrix(robot: Robot):
     tree = regrouped(KinematicTree.of(robot))
     q, qd, tau = (SX.sym(name, robot.n) for name in ("q", "qd", "tau"))
     rates, torques = entries(qd), entries(tau)
@@ -37,7 +37,7 @@ def test_articulated_bodies_agree_with_the_factored_matrix(robot: Robot):
         assert_allclose(two, one, rtol=0, atol=tolerance * max(1.0, np.abs(one).max()))
 
 
-def test_long_chains_go_through_articulated_bodies():
+def test_long_chains_use_the_articulated_body_algorithm():
     random = np.random.default_rng(0)
     links = [
         Link(
@@ -51,7 +51,7 @@ def test_long_chains_go_through_articulated_bodies():
     snake = Robot(name="snake", links=serial_chain(links))
     for q, qd, qdd in random_states(snake, 1):
         tau = evaluate(snake, "rne", q, qd, qdd)
-        # The condition of M is 1e5 here.
+        # The condition number of M is 1e5 here.
         assert_allclose(evaluate(snake, "accel", q, qd, tau), qdd, rtol=0, atol=1e-8)
 
 
@@ -63,21 +63,21 @@ MASSLESS = "has no inertia to accelerate: the inertia matrix is singular at ever
     [
         ((Link(name="ghost"),), "ghost"),
         ((Link(name="rod", **ROD), Link(name="pin", parent="rod")), "pin"),
-        # A point mass on the axis does not resist the turn.
+        # A point mass on the joint axis has no inertia about it.
         ((Link(name="point", mass=2.0, centre_of_mass=(0, 0, 0.3)),), "point"),
-        # Two joints on one axis with nothing in between: the outer one takes all, the inner none.
+        # Two joints on one axis without mass between them: the inner joint has no inertia of its own.
         ((Link(name="inner"), Link(name="outer", parent="inner", **ROD)), "inner"),
         ((Link(name="slider", joint=Prismatic()),), "slider"),
     ],
 )
-def test_joint_without_inertia_is_named(links: tuple[Link, ...], joint: str):
+def test_a_joint_without_inertia_is_refused_with_its_name(links: tuple[Link, ...], joint: str):
     arm = Robot(name="arm", links=links)
     expected = re.escape(f"robot 'arm', link '{joint}': joint '{joint}' {MASSLESS}")
     with pytest.raises(RobotError, match=expected + ".*Fix: give the link a mass and an inertia"):
         TRACES["accel"](arm)
 
 
-def test_motor_inertia_or_payload_is_enough_to_accelerate():
+def test_motor_inertia_or_payload_is_sufficient_for_forward_dynamics():
     driven = Robot(name="driven", links=(Link(name="l", motor=Motor(inertia=1e-3, gear_ratio=10)),))
     assert evaluate(driven, "accel", [0], [0], [1.0]) == pytest.approx([10.0])
     bare = Robot(name="bare", links=(Link(name="l", joint=Revolute()),), tool=transl(1.0, 0.0, 0.0))
@@ -92,21 +92,21 @@ def test_motor_inertia_or_payload_is_enough_to_accelerate():
         TRACES["accel_loaded"](fixed_tool)
 
 
-def test_robot_without_mass_has_no_centre():
+def test_a_robot_without_mass_has_no_centre_of_mass():
     bare = Robot(name="bare", links=(Link(name="l"),))
     with pytest.raises(RobotError, match="robot 'bare': no link has a mass, so there is no centre of mass"):
         TRACES["centre_of_mass"](bare)
 
 
 @pytest.mark.parametrize("name", TRACES)
-def test_robot_that_cannot_move_is_told(name: str):
+def test_a_robot_without_moving_joints_is_refused(name: str):
     pole = Robot(name="pole", links=(Link(name="pole", joint=Fixed(), mass=1.0),))
     method = name.removesuffix("_loaded")
     with pytest.raises(RobotError, match=f"robot 'pole': no joint moves, so there is no {method}"):
         TRACES[name](pole)
 
 
-def test_load_on_a_link_that_stands_is_not_felt():
+def test_a_load_on_a_stationary_link_does_not_change_the_torques():
     arm = Robot(name="arm", links=(Link(name="rod", **ROD), Link(name="stand", joint=Fixed(), mass=1.0)))
     load = (np.ones(6), (1.0, 0, 0, 0, 1, 1, 1, 0, 0, 0))
     state = ([0.3], [0.2], [0.1])

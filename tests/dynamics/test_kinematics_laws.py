@@ -1,4 +1,4 @@
-"""Kinematics against the description's own transforms, and Jacobians against derivatives."""
+"""Kinematics compared with the transforms of the description, and Jacobians with derivatives."""
 
 from dataclasses import replace
 
@@ -24,7 +24,7 @@ from robots_for_tests import build_random_tree, evaluate, random_states, random_
 
 
 def described_poses(robot: Robot, q: np.ndarray) -> list[np.ndarray]:
-    """Base, links, tool by multiplying the description's matrices with numbers."""
+    """Return the poses of base, links and tool as numeric products of the description's matrices."""
     at = dict(zip(robot.joint_names, q))
     world: dict[str | None, np.ndarray] = {None: robot.base.matrix}
     waiting = list(robot.links)
@@ -39,7 +39,7 @@ def described_poses(robot: Robot, q: np.ndarray) -> list[np.ndarray]:
 def test_poses_are_products_of_the_described_transforms(robot: Robot):
     for q, _, _ in random_states(robot):
         expected = described_poses(robot, q)
-        # A product of ten rotations leaves ten roundings.
+        # A product of ten rotations has ten rounding errors.
         assert_allclose(evaluate(robot, "link_poses", q), expected, rtol=0, atol=2e-14)
         assert_allclose(evaluate(robot, "fkine", q), expected[-1], rtol=0, atol=2e-14)
 
@@ -82,12 +82,12 @@ def test_manipulability_of_redundant_arms(count: int):
 
 
 def test_manipulability_vanishes_at_a_singular_position(puma560: Robot):
-    # Wrist singularity: joints 4 and 6 in line. The toolbox's root of a determinant is good to 1e-8 only.
+    # Wrist singularity: axes 4 and 6 coincide. The square root of a determinant is accurate to 1e-8 only.
     assert evaluate(puma560, "manipulability", [0.3, 0.5, -1.0, 0.2, 0.0, 0.1]) < 1e-16
 
 
 def test_standard_and_modified_tables_of_one_robot_agree():
-    """A modified row holds the alpha and a of the standard row before it; the last ones go into the tool."""
+    """A modified row has alpha and a of the preceding standard row; those of the last row become the tool."""
     random = np.random.default_rng(11)
     alpha, a, d = (random.uniform(-1, 1, 4) for _ in range(3))
     mass = random.uniform(1, 2, 4)
@@ -104,7 +104,7 @@ def test_standard_and_modified_tables_of_one_robot_agree():
             inertia=(0.3, 0.4, 0.5),
             motor=Motor(inertia=1e-4, gear_ratio=20),
         )
-        # The same body in the frame of the modified table, which lies at its joint.
+        # The same body in the frame of the modified table, which is located at its joint.
         R, p = (Transform(rotation=link.after.rotation), link.after.translation)
         shift = np.array((0.0, 0.0, d[i]))
         modified.append(
@@ -132,7 +132,7 @@ def test_standard_and_modified_tables_of_one_robot_agree():
 
 
 @pytest.mark.parametrize("convention", [standard_dh, modified_dh])
-def test_rows_of_both_conventions_are_the_textbook_matrices(convention):
+def test_rows_of_both_conventions_agree_with_the_textbook_matrices(convention):
     alpha, a, d, theta, offset, q = 0.3, 0.5, 0.7, 0.2, 0.1, 0.4
     for sigma in (0, 1):
         link = convention("l", alpha=alpha, a=a, d=d, theta=theta, sigma=sigma, offset=offset)
@@ -157,7 +157,7 @@ def test_rows_of_both_conventions_are_the_textbook_matrices(convention):
         assert_allclose(evaluate(arm, "fkine", [q]), expected, rtol=0, atol=1e-15)
 
 
-def test_moving_and_turning_base_and_gravity_together_changes_no_torque(puma560: Robot):
+def test_torques_do_not_change_when_base_and_gravity_are_rotated_together(puma560: Robot):
     T = random_transform(np.random.default_rng(2))
     turned = replace(puma560, base=T, gravity=T.R @ np.array(puma560.gravity))
     for q, qd, qdd in random_states(puma560):
@@ -168,13 +168,13 @@ def test_moving_and_turning_base_and_gravity_together_changes_no_torque(puma560:
         assert_allclose(evaluate(turned, "fkine", q), expected, rtol=0, atol=1e-14)
 
 
-def test_turning_the_base_leaves_the_inertia(puma560: Robot):
+def test_moving_the_base_does_not_change_the_inertia(puma560: Robot):
     turned = replace(puma560, base=random_transform(np.random.default_rng(2)))
     for q, _, _ in random_states(puma560):
         assert_allclose(evaluate(turned, "inertia", q), evaluate(puma560, "inertia", q), rtol=0, atol=1e-14)
 
 
-def test_order_of_the_links_does_not_matter():
+def test_the_order_of_the_links_does_not_change_the_dynamics():
     robot = build_random_tree(2)
     last = robot.links[-1]
     turned = replace(robot, links=(*reversed(robot.links[:-1]), last))
@@ -188,8 +188,8 @@ def test_order_of_the_links_does_not_matter():
             assert_allclose(actual, expected, rtol=0, atol=1e-11 * np.abs(expected).max())
 
 
-def test_a_fixed_link_is_one_body_with_its_parent():
-    """A body split in two halves that are bolted together moves as the whole."""
+def test_a_fixed_link_and_its_parent_form_one_rigid_body():
+    """Two halves of a body with a fixed joint between them have the dynamics of the whole body."""
     random = np.random.default_rng(4)
     T = random_transform(random)
     half = {"mass": 2.0, "centre_of_mass": (0.1, 0.2, 0.3), "inertia": (0.3, 0.4, 0.5)}
@@ -224,7 +224,7 @@ def test_a_fixed_link_is_one_body_with_its_parent():
         assert_allclose(evaluate(split, "rne", q, qd, qdd), evaluate(whole, "rne", q, qd, qdd), rtol=1e-13)
 
 
-def test_prismatic_joint_lifts_its_weight():
+def test_a_vertical_prismatic_joint_carries_the_weight():
     lift = Robot(
         name="lift",
         links=(Link(name="cage", joint=Prismatic(), mass=3.0, motor=Motor(inertia=2e-3, gear_ratio=10)),),

@@ -1,4 +1,4 @@
-"""The Puma 560 to every digit that the Robotics Toolbox prints, and the paper's arm."""
+"""The Puma 560 compared with all digits that the Robotics Toolbox prints, and the arm of the paper."""
 
 import numpy as np
 import pytest
@@ -53,7 +53,7 @@ def test_friction(puma560: Robot):
 
 def test_force_and_moment_at_the_last_link(puma560: Robot):
     tau = evaluate(puma560.nofriction(), "rne_loaded", QN, STILL, STILL, (1, 2, 3, 1, 2, 3), np.zeros(10))
-    # Six significant digits are published.
+    # The source has six significant digits.
     assert_allclose(tau, (0.642756, 29.0866, 4.70321, 2.82843, -1.97175, 3), rtol=5e-6)
 
 
@@ -68,7 +68,7 @@ def test_inertia(puma560: Robot):
     )
     M = evaluate(puma560, "inertia", QN)
     for i, row in enumerate(upper):
-        # One entry is published with its last digit cut and not rounded.
+        # One published entry is truncated instead of rounded.
         assert_allclose(M[i, i:], row, rtol=0, atol=1e-10)
         assert_allclose(M[i:, i], row, rtol=0, atol=1e-10)
 
@@ -96,7 +96,7 @@ def test_forward_dynamics(puma560: Robot):
     assert_allclose(accel, falling, rtol=0, atol=1e-10)
 
 
-def test_paper_arm_follows_its_path(kr180: Robot):
+def test_the_arm_of_the_paper_along_its_trajectory(kr180: Robot):
     qf = np.array([3.14, 0, 1.57, 0])
     places = {
         0: (1.95, -1.25, -1.85),
@@ -139,6 +139,6 @@ def test_friction_of_every_toolbox_release(model: FrictionModel, forward: float,
     assert evaluate(arm, "friction", [2.0]) == pytest.approx([forward], rel=1e-15)
     assert evaluate(arm, "friction", [-2.0]) == pytest.approx([backward], rel=1e-15)
     assert evaluate(arm, "friction", [0.0]) == [0.0]
-    # The same term stands in inverse and forward dynamics: 1 + G^2 Jm = 3.5 kg m2.
+    # Inverse and forward dynamics have the same inertia: 1 + G^2 Jm = 3.5 kg m2.
     assert evaluate(arm, "rne", [0.1], [2.0], [3.0]) == pytest.approx([3.5 * 3 + forward])
     assert evaluate(arm, "accel", [0.1], [2.0], [1.0]) == pytest.approx([(1 - forward) / 3.5])

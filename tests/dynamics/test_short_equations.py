@@ -1,4 +1,4 @@
-"""Tracing folds a robot's zeros away: the equations stay short, which is what makes the kernels fast."""
+"""Tracing eliminates the zeros of a robot's parameters: short equations make fast kernels."""
 
 from collections import Counter
 
@@ -22,7 +22,7 @@ ARITHMETIC = {
 
 
 def arithmetic(traced: TracedFunction) -> int:
-    """Multiplies and adds of one evaluation."""
+    """Return the number of multiplications and additions of one evaluation."""
     function = traced.casadi_function()
     count = Counter(function.instruction_id(k) for k in range(function.n_instructions()))
     return sum(count[operation] for operation in ARITHMETIC)
@@ -31,7 +31,7 @@ def arithmetic(traced: TracedFunction) -> int:
 @pytest.mark.parametrize(
     ("robot", "name", "most"),
     [
-        # Ceilings of the design; the counts today are 379, 650, 77 and 75, and 223 for the paper's arm.
+        # Upper limits of the design. Present counts are 379, 650, 77 and 75, and 223 for the paper's arm.
         (build_puma560(), "rne", 500),
         (build_puma560(), "accel", 750),
         (build_puma560(), "fkine", 100),
@@ -40,18 +40,18 @@ def arithmetic(traced: TracedFunction) -> int:
     ],
     ids=lambda value: getattr(value, "name", str(value)),
 )
-def test_equations_stay_short(robot: Robot, name: str, most: int):
+def test_operation_counts_are_below_their_limits(robot: Robot, name: str, most: int):
     assert arithmetic(TRACES[name](robot)) <= most
 
 
-def test_regrouping_leaves_no_mass_beyond_a_turning_joint(puma560: Robot):
+def test_regrouping_moves_the_mass_of_revolute_links_to_their_parents(puma560: Robot):
     for body in regrouped(KinematicTree.of(puma560)).bodies:
         assert body.inertia.mass == 0
         assert body.inertia.first[2] == 0
         assert body.inertia.second.yy == 0
 
 
-def test_quarter_turns_of_an_offset_cost_nothing():
+def test_offsets_of_quarter_turns_need_no_arithmetic():
     for quarters in range(-4, 5):
         link = standard_dh("l", a=1.0, offset=quarters * 1.5707963267948966)
         assert arithmetic(TRACES["fkine"](Robot(name="r", links=(link,)))) == 0

@@ -1,4 +1,4 @@
-"""Exact ratios of sample times whose doubles are rounded."""
+"""Exact ratios of sample times that are rounded to doubles."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from armblocks.equations import SampleClock
 from armblocks.equations.clock_ratios import common_period, exact_clocks, simplest_between
 
 
-def test_rounded_sample_times_have_the_common_period_of_the_fractions_meant() -> None:
+def test_rounded_sample_times_have_the_common_period_of_their_fractions() -> None:
     random = np.random.default_rng(9)
     for _ in range(200):
         meant = [Fraction(int(a), int(b)) for a, b in random.integers(1, 1000, (3, 2))]
@@ -23,18 +23,18 @@ def test_rounded_sample_times_have_the_common_period_of_the_fractions_meant() ->
         assert math.gcd(*(int(period / own) for own in meant)) == 1
 
 
-def test_one_clock_keeps_its_period_to_the_bit() -> None:
+def test_the_period_of_a_single_clock_is_kept_bit_for_bit() -> None:
     for period in [0.1, 1.0 / 3.0, math.pi / 100.0, 2.0**-20, *np.random.default_rng(1).random(100).tolist()]:
         assert float(common_period(exact_clocks([SampleClock(period)]))) == period
 
 
-def test_multiples_of_an_irrational_sample_time_have_their_common_period() -> None:
+def test_multiples_of_an_irrational_sample_time_have_a_common_period() -> None:
     step = math.pi / 100.0
     clocks = exact_clocks([SampleClock(2.0 * step), SampleClock(3.0 * step)])
     assert abs(float(common_period(clocks)) / (6.0 * step) - 1.0) < 1e-15
 
 
-def test_the_simplest_fraction_of_an_interval_is_that_of_a_search() -> None:
+def test_the_simplest_fraction_of_an_interval_agrees_with_a_search() -> None:
     random = np.random.default_rng(2)
     for _ in range(100):
         low = Fraction(int(random.integers(0, 500)), int(random.integers(1, 100)))

@@ -1,4 +1,5 @@
-"""Elementary functions of constants never come from the C library, wherever the constant arises."""
+"""Elementary functions of constants are never evaluated by the C library, whatever the origin of the
+constant."""
 
 import math
 from collections.abc import Callable
@@ -23,7 +24,7 @@ MARK = 1234.5
 
 @pytest.fixture
 def marked(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The functions of this package give a value that no C library gives."""
+    """Replace the functions of this package by ones that return a marker value."""
     for name in rounded_functions.FUNCTIONS:
         monkeypatch.setitem(rounded_functions.FUNCTIONS, name, lambda *arguments: MARK)
 
@@ -50,7 +51,7 @@ def test_constants_in_masks() -> None:
 
 @pytest.mark.usefixtures("marked")
 def test_constants_that_pass_through_blocks() -> None:
-    """An Expression without inputs gives a number, which the block behind it gets for its input."""
+    """The output of an Expression without inputs is a constant input of the next block."""
 
     def chain(d: ab.DiagramBuilder) -> object:
         number = d.add("number", Expression(formula="1.995", inputs=0))
@@ -69,7 +70,7 @@ def test_constants_that_solve_equations() -> None:
 
 
 def test_the_logarithm_in_the_derivative_of_a_power_is_left_to_the_compiled_code() -> None:
-    """CasADi would put the C library's log(2.2) into the derivative of 2.2^u."""
+    """CasADi would evaluate log(2.2) in the derivative of 2.2^u with the C library."""
     builder = ab.DiagramBuilder("d")
     state = builder.add("x", Integrator(initial=0.3))
     builder.connect(builder.add("y", Expression(formula="2.2^u - u"), state), state)
@@ -94,7 +95,7 @@ def test_powers_of_constants_keep_value_and_derivative() -> None:
                     assert slope == pytest.approx(math.log(base) * base**x, rel=1e-14, abs=1e-15)
 
 
-def test_functions_of_symbols_stay_as_they_are() -> None:
+def test_functions_of_symbols_are_not_changed() -> None:
     u = SX.sym("u", 3)
     plain = TracedFunction.trace("f", signature(("u", (3,))), signature(("y", (3,))), casadi.sin)
     ours = TracedFunction.trace(
@@ -104,8 +105,9 @@ def test_functions_of_symbols_stay_as_they_are() -> None:
     assert substituted(casadi.sin(u), u, 2.0 * u).shape == (3, 1)
 
 
-def test_linear_solutions_pass_beside_constants() -> None:
-    """Their calls stay calls, whether their arguments or those of other functions are constants."""
+def test_linear_solutions_are_kept_when_constants_are_folded() -> None:
+    """Calls of the linear solver stay calls, even if their arguments or those of other functions are
+    constants."""
     A, b, u = SX.sym("A", 4), SX.sym("b", 2), SX.sym("u")
     x = linear_solution(casadi.reshape(A, 2, 2), b)
     results = casadi.vertcat(casadi.sin(x[0]) * u, x, casadi.cos(u), casadi.vec(casadi.jacobian(x, b)))

@@ -12,7 +12,7 @@ from armblocks.errors import InputError, UnknownNameError
 LAYOUT = signature(("t", (), "s"), ("q", (2,), "rad"), ("T", (2, 3)), ("stack", (2, 2, 2)))
 
 
-def test_unpacking_undoes_packing() -> None:
+def test_unpacking_is_the_inverse_of_packing() -> None:
     values = {slot.name: np.arange(slot.size, dtype=float).reshape(slot.shape) for slot in LAYOUT}
     flat = LAYOUT.pack(values)
     assert flat.shape == (LAYOUT.size,) == (17,)
@@ -24,7 +24,7 @@ def test_unpacking_undoes_packing() -> None:
     assert batch["t"].shape == (2,)
 
 
-def test_places_follow_one_another() -> None:
+def test_quantities_are_stored_one_after_another() -> None:
     assert LAYOUT.names == ("t", "q", "T", "stack")
     assert LAYOUT.ranges["T"] == slice(3, 9)
     assert len(LAYOUT) == 4
@@ -32,7 +32,7 @@ def test_places_follow_one_another() -> None:
 
 
 @pytest.mark.parametrize("shape", [(), (3,), (2, 3), (2, 3, 2)])
-def test_symbols_lie_row_by_row_as_numpy_does(shape: tuple[int, ...]) -> None:
+def test_symbols_are_stored_in_row_major_order(shape: tuple[int, ...]) -> None:
     numbers = np.arange(np.prod(shape, dtype=int), dtype=float)
     flat = SX.sym("flat", numbers.size)
     natural = unflatten(flat, shape)
@@ -42,7 +42,7 @@ def test_symbols_lie_row_by_row_as_numpy_does(shape: tuple[int, ...]) -> None:
     assert np.array_equal(matrix.ravel(), numbers)
 
 
-def test_what_does_not_fit_is_refused() -> None:
+def test_invalid_names_and_shapes_are_refused() -> None:
     with pytest.raises(InputError, match=r"the name 'q' occurs twice in one signature"):
         Signature((Slot("q"), Slot("q")))
     with pytest.raises(InputError, match=r"no value is given for 'q'. Allowed: t, q"):
@@ -56,13 +56,13 @@ def test_what_does_not_fit_is_refused() -> None:
         flatten(SX.sym("v", 2), (2, 3))
 
 
-def test_a_traced_function_evaluates_itself() -> None:
+def test_a_traced_function_can_be_called_with_numbers() -> None:
     ends = signature(("A", (2, 2)), ("b", (2,)))
     product = TracedFunction.trace("product", ends, signature(("y", (2,))), lambda A, b: A @ b)
     A, b = np.array([[1.0, 2.0], [3.0, 4.0]]), np.array([5.0, 6.0])
     assert np.array_equal(product(A, b)[0], A @ b)
 
 
-def test_equations_give_one_value_for_each_output() -> None:
+def test_equations_with_a_wrong_number_of_outputs_are_refused() -> None:
     with pytest.raises(InputError, match=r"the equations of 'f' return 2 values. Allowed: 1 values"):
         TracedFunction.trace("f", signature(("a", ())), signature(("b", ())), lambda a: (a, a))
