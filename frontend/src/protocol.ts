@@ -46,7 +46,7 @@ export interface Envelope {
     | Undo;
 }
 /**
- * Ask for the mask of a subsystem, or of the sheet itself: the :class:`SetMask` that would make it.
+ * Return the mask of a subsystem or of the sheet, as the :class:`SetMask` that declares it.
  */
 export interface AskMask {
   kind: "ask_mask";
@@ -55,11 +55,11 @@ export interface AskMask {
   block?: string;
 }
 /**
- * Show a document again: after a reload, after the line was down, or in a second page.
+ * Show a document again: after a reload, after a lost connection, or in a second page.
  *
- * Where the server was started anew and does not know it, it comes from its journal, or else from the file
- * or the shipped one of these names, under the same key: edits that wait to be sent again find it. Of a
- * diagram the sheet at the path ``inside`` is shown.
+ * A server that was restarted and does not have the document open recovers it from its journal, or else
+ * opens the file ``path`` or the shipped ``origin``, under the same key. Edits that the page sends again
+ * then find their document. ``inside`` is the path of the displayed sheet of a diagram.
  */
 export interface Attach {
   kind: "attach";
@@ -71,10 +71,10 @@ export interface Attach {
   in_front?: boolean;
 }
 /**
- * Carry out an edit.
+ * Apply an edit.
  *
- * ``inside``: names of the subsystems on the way to the sheet of a diagram that is edited. Changes in a row
- * of one ``gesture`` (the letters typed into one cell) are one step of undo.
+ * ``inside``: names of the subsystems that lead to the edited sheet of a diagram. Consecutive changes with
+ * the same ``gesture`` (for example the letters typed into a cell) are one undo step.
  */
 export interface Change {
   document: string;
@@ -110,9 +110,9 @@ export interface Change {
     | SetSettings;
 }
 /**
- * Put blocks on the sheet, with wires among them or to what is there: insert, paste and duplicate.
+ * Add blocks and connect them: insert, paste and duplicate.
  *
- * ``instead``: wires that give way, as where a block is dropped on one.
+ * ``instead``: wires that are removed, for example the wire on which a block is dropped.
  */
 export interface AddBlocks {
   kind: "add";
@@ -121,7 +121,7 @@ export interface AddBlocks {
   instead?: Wire[];
 }
 /**
- * A block to be put on the sheet. ``parameters`` states those that are not at their default.
+ * A block to be added. ``parameters`` contains the values that differ from the defaults.
  */
 export interface NewBlock {
   name: string;
@@ -132,7 +132,7 @@ export interface NewBlock {
   place: Place;
 }
 /**
- * Where a block stands: top left corner and, if not its own, its size in px.
+ * Position of a block: top left corner, and its size if it is not the default, px.
  */
 export interface Place {
   x: number;
@@ -145,7 +145,7 @@ export interface Place {
 /**
  * A wire between two ports, written ``block/port``.
  *
- * ``bends``: the way that somebody has drawn, see :func:`armblocks.drawing.wire_routing.bent`.
+ * ``bends``: the corners of a route drawn by the user, see :func:`armblocks.drawing.wire_routing.bent`.
  */
 export interface Wire {
   source: string;
@@ -153,34 +153,34 @@ export interface Wire {
   bends?: number[];
 }
 /**
- * Put a new link behind another one, or at the base where ``after`` is empty.
+ * Insert a new link after another one, or at the base if ``after`` is empty.
  */
 export interface AddJoint {
   kind: "add_joint";
   after: string;
 }
 /**
- * Lay the blocks of a sheet out anew, from left to right.
+ * Lay out the blocks of a sheet again, from left to right.
  */
 export interface ArrangeBlocks {
   kind: "arrange";
 }
 /**
- * Lead wires along the bends that they have here; without any the way is chosen again.
+ * Set the bends of wires; a wire without bends is routed automatically.
  */
 export interface BendWires {
   kind: "bend";
   wires: Wire[];
 }
 /**
- * Make a block that is linked to a library a copy of one's own, which may be changed inside.
+ * Replace the link to a library by a copy of the library block, which can be edited.
  */
 export interface BreakLink {
   kind: "break_link";
   block: string;
 }
 /**
- * Type into one cell: of a link, or of the robot where ``link`` is empty.
+ * Type into one cell of a link, or of the robot if ``link`` is empty.
  */
 export interface SetCell {
   kind: "cell";
@@ -190,7 +190,7 @@ export interface SetCell {
   angles: "deg" | "rad";
 }
 /**
- * Draw a wire. With ``replace`` the input's present wire gives way.
+ * Add a wire. With ``replace`` the present wire of the input is removed.
  */
 export interface Connect {
   kind: "connect";
@@ -198,7 +198,7 @@ export interface Connect {
   replace?: boolean;
 }
 /**
- * Read the rows by the other convention, or write the same arm in it (``keep_arm``).
+ * Interpret the D-H rows by the other convention, or convert them for the same arm (``keep_arm``).
  */
 export interface SetConvention {
   kind: "convention";
@@ -213,7 +213,7 @@ export interface Describe {
   text: string;
 }
 /**
- * Put blocks into a subsystem of their own; its ports are the wires that are cut thereby.
+ * Move blocks into a new subsystem; its ports are the wires that cross its boundary.
  */
 export interface GroupBlocks {
   kind: "group";
@@ -221,7 +221,7 @@ export interface GroupBlocks {
   name: string;
 }
 /**
- * Take values that were tried in a run, ``block.parameter``, into the model: one step for all of them.
+ * Write tuned values of a run, by ``block.parameter``, into the model, as one undo step.
  */
 export interface KeepTuned {
   kind: "keep_tuned";
@@ -230,7 +230,7 @@ export interface KeepTuned {
   };
 }
 /**
- * Log an output ``block/port``, so that it is seen without a Scope; or log it no longer.
+ * Start or stop logging an output ``block/port``, whose signal is then recorded without a Scope.
  */
 export interface LogSignal {
   kind: "log";
@@ -238,9 +238,9 @@ export interface LogSignal {
   logged: boolean;
 }
 /**
- * Declare the parameters of a subsystem, or of the sheet itself where no block is named, in this order.
+ * Declare the parameters of a subsystem, in this order, or of the sheet itself if ``block`` is empty.
  *
- * ``name`` is what its face says; empty leaves that as it is.
+ * ``name`` is the text on its face; empty leaves the text unchanged.
  */
 export interface SetMask {
   kind: "mask";
@@ -252,9 +252,9 @@ export interface SetMask {
   parameters: MaskParameter[];
 }
 /**
- * A parameter that a diagram declares. ``default`` as it is typed; ``was``: the name that it had before.
+ * A parameter of a mask. ``default`` is the typed text; ``was`` the former name.
  *
- * ``minimum``, ``above`` and ``maximum`` bound its numbers, ``choices`` are what a choice may be.
+ * ``minimum``, ``above`` and ``maximum`` bound its numbers; ``choices`` are the allowed values of a choice.
  */
 export interface MaskParameter {
   name: string;
@@ -269,10 +269,10 @@ export interface MaskParameter {
   choices?: string[];
 }
 /**
- * Put blocks and notes elsewhere, or turn blocks: one drag is one edit, however much was in hand.
+ * Move blocks and notes, or rotate blocks; one drag is one edit.
  *
- * Ways that are drawn between blocks that move alike move with them. ``wires`` are new, and those of
- * ``instead`` give way: a block is put into a wire, or taken out of its wires.
+ * User-drawn routes between blocks that move by the same amount move with them. ``wires`` are added and
+ * those of ``instead`` removed, when a block is inserted into a wire or disconnected from its wires.
  */
 export interface MoveBlocks {
   kind: "move";
@@ -286,7 +286,7 @@ export interface MoveBlocks {
   instead?: Wire[];
 }
 /**
- * Words on the sheet: their top left corner in px.
+ * A note on the sheet: its text, and its top left corner in px.
  *
  * This interface was referenced by `undefined`'s JSON-Schema definition
  * via the `patternProperty` "^/\S+$".
@@ -297,7 +297,7 @@ export interface SheetNote {
   text: string;
 }
 /**
- * Let a link of a chain change places with its neighbour.
+ * Exchange a link of a chain with its neighbour.
  */
 export interface MoveJoint {
   kind: "move_joint";
@@ -305,7 +305,7 @@ export interface MoveJoint {
   by: -1 | 1;
 }
 /**
- * Write notes, or change what they say.
+ * Add notes or change their text.
  */
 export interface SetNotes {
   kind: "notes";
@@ -314,7 +314,7 @@ export interface SetNotes {
   };
 }
 /**
- * Change parameters of one block. Wires to ports that thereby vanish are removed.
+ * Change parameters of one block. Wires to ports that no longer exist are removed.
  */
 export interface SetParameters {
   kind: "parameters";
@@ -324,10 +324,10 @@ export interface SetParameters {
   };
 }
 /**
- * Put what was copied on the sheet: ``text`` is a diagram as a file holds it.
+ * Paste blocks: ``text`` is a diagram in the file format.
  *
- * ``names``: what its blocks and notes are to be called here, where that is not as there. ``shift``: px that
- * they stand further right and down than there.
+ * ``names``: new names of its blocks and notes, where they differ. ``shift``: displacement to the right and
+ * down, px.
  */
 export interface PasteBlocks {
   kind: "paste";
@@ -338,7 +338,7 @@ export interface PasteBlocks {
   shift?: number;
 }
 /**
- * Take blocks, wires and notes off the sheet; the wires of the blocks go with them.
+ * Remove blocks, wires and notes; the wires of the removed blocks are removed with them.
  */
 export interface RemoveBlocks {
   kind: "remove";
@@ -354,7 +354,7 @@ export interface RemoveJoint {
   link: string;
 }
 /**
- * Give a block another name; its wires and its place go with it.
+ * Rename a block; its wires and its position remain.
  */
 export interface Rename {
   kind: "rename";
@@ -370,7 +370,7 @@ export interface RenameLink {
   name: string;
 }
 /**
- * Change how the model is run, by the names of ``SimulationOptions``; ``None`` leaves it to armblocks.
+ * Change run settings, by the names of ``SimulationOptions``; ``None`` restores the default.
  */
 export interface SetSettings {
   kind: "settings";
@@ -379,7 +379,7 @@ export interface SetSettings {
   };
 }
 /**
- * Put a document away; ``discard`` where it has edits that no file holds.
+ * Close a document; ``discard`` is required if it has unsaved edits.
  */
 export interface Close {
   kind: "close";
@@ -387,7 +387,7 @@ export interface Close {
   discard?: boolean;
 }
 /**
- * Say how a run goes on. ``step`` and ``back`` go to the next and to the last recorded instant.
+ * Pause, resume, stop or step a run. ``step`` and ``back`` move by one recorded instant.
  */
 export interface Control {
   run: string;
@@ -395,7 +395,7 @@ export interface Control {
   action: "pause" | "resume" | "step" | "back" | "stop";
 }
 /**
- * Ask for blocks and notes of a sheet as text, which :class:`PasteBlocks` puts on a sheet again.
+ * Return blocks and notes of a sheet as text, for :class:`PasteBlocks`.
  */
 export interface Copy {
   kind: "copy";
@@ -405,7 +405,7 @@ export interface Copy {
   notes?: string[];
 }
 /**
- * Open a file that was dropped on the page: a script, a robot or a diagram. Nothing of it is run.
+ * Open a file that was dropped on the studio: a diagram, a robot or a script (it is not executed).
  */
 export interface Drop {
   kind: "drop";
@@ -413,13 +413,13 @@ export interface Drop {
   content: string;
 }
 /**
- * Ask for the files of the project folder as they are now.
+ * Return the present files of the project folder.
  */
 export interface Files {
   kind: "files";
 }
 /**
- * Ask for blocks of all sheets by words of their names, types and values: a list of :class:`Found`.
+ * Search all sheets for blocks by words in names, types and values.
  */
 export interface Find {
   kind: "find";
@@ -427,14 +427,14 @@ export interface Find {
   text: string;
 }
 /**
- * Leave the file that has changed on the disk as it is until the next save, which overwrites it.
+ * Keep the document although its file has changed on disk; the next save overwrites the file.
  */
 export interface KeepMine {
   kind: "keep_mine";
   document: string;
 }
 /**
- * Look at the sheet inside a subsystem; the empty path is the whole model.
+ * Display the sheet inside a subsystem; the empty path is the top sheet.
  */
 export interface Look {
   kind: "look";
@@ -442,7 +442,7 @@ export interface Look {
   inside: string[];
 }
 /**
- * Begin a new document.
+ * Create a new document.
  */
 export interface New {
   kind: "new";
@@ -451,7 +451,7 @@ export interface New {
 /**
  * Open a file of the project: a diagram, a robot, or a script of robots.
  *
- * The reply has the keys of the documents; the first comes to the front.
+ * The reply contains the keys of the documents; the front end shows the first one.
  */
 export interface Open {
   kind: "open";
@@ -466,14 +466,14 @@ export interface OpenShipped {
   name: string;
 }
 /**
- * Ask for the tree of sheets, an :class:`Outline`.
+ * Return the tree of sheets.
  */
 export interface AskOutline {
   kind: "outline";
   document: string;
 }
 /**
- * Ask for a drawing of a robot at ``q``, as SVG.
+ * Return a drawing of a robot at ``q``, as SVG.
  */
 export interface AskPicture {
   document: string;
@@ -487,13 +487,13 @@ export interface AskPicture {
   theme: "light" | "dark";
 }
 /**
- * Ask for nothing but an answer: the page thereby knows that the line is up.
+ * Test the connection; the reply has no content.
  */
 export interface Ping {
   kind: "ping";
 }
 /**
- * Ask where the base, the links and the tool of a robot are at ``q``: poses (L+2, 4, 4).
+ * Return the poses of base, links and tool of a robot at ``q``: (L+2, 4, 4).
  */
 export interface AskPose {
   document: string;
@@ -506,7 +506,7 @@ export interface AskPose {
   q: number[];
 }
 /**
- * Ask what the robot of a document does at ``q, qd, qdd``.
+ * Compute the read-outs of the robot of a document at ``q, qd, qdd``.
  */
 export interface AskReadings {
   kind: "readings";
@@ -525,10 +525,10 @@ export interface AskReadings {
   qdd: number[];
 }
 /**
- * Say what becomes of a document that a journal gives back.
+ * Recover or discard a document of an earlier server.
  *
- * ``open`` opens it as it was, not yet saved; ``keep_both`` saves it as a new file beside the one it came
- * from and opens that; ``discard`` deletes the journal.
+ * ``open`` opens it with its unsaved edits; ``keep_both`` saves it as a new file beside the original one and
+ * opens the new file; ``discard`` deletes the journal.
  */
 export interface Recover {
   kind: "recover";
@@ -536,7 +536,7 @@ export interface Recover {
   action: "open" | "keep_both" | "discard";
 }
 /**
- * Do again what was undone.
+ * Repeat the edit that was undone last.
  */
 export interface Redo {
   document: string;
@@ -546,7 +546,7 @@ export interface Redo {
   kind: "redo";
 }
 /**
- * Take what the file holds now, as one step that can be undone.
+ * Replace the document by the content of its file, as one undo step.
  */
 export interface Reload {
   document: string;
@@ -556,7 +556,7 @@ export interface Reload {
   kind: "reload";
 }
 /**
- * Pause a run and take it back to an instant (s): what came later is forgotten, tuned values stay.
+ * Pause a run and return to an instant (s). Later samples are discarded; tuned values remain.
  */
 export interface Rewind {
   run: string;
@@ -564,7 +564,7 @@ export interface Rewind {
   time: number;
 }
 /**
- * Open the robot that a block uses: its file, or a copy of it.
+ * Open the robot of a block: its file, or a copy of a shipped robot.
  */
 export interface RobotOfBlock {
   kind: "robot_of_block";
@@ -573,15 +573,15 @@ export interface RobotOfBlock {
   block: string;
 }
 /**
- * Ask which tables robots have and what stands in their columns.
+ * Return the columns of the robot tables.
  */
 export interface AskRobotTables {
   kind: "robot_tables";
 }
 /**
- * Start the model. ``speed`` is simulated seconds per second, ``None`` as fast as possible.
+ * Start a run. ``speed`` is simulated seconds per second; ``None`` runs as fast as possible.
  *
- * ``tuned``: values of tunable parameters, ``block.parameter``, that are tried without being in the model.
+ * ``tuned``: trial values of tunable parameters, by ``block.parameter``; the model keeps its own values.
  */
 export interface Run {
   kind: "run";
@@ -592,7 +592,7 @@ export interface Run {
   };
 }
 /**
- * Write the file; ``path`` gives it another. ``overwrite``: also where the disk has changed meanwhile.
+ * Write the file, under ``path`` if it is given. ``overwrite``: also if the file has changed on disk.
  *
  * The reply is the path.
  */
@@ -603,7 +603,7 @@ export interface Save {
   overwrite?: boolean;
 }
 /**
- * Ask for the bodies of a robot.
+ * Return the bodies of a robot.
  */
 export interface AskScene {
   document: string;
@@ -612,7 +612,7 @@ export interface AskScene {
   kind: "scene";
 }
 /**
- * Change the speed of a run; ``None``: as fast as possible.
+ * Change the speed of a run; ``None`` runs as fast as possible.
  */
 export interface SetSpeed {
   run: string;
@@ -620,7 +620,7 @@ export interface SetSpeed {
   speed?: number | null;
 }
 /**
- * Change a tunable parameter of a run that is under way.
+ * Change a tunable parameter during a run.
  */
 export interface Tune {
   run: string;
@@ -629,7 +629,7 @@ export interface Tune {
   value: unknown;
 }
 /**
- * Ask what a text typed into a parameter's field means: its value, or what is wrong with it.
+ * Parse a text typed into a parameter field; the reply is its value, a refusal describes the error.
  */
 export interface TypedValue {
   kind: "typed";
@@ -641,7 +641,7 @@ export interface TypedValue {
   text: string;
 }
 /**
- * Ask what is wrong with settings while they are typed: a text for each that is, by name.
+ * Check settings while they are typed; the reply has an error text for each invalid one, by name.
  */
 export interface TypedSettings {
   kind: "typed_settings";
@@ -651,7 +651,7 @@ export interface TypedSettings {
   };
 }
 /**
- * Take the last edit back.
+ * Revert the last edit.
  */
 export interface Undo {
   document: string;
@@ -661,13 +661,13 @@ export interface Undo {
   kind: "undo";
 }
 /**
- * Only for the types of the front end: everything that the server sends as text.
+ * All text messages of the server, for the generated types of the front end.
  */
 export interface ServerMessage {
   event: Changed | Checked | Documents | Opened | Reply | RunProgress | RunRewound | RunStarted | RunTuned | Welcome;
 }
 /**
- * A document went from version ``before`` to that of its state, which may be the same.
+ * The change of a document from version ``before`` to the version in ``state``, which may be the same.
  */
 export interface Changed {
   kind: "changed";
@@ -676,11 +676,11 @@ export interface Changed {
   change: DiagramChange | RobotChange;
 }
 /**
- * Where a document stands.
+ * File, version and save state of a document.
  *
- * ``origin`` is the shipped example or robot that it began as. ``disk`` says how the file is now, compared
- * with what was opened or saved. ``journaled`` is false where the journal cannot be written: then only a
- * save keeps the edits.
+ * ``origin`` is the shipped example or robot from which it was created. ``disk`` compares the file on disk
+ * with the version that was opened or saved. ``journaled`` is false if the journal cannot be written; the
+ * edits are then lost unless they are saved.
  */
 export interface DocumentState {
   document: string;
@@ -696,7 +696,7 @@ export interface DocumentState {
   journaled: boolean;
 }
 /**
- * What changed on the sheet that a page looks at, and the settings of the diagram.
+ * Changes of the displayed sheet and of the run settings.
  */
 export interface DiagramChange {
   kind: "diagram";
@@ -706,7 +706,7 @@ export interface DiagramChange {
   };
 }
 /**
- * From one version of the drawing to the next.
+ * The difference between two versions of a sheet.
  */
 export interface SheetChange {
   blocks: {
@@ -721,7 +721,7 @@ export interface SheetChange {
   logged?: string[] | null;
 }
 /**
- * A block as it stands on the sheet. ``face`` is SVG in the block's own px; its colours are classes.
+ * A block as drawn on the sheet. ``face`` is SVG in the block's px; its colours are CSS classes.
  */
 export interface SheetBlock {
   name: string;
@@ -744,7 +744,7 @@ export interface SheetBlock {
   link: string;
 }
 /**
- * A port on the edge of its block: px from the block's corner, and the direction of its wire.
+ * A port on the edge of its block: position from the block's corner in px, and direction of its wire.
  */
 export interface PortSpot {
   name: string;
@@ -757,7 +757,7 @@ export interface PortSpot {
   dy: number;
 }
 /**
- * One parameter of a type of block, as its dialog needs it.
+ * The declaration of one parameter of a block type, for its dialog.
  */
 export interface ParameterRule {
   name: string;
@@ -770,7 +770,7 @@ export interface ParameterRule {
   allowed: string;
 }
 /**
- * A robot after a change: all of it, since one cell may change many.
+ * A robot after a change: the complete content, because one cell may affect many others.
  */
 export interface RobotChange {
   kind: "robot";
@@ -791,7 +791,7 @@ export interface RobotContent {
   findings: RobotFinding[];
 }
 /**
- * A link as the tables show it: values by column in SI units, ``None`` where there is none.
+ * A link as a row of the tables: values by column in SI units, ``None`` for an empty cell.
  */
 export interface LinkRow {
   name: string;
@@ -807,7 +807,7 @@ export interface LinkRow {
   };
 }
 /**
- * What no real arm could have, at the columns of a link that say it.
+ * A physically impossible value, and the columns of the link that contain it.
  */
 export interface RobotFinding {
   link: string;
@@ -816,7 +816,7 @@ export interface RobotFinding {
   fix: string;
 }
 /**
- * What the background check found in one version of a document; ``wires`` by source port.
+ * The findings of the background check for one version of a document; ``wires`` by source port.
  */
 export interface Checked {
   kind: "checked";
@@ -828,7 +828,7 @@ export interface Checked {
   };
 }
 /**
- * What the background check says; ``block`` and ``port`` are ``""`` where it is of the whole drawing.
+ * A finding of the background check; ``block`` and ``port`` are ``""`` for the whole diagram.
  */
 export interface Finding {
   severity: "error" | "warning";
@@ -838,7 +838,7 @@ export interface Finding {
   fix: string;
 }
 /**
- * What runs on the wires that leave a port.
+ * Type and shape of the signal on the wires of an output port.
  */
 export interface WireKind {
   shape: number[];
@@ -846,7 +846,7 @@ export interface WireKind {
   bus?: boolean;
 }
 /**
- * The documents that are open and those that wait to be recovered, whenever either has changed.
+ * The open and the recoverable documents, sent when either list has changed.
  */
 export interface Documents {
   kind: "documents";
@@ -854,12 +854,12 @@ export interface Documents {
   recoveries: Recovery[];
 }
 /**
- * A document that was not saved when the studio ended, as its journal gives it back.
+ * An unsaved document of an earlier server that can be recovered from its journal.
  *
- * ``path`` is the file that it came from, ``None`` where it never had one. ``began`` and ``last`` are when
- * the first and the last edit since the save were made (s since 1970), ``edits`` how many there are,
- * ``parts`` how many blocks or links it has. ``disk`` says whether the file is still the one that was
- * edited. ``missing`` says what could not be read.
+ * ``path`` is its file, or ``None`` if it was never saved. ``began`` and ``last`` are the times of the first
+ * and the last edit since the save (s since 1970), ``edits`` is their number, ``parts`` the number of blocks
+ * or links. ``disk`` says whether the file has changed since the edits. ``missing`` describes the edits that
+ * could not be recovered.
  */
 export interface Recovery {
   document: string;
@@ -874,9 +874,9 @@ export interface Recovery {
   missing: string;
 }
 /**
- * A whole document, for a page that shows it from now on.
+ * A complete document, for a page that shows it from now on.
  *
- * ``notes``: what was said when its file was read. ``in_front``: whether it comes to the front of the page.
+ * ``notes``: warnings issued while its file was read. ``in_front``: whether the page brings it to the front.
  */
 export interface Opened {
   kind: "opened";
@@ -886,10 +886,10 @@ export interface Opened {
   in_front: boolean;
 }
 /**
- * The sheet of a diagram that a page looks at, and how the diagram is run.
+ * The displayed sheet of a diagram, and the run settings.
  *
- * ``inside``: names of the subsystems on the way to the sheet. ``settings`` go by the names of
- * ``SimulationOptions``. ``run``: the key of the run that the server has of the diagram.
+ * ``inside``: names of the subsystems that lead to the sheet. ``settings`` use the names of
+ * ``SimulationOptions``. ``run``: key of the current or last run of the diagram.
  */
 export interface DiagramContent {
   kind: "diagram";
@@ -901,7 +901,7 @@ export interface DiagramContent {
   run: string | null;
 }
 /**
- * The whole drawing.
+ * The complete drawing of a sheet.
  */
 export interface Sheet {
   name: string;
@@ -918,7 +918,7 @@ export interface Sheet {
   link: string;
 }
 /**
- * The answer to a request: ``fault`` where it was refused.
+ * The reply to a request; ``fault`` is set if the request was refused.
  */
 export interface Reply {
   kind: "reply";
@@ -929,7 +929,7 @@ export interface Reply {
   fault?: Fault | null;
 }
 /**
- * Why a request was refused, in the parts of an ``ArmblocksError``.
+ * The reason for a refused request: the fields of an ``ArmblocksError``.
  */
 export interface Fault {
   what: string;
@@ -938,7 +938,7 @@ export interface Fault {
   fix: string;
 }
 /**
- * Where a run stands. ``solver`` and ``reason`` say at its end what worked it out, and why that.
+ * State and time of a run. At the end, ``solver`` and ``reason`` state which solver was used and why.
  */
 export interface RunProgress {
   kind: "run_progress";
@@ -952,7 +952,7 @@ export interface RunProgress {
   reason?: string;
 }
 /**
- * A run stands at an earlier instant (s) again: only the first ``count`` samples are still true.
+ * A run has returned to an earlier instant (s); only the first ``count`` samples remain valid.
  */
 export interface RunRewound {
   kind: "run_rewound";
@@ -961,7 +961,7 @@ export interface RunRewound {
   count: number;
 }
 /**
- * A run has begun: what it records and how it is to be shown.
+ * The start of a run: its recorded signals, views and tunable parameters.
  */
 export interface RunStarted {
   kind: "run_started";
@@ -977,9 +977,9 @@ export interface RunStarted {
   stride: number;
 }
 /**
- * One recorded signal of a run and where its numbers lie in the columns of a frame.
+ * One recorded signal of a run, in the order of the columns of a frame.
  *
- * ``entries`` are names of the entries of a vector, such as joints; empty where they are numbered.
+ * ``entries`` are the names of the entries of a vector, such as joints; empty if the entries are numbered.
  */
 export interface Channel {
   name: string;
@@ -988,7 +988,7 @@ export interface Channel {
   entries: string[];
 }
 /**
- * A picture that a sink asks for. ``robot`` is the key of its scene where the kind is ``robot``.
+ * The plot or 3-D view of a sink. For the kind ``robot``, ``robot`` is the key of its scene.
  */
 export interface ViewOf {
   block: string;
@@ -998,9 +998,9 @@ export interface ViewOf {
   title: string;
 }
 /**
- * A parameter that can be changed while the run goes on; ``path`` is ``block.parameter``.
+ * A parameter that can be changed during a run; ``path`` is ``block.parameter``.
  *
- * ``low`` and ``high`` bound its numbers as the block declares it; ``None`` where nothing does.
+ * ``low`` and ``high`` are the bounds that the block declares, ``None`` if unbounded.
  */
 export interface Tunable {
   path: string;
@@ -1011,7 +1011,7 @@ export interface Tunable {
   high: number | null;
 }
 /**
- * From this instant (s) on a parameter of a run has this value.
+ * A parameter of a run has this value from this instant (s) on.
  */
 export interface RunTuned {
   kind: "run_tuned";
@@ -1021,7 +1021,7 @@ export interface RunTuned {
   value: unknown;
 }
 /**
- * The first message: the library, the examples, the files and the documents that are open.
+ * The first message: library, examples, files and open documents.
  */
 export interface Welcome {
   kind: "welcome";
@@ -1039,7 +1039,7 @@ export interface Welcome {
   recoveries: Recovery[];
 }
 /**
- * A type of block in the library palette. ``face`` is the drawing of one with the default parameters.
+ * A block type in the library palette. ``face`` is the drawing with default parameters.
  */
 export interface BlockType {
   type: string;
@@ -1055,7 +1055,7 @@ export interface BlockType {
   parameters: ParameterRule[];
 }
 /**
- * A solver that a model may ask for.
+ * A solver that a model may select.
  */
 export interface SolverChoice {
   name: string;
@@ -1064,7 +1064,7 @@ export interface SolverChoice {
   stiff: boolean;
 }
 /**
- * One setting of a run, as the dialog of configuration parameters needs it.
+ * One setting of a run, for the dialog of configuration parameters.
  */
 export interface SettingRule {
   name: string;
@@ -1111,14 +1111,14 @@ export interface Replies {
   undo: number;
 }
 /**
- * Files of the project folder; ``recent`` are those used last, the latest first.
+ * Files of the project folder; ``recent`` are the recently used ones, the latest first.
  */
 export interface FileList {
   files: string[];
   recent: string[];
 }
 /**
- * A block that was sought; ``match`` is the value that fits, ``""`` where name or type does.
+ * A block found by a search; ``match`` is the matching value, ``""`` if the name or type matches.
  */
 export interface Found {
   inside: string[];
@@ -1135,7 +1135,7 @@ export interface Outline {
   subsystems: Outline[];
 }
 /**
- * What an arm does in one configuration; m, rad, N m, world axes.
+ * Read-outs of an arm in one configuration, in m, rad and N m along world axes.
  */
 export interface Readings {
   pose: number[][];
@@ -1149,7 +1149,7 @@ export interface Readings {
   limits: string[];
 }
 /**
- * Every column of the tables of robots.
+ * All columns of the tables of robots.
  */
 export interface RobotTables {
   kinematics: CellColumn[];
@@ -1172,8 +1172,8 @@ export interface CellColumn {
 /**
  * Bodies, joints and size of a robot.
  *
- * ``reach`` (m) of the arm; ``foot`` (m): how far the bodies of the base reach below its frame. There are
- * ``rows`` poses: of base, links and tool.
+ * ``reach`` (m) of the arm; ``foot`` (m): distance by which the bodies of the base extend below its frame.
+ * ``rows`` is the number of poses: base, links and tool.
  */
 export interface RobotScene {
   name: string;
@@ -1185,7 +1185,7 @@ export interface RobotScene {
   [k: string]: unknown;
 }
 /**
- * A body of a robot, which moves with a ``row`` of the poses: 0 is the base, then come the links.
+ * A body of a robot; its pose is ``row`` of the poses: row 0 is the base, the links follow.
  *
  * ``corners`` (F, 3, 3) m and unit ``normals`` (F, 3, 3) of its triangles: base64 of little-endian float32.
  */
@@ -1197,12 +1197,12 @@ export interface SceneBody {
   [k: string]: unknown;
 }
 /**
- * A joint: the link of ``row`` moves against that of ``carrier``.
+ * A joint: the link of ``row`` moves relative to the body of row ``carrier``.
  *
- * ``frame`` is its pose in the frame of ``carrier`` and ``moving`` its pose in the link's own frame, (16,)
- * row by row; z is the joint's axis. The x of ``moving`` has turned from that of ``frame`` by q + ``offset``
- * (of a prismatic joint: its origin has moved so far). ``limits`` are in rad or m, ``radius`` (m) is that of
- * the drum that is drawn on the joint.
+ * ``frame`` is the joint frame in the frame of ``carrier``, ``moving`` the joint frame in the link frame,
+ * both (16,) row by row; z is the joint axis. For a revolute joint, x of ``moving`` is rotated from x of
+ * ``frame`` by q + ``offset``; for a prismatic joint, its origin is displaced by q + ``offset``. ``limits``
+ * are in rad or m, ``radius`` (m) is that of the cylinder drawn at the joint.
  */
 export interface SceneJoint {
   name: string;

@@ -84,11 +84,11 @@ def test_names_that_are_taken_and_texts_that_are_no_diagram_are_refused() -> Non
     with pytest.raises(DiagramError, match="a block is already named 'PID'"):
         document.edit(PasteBlocks(text=copy(document.diagram, "PID")))
     document = Document(noted, load_robot)
-    with pytest.raises(DiagramError, match="a note of this name is already there"):
+    with pytest.raises(DiagramError, match="a note with this name exists already"):
         document.edit(PasteBlocks(text=copy(noted, notes=("/1",))))
     document.edit(PasteBlocks(text=copy(noted, notes=("/1",)), names={"/1": "/2"}, shift=5.0))
     assert document.diagram.notes["/2"] == Note(x=5, y=5, text="a")
-    with pytest.raises(FormatError, match="what was copied"):
+    with pytest.raises(FormatError, match="the copied blocks"):
         document.edit(PasteBlocks(text="[1, 2]"))
 
 
@@ -139,5 +139,5 @@ def test_a_block_is_put_into_a_wire_and_taken_out_of_it_as_one_step() -> None:
     document.undo()
     assert document.diagram == alone
     document.edit(RemoveBlocks(blocks=["free"]))
-    with pytest.raises(DiagramError, match="there is no wire free/y -> x1/u"):
+    with pytest.raises(DiagramError, match="the wire free/y -> x1/u does not exist"):
         document.edit(MoveBlocks(places={}, instead=through[1:]))

@@ -34,7 +34,7 @@ def test_save_as_asks_before_it_overwrites(page: Page, studio: Studio) -> None:
     field = page.get_by_role("combobox", name="File")
     field.fill("a:b")
     page.get_by_role("button", name="Save", exact=True).click()
-    expect(page.get_by_text("is no path of the project")).to_be_visible()
+    expect(page.get_by_text("is not a path of the project")).to_be_visible()
     field.fill("models/one")
     field.press("Enter")
     expect(page.locator(".title")).to_have_text("one")

@@ -57,7 +57,7 @@ def test_a_changed_byte_ends_the_journal_there(tmp_path: Path) -> None:
 def test_a_journal_without_a_whole_record_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.journal"
     path.write_bytes(b"12 00000000 {")
-    with pytest.raises(FormatError, match="the journal holds no whole record"):
+    with pytest.raises(FormatError, match="the journal contains no complete record"):
         read_journal(path)
     with pytest.raises(FormatError, match="the journal cannot be read"):
         read_journal(tmp_path / "nowhere")

@@ -57,17 +57,17 @@ def test_a_file_that_somebody_else_has_written_is_noticed(folder: ProjectFolder)
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        (".hidden.json", "begins with a dot"),
-        ("a/ b.json", "begins with a dot or space"),
+        (".hidden.json", "begins or ends with a dot"),
+        ("a/ b.json", "begins or ends with a dot or space"),
         ("a//b.json", "is empty"),
-        ("what?.json", "holds a character that not every system stores"),
-        ("line\nbreak.json", "holds a character"),
-        ("NUL.json", "is the name of a device"),
+        ("what?.json", "contains a character that some systems cannot store"),
+        ("line\nbreak.json", "contains a character"),
+        ("NUL.json", "is a reserved device name"),
         ("x" * 130 + ".json", "has 135 characters"),
     ],
 )
 def test_names_that_no_system_stores_are_refused(folder: ProjectFolder, name: str, words: str) -> None:
-    with pytest.raises(ArmblocksError, match=f"cannot be a file's name: it .*{words}"):
+    with pytest.raises(ArmblocksError, match=f"cannot be a file name: it .*{words}"):
         folder.write(name, b"{}")
 
 
@@ -94,11 +94,11 @@ def test_what_a_killed_save_left_is_swept_away(folder: ProjectFolder) -> None:
         ("arms/../../outside.json", "lies outside of the project folder"),
         ("../project-secret/a.json", "lies outside of the project folder"),
         ("link.json", "lies outside of the project folder"),
-        ("/etc/passwd.json", "is no path of the project"),
-        ("\\\\host\\share\\a.json", "is no path of the project"),
-        ("C:/a.json", "is no path of the project"),
-        ("a\0.json", "is no path of the project"),
-        ("", "is no path of the project"),
+        ("/etc/passwd.json", "is not a path of the project"),
+        ("\\\\host\\share\\a.json", "is not a path of the project"),
+        ("C:/a.json", "is not a path of the project"),
+        ("a\0.json", "is not a path of the project"),
+        ("", "is not a path of the project"),
         ("notes.txt", "the studio does not open 'notes.txt'"),
         ("inside.json/..", "lies outside of the project folder"),
     ],

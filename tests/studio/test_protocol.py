@@ -38,5 +38,5 @@ def test_a_request_without_a_reply_type_is_refused() -> None:
     class Silent(Request):  # pyright: ignore[reportMissingTypeArgument]
         """A request that does not say which value its reply has."""
 
-    with pytest.raises(TypeError, match="Silent does not say which reply it has"):
+    with pytest.raises(TypeError, match="Silent does not declare the type of its reply"):
         reply_type(Silent)

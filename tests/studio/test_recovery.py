@@ -260,7 +260,7 @@ def test_saved_drawings_leave_no_journal_behind(disk: Disk) -> None:
         found = documents.new()
         documents.perform(found, change("1", add("gain")))
         assert len(list(disk.kept.journals.iterdir())) == 1
-        with pytest.raises(InputError, match="'untitled' has edits that no file holds"):
+        with pytest.raises(InputError, match="'untitled' has unsaved edits"):
             documents.close(found, discard=False)
         await documents.save(found, "a.json", overwrite=False)
         documents.end()
@@ -388,7 +388,7 @@ def test_a_journal_that_cannot_be_read_is_not_written_over(disk: Disk) -> None:
         journal = disk.kept.journals / f"{key}.diagram"
         journal.write_bytes(b"nothing that is a journal")
         documents = disk.documents()
-        with pytest.raises(FormatError, match="the journal holds no whole record"):
+        with pytest.raises(FormatError, match="the journal contains no complete record"):
             documents.attach(key)
         assert journal.read_bytes() == b"nothing that is a journal"
         assert [offer.document for offer in documents.left.offers()] == [key]

@@ -116,7 +116,7 @@ def test_the_paper_s_script_is_dropped_edited_undone_saved_and_opened_again(tmp_
         assert "changed on the disk" in await talk.refused("save", document=key)
         await talk.ask("save", document=key, overwrite=True)
         (tmp_path / "other.json").write_text("{}")
-        assert "such a file already" in await talk.refused("save", document=key, path="other.json")
+        assert "the file exists already" in await talk.refused("save", document=key, path="other.json")
 
     talk(tmp_path, talking)
     (saved,) = read_robots((tmp_path / "arms" / "mine.json").read_bytes(), "mine.json").values()
@@ -130,7 +130,7 @@ def test_the_paper_s_script_is_dropped_edited_undone_saved_and_opened_again(tmp_
 def test_what_is_dropped_is_bounded_and_named_where_it_is_not_understood(tmp_path: Path) -> None:
     async def talking(talk: Talk) -> None:
         for name in ("arm.exe", "noname", "run.py"):
-            assert "no kind of file" in await talk.refused("drop", name=name, content="")
+            assert "is not a file type" in await talk.refused("drop", name=name, content="")
         assert "the content is not base64" in await talk.refused("drop", name="a.m", content="§")
         huge = packed(b" " * (MOST_DROPPED + 1))
         assert f"{MOST_DROPPED + 1} bytes" in await talk.refused("drop", name="a.json", content=huge)
@@ -208,10 +208,10 @@ def test_two_pages_see_each_other_s_edits(tmp_path: Path) -> None:
         assert other_told[-1]["state"]["version"] == 8
         assert "open document" in await talk.refused("undo", document="nobody")
         rename = {"kind": "rename", "block": "a", "name": "b"}
-        assert "'rename' is no edit of a robot" in await talk.refused("change", document=key, edit=rename)
+        assert "'rename' is not an edit of a robot" in await talk.refused("change", document=key, edit=rename)
         await talk.ask("redo", document=key)
         await talk.ask("undo", document=key)
-        assert "has edits that no file holds" in await talk.refused("close", document=key)
+        assert "has unsaved edits" in await talk.refused("close", document=key)
         await talk.ask("close", document=key, discard=True)
         assert talk.told[-2]["documents"] == []
 
@@ -247,18 +247,18 @@ def test_singularities_are_told_in_words() -> None:
     puma = ab.load_robot("puma560")
     names = puma.robot.joint_names
     wrist = readings(puma, [0.1, 0.4, -0.3, 0.5, 0.0, 0.2], [0.0] * 6, [0.0] * 6)
-    assert wrist.singular.startswith(f"Singular: {names[3]} and {names[5]} can move against each other")
+    assert wrist.singular.startswith(f"Singular: {names[3]} and {names[5]} can move together")
     assert readings(puma, [0.1, 0.4, -0.3, 0.5, 0.7, 0.2], [0.0] * 6, [0.0] * 6).singular == ""
     assert singularity(np.zeros((6, 2)), ["a", "b"], 1.0) == "Singular: no joint moves the tool."
     lone = np.zeros((6, 2))
     lone[0, 0] = 1.0
-    assert singularity(lone, ["a", "b"], 1.0) == "Singular: b moves and the tool stays where it is."
+    assert singularity(lone, ["a", "b"], 1.0) == "Singular: b moves without motion of the tool."
     square = np.diag([1.0, 1.0, 1.0, 1.0, 1.0, 0.01])
     assert singularity(square, list("abcdef"), 1.0).startswith("Close to singular: f moves")
     fast = readings(puma, [9.0] * 6, [100.0] * 6, [0.0] * 6)
-    assert f"{names[0]} stands outside of its range" in fast.limits
+    assert f"{names[0]} is outside its range" in fast.limits
     kuka = ab.load_robot("kr180")
-    assert "link1 is faster than it may be" in readings(kuka, [0.0] * 4, [9.0] * 4, [0.0] * 4).limits
+    assert "link1 exceeds its speed limit" in readings(kuka, [0.0] * 4, [9.0] * 4, [0.0] * 4).limits
 
 
 def test_files_of_robots_are_told_from_diagrams_and_bounded() -> None:

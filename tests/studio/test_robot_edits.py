@@ -133,8 +133,8 @@ def test_cells_without_a_value_can_be_emptied() -> None:
         ("link1", "a", "[1, 5]", "2 numbers were typed"),
         ("link1", "a", "import os", "is not a formula"),
         ("link1", "a", "inf", "a is inf"),
-        ("link1", "theta", "1", "there is nothing to type here"),
-        ("link1", "joint", "ball", "'ball' is no choice"),
+        ("link1", "theta", "1", "this cell cannot be edited"),
+        ("link1", "joint", "ball", "'ball' is not a choice"),
         ("link1", "colour", "red", "there is no column 'colour'"),
         ("link1", "mass", "-1", "the mass is -1 kg"),
         ("link1", "lowest", "400", "position limits are reversed"),
@@ -163,13 +163,13 @@ def test_joints_are_added_taken_out_moved_and_renamed() -> None:
     swapped = edited(robot, "move_joint", link=names[0], by=1)
     assert [link.name for link in swapped.links[:3]] == [names[1], names[0], names[2]]
     assert edited(swapped, "move_joint", link=names[0], by=-1) == robot
-    with pytest.raises(InputError, match="no neighbour on that side"):
+    with pytest.raises(InputError, match="no link on that side"):
         edited(robot, "move_joint", link=names[0], by=-1)
     renamed = edited(robot, "rename_link", link=names[1], name=" elbow ")
     assert renamed.links[2].parent == "elbow"
     with pytest.raises(RobotError, match=f"two links are named '{names[0]}'"):
         edited(robot, "rename_link", link=names[1], name=names[0])
-    with pytest.raises(RobotError, match="one link at least"):
+    with pytest.raises(RobotError, match="at least one link"):
         edited(replace(robot, links=robot.links[:1]), "remove_joint", link=names[0])
     tree = replace(robot, links=(*robot.links, standard_dh("finger", parent=names[1])))
     with pytest.raises(RobotError, match="do not form a single chain"):

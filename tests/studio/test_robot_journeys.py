@@ -139,7 +139,7 @@ def test_the_paper_s_script_is_dropped_looked_at_and_pictured(page: Page) -> Non
     drop(page, "evil.m", b"L{1} = link([0 1 0 0 0]);\nsystem('true')\n")
     expect(page.get_by_text(re.compile("evil.m:2"))).to_be_visible()
     drop(page, "arm.step", b"ISO-10303-21;")
-    expect(page.get_by_text("is no kind of file that can be dropped here")).to_be_visible()
+    expect(page.get_by_text("is not a file type that can be dropped here")).to_be_visible()
     model = (Path(ab.__file__).parents[2] / "examples" / "van_der_pol_pid.json").read_bytes()
     drop(page, "pendulum.json", model)
     expect(editor).to_have_count(0)

@@ -206,7 +206,7 @@ def test_what_was_dropped_is_in_the_journal_before_it_is_edited(disk: Disk, tmp_
         robots = disk.robots()
         found = robots.bring(load_robot("kr180"))
         assert found.document.dirty
-        with pytest.raises(InputError, match="has edits that no file holds"):
+        with pytest.raises(InputError, match="has unsaved edits"):
             robots.close(found, discard=False)
         back = disk.as_after_a_crash(tmp_path / "second").robots().attach(found.key)
         assert back.robot == load_robot("kr180")
@@ -248,7 +248,7 @@ def test_two_pages_do_not_overwrite_each_other_s_cells(disk: Disk) -> None:
             cell("3", "link1", "a", "4", author="me", base=0),
             say.Undo(document="", key="4", author="me", base=0),
         ):
-            with pytest.raises(InputError, match=r"another page.*do it again"):
+            with pytest.raises(InputError, match=r"another page.*repeat the edit"):
                 robots.perform(found, late)
         assert found.robot.links[0].dh is not None
         assert (found.robot.links[0].dh.a, found.robot.links[0].dh.d) == (2, 3)

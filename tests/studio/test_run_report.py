@@ -14,7 +14,7 @@ WAY_OUT = "shorten the run, or use 'armblocks run'"
 
 @pytest.mark.parametrize(
     ("sent", "what"),
-    [(b"", "the report could not be made in the time and memory it may have"), (b"Eno room", "no room")],
+    [(b"", "the report exceeded its time or memory limit"), (b"Eno room", "no room")],
 )
 def test_a_report_that_failed_says_why_and_what_to_do(sent: bytes, what: str) -> None:
     ours, theirs = Pipe(duplex=False)

@@ -229,18 +229,18 @@ def test_refusals_say_what_is_in_the_way() -> None:
     second = AddBlocks(blocks=[NewBlock(name="GAIN", type="Gain", place=place)])
     assert "a block is already named 'gain'" in refused(second)
     assert "is already driven by 'sine/y'" in refused(Connect(wire=Wire(source="sine/y", target="gain/u")))
-    assert "'gain' is no port" in refused(Connect(wire=Wire(source="gain", target="gain/u")))
+    assert "'gain' is not a port" in refused(Connect(wire=Wire(source="gain", target="gain/u")))
     gone = Wire(source="gain/y", target="gain/u")
-    assert "there is no wire gain/y -> gain/u" in refused(RemoveBlocks(wires=[gone]))
+    assert "the wire gain/y -> gain/u does not exist" in refused(RemoveBlocks(wires=[gone]))
     many = [NewBlock(name=f"b{k}", type="Gain", place=place) for k in range(20_000)]
-    assert "the sheet would hold 20002 blocks" in refused(AddBlocks(blocks=many))
+    assert "the sheet would have 20002 blocks" in refused(AddBlocks(blocks=many))
     wrong = SetParameters(block="gain", values={"gain": "import os"})
     assert "'import os' is not a formula" in refused(wrong)
     assert "there is no name named 'os'" in refused(SetParameters(block="gain", values={"gain": "2*os"}))
     assert "is not a formula" in refused(SetParameters(block="gain", values={"gain": "1; x = 2"}))
-    assert "this is no value" in refused(SetParameters(block="gain", values={"gain": " "}))
+    assert "this is not a value" in refused(SetParameters(block="gain", values={"gain": " "}))
     plot = AddBlocks(blocks=[NewBlock(name="p", type="RobotPlot", parameters={"robot": 3}, place=place)])
-    assert "a robot is asked for, and int was given" in refused(plot)
+    assert "the value must be a robot, and int was given" in refused(plot)
 
 
 def test_there_is_an_end_to_undo_and_redo() -> None:

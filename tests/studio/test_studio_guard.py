@@ -244,7 +244,7 @@ def test_two_host_headers_are_refused(app: Guard, keys: Keys) -> None:
         "path": "/",
         "headers": [(b"host", HOST.encode()), (b"host", b"evil.com")],
     }
-    assert app.refusal(scope) == (403, "this server answers to its own address only")
+    assert app.refusal(scope) == (403, "this server accepts requests to its own address only")
 
 
 @pytest.mark.parametrize(

@@ -107,7 +107,7 @@ def test_a_file_that_changed_on_the_disk_is_not_overwritten_without_a_word(tmp_p
             await ask("save", document=key)
         assert (tmp_path / "a.json").read_text() == "{}"
         (tmp_path / "b.json").write_text("{}")
-        with pytest.raises(ArmblocksError, match="there is such a file already"):
+        with pytest.raises(ArmblocksError, match="the file exists already"):
             await ask("save", document=key, path="b.json")
         await ask("save", document=key, path="b.json", overwrite=True)
         await ask("save", document=key)
@@ -199,4 +199,4 @@ def test_a_run_without_memory_fails_in_words(monkeypatch: pytest.MonkeyPatch) ->
     run.run()
     event = json.loads(said[-1][1:])
     assert event["state"] == "failed"
-    assert event["fault"]["what"] == "the run needs more memory than it may have"
+    assert event["fault"]["what"] == "the run exceeds its memory limit"

@@ -91,13 +91,13 @@ def test_what_breaks_is_said_with_its_place_and_without_words(capsys: pytest.Cap
         try:
             raise ValueError(CONTENT) from KeyError(CONTENT)
         except ValueError:
-            logging.getLogger("armblocks.studio.server.hub").exception("a request met a defect")
+            logging.getLogger("armblocks.studio.server.hub").exception("a request failed because of a defect")
         logging.getLogger("uvicorn.error").warning("GET /login?key=%s %s %s", login, keys.session, keys.token)
     finally:
         root.handlers[:] = before
         root.setLevel(level)
     said = capsys.readouterr().err
-    assert "ERROR: a request met a defect" in said
+    assert "ERROR: a request failed because of a defect" in said
     assert f'File "{__file__}"' in said
     assert "ValueError" in said
     assert "WARNING: GET /login?key=… … …" in said

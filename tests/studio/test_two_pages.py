@@ -78,8 +78,9 @@ def test_an_edit_of_what_another_page_changed_is_refused(theirs: DiagramEdit, mi
     before = document.diagram
     with pytest.raises(
         InputError,
-        match=r"your change conflicts with a change from another page.*an edit of what this page showed"
-        r".*look at what is there now, and do it again if you still want to",
+        match=r"your change conflicts with a change from another page.*"
+        r"an edit of the version that this page showed"
+        r".*look at the present version, and repeat the edit if you still want it",
     ):
         document.perform(change("me", base, mine))
     assert document.diagram is before
@@ -130,7 +131,7 @@ def test_undo_takes_back_what_the_page_saw_and_nothing_else() -> None:
 
 @pytest.mark.parametrize("base", [-1, 10_000])
 def test_a_version_that_nobody_knows_is_refused(base: int) -> None:
-    with pytest.raises(InputError, match="the page shows a version of the drawing that is long past"):
+    with pytest.raises(InputError, match="the page shows a version of the drawing that is too old"):
         drawing().perform(change("me", base, gain("b0", 2.0)))
 
 

@@ -144,8 +144,8 @@ def fail_unforeseen(pipe: Connection) -> None:
 
 DEATHS: list[tuple[Callable[[Connection], None], str]] = [
     (crash, "the process of the run crashed (SIGSEGV)"),
-    (use_up_memory, "the run needs more memory than it may have"),
-    (use_up_the_processor, "the run has used all the processor time that it may have (SIGXCPU)"),
+    (use_up_memory, "the run exceeds its memory limit"),
+    (use_up_the_processor, "the run has exceeded its limit of processor time (SIGXCPU)"),
     (fail_unforeseen, "armblocks has a defect (KeyError: 'something')"),
 ]
 
@@ -234,7 +234,7 @@ def test_a_worker_that_is_killed_is_told_and_its_samples_stay(tmp_path: Path) ->
         await talk.until(run, "running")
         os.kill(talk.pid(run), signal.SIGKILL)
         told = await talk.until(run, "failed")
-        assert "(SIGKILL): its memory may have been used up" in told["fault"]["what"]
+        assert "(SIGKILL): the memory may be exhausted" in told["fault"]["what"]
         late: list[str | bytes] = []
 
         async def hear(said: str | bytes) -> None:
@@ -289,7 +289,7 @@ def defect_in_the_report(pipe: Connection, job: dict[str, Any]) -> None:
 @pytest.mark.parametrize(
     ("death", "words"),
     [
-        (crash_in_the_report, "the report could not be made in the time and memory it may have"),
+        (crash_in_the_report, "the report exceeded its time or memory limit"),
         (defect_in_the_report, "armblocks has a defect (KeyError)"),
     ],
 )

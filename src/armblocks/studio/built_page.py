@@ -14,25 +14,25 @@ from armblocks.errors import FormatError
 
 WEB = Path(__file__).parent / "web"
 BUILD = Path(__file__).parents[3] / "frontend" / "build_page.py"
-"""The script that builds the page; only a checkout has it."""
+"""The script that builds the page; it exists only in a checkout."""
 
 
 def built_page(folder: Path = WEB, script: Path = BUILD) -> Path:
-    """The folder of the built page; raises ``FormatError`` with what to do if it is not there."""
+    """Return the folder of the built page; raise ``FormatError`` with the remedy if the page is missing."""
     if not (folder / "index.html").is_file():
         raise FormatError(
             "this installation has no studio page: it was installed without Node.js",
             where=str(folder),
-            allowed="everything but the studio and the widgets works",
+            allowed="everything except the studio and the notebook widgets",
             fix=f"run 'python {script}'" if script.is_file() else "install a wheel that has the page",
         )
     return folder
 
 
 def build_in_checkout(notify: Callable[[str], None], folder: Path = WEB, script: Path = BUILD) -> None:
-    """Build the page where it is missing and its sources are there; ``notify`` gets a line beforehand.
+    """Build the page if it is missing and its sources are present; call ``notify`` with one line first.
 
-    The build writes its progress to standard error. Raises ``FormatError`` where it fails.
+    The build writes its progress to standard error. Raises ``FormatError`` if the build fails.
     """
     if (folder / "index.html").is_file() or not script.is_file():
         return

@@ -1,7 +1,7 @@
 """The studio's views in a notebook: the scopes of a run, and the arm, with one time cursor.
 
-The widgets follow the protocol of anywidget, so Jupyter, VS Code, Colab and marimo show them. Everything that
-they draw with comes along with them; nothing is fetched.
+The widgets follow the protocol of anywidget, so Jupyter, VS Code, Colab and marimo show them. They contain
+all scripts and styles that they need; nothing is downloaded.
 """
 
 from __future__ import annotations
@@ -40,11 +40,11 @@ DRAWING_SIZE = (480, 360)
 def run_widget(
     diagram: Diagram, result: SimulationResult, *, show: str | None = None, height: int = HEIGHT
 ) -> AnyWidget:
-    """What a run of ``diagram`` recorded, as the studio shows it: scopes, the arm, a time cursor.
+    """Show the record of a run of ``diagram`` as the studio does: scopes, the arm, a time cursor.
 
-    ``show`` ``"scopes"`` or ``"robot"`` for one of both; ``height`` in pixels. Widgets of one result share
-    their time cursor; ``widget.time`` (s) reads and moves it. Raises ``InputError`` where there is nothing to
-    show, ``MissingLibraryError`` where anywidget is not installed.
+    ``show`` selects ``"scopes"`` or ``"robot"``; ``None`` shows both. ``height`` is in pixels. Widgets of one
+    result share a time cursor; ``widget.time`` (s) reads and sets it. Raises ``InputError`` if the diagram
+    has nothing to show, ``MissingLibraryError`` if anywidget is not installed.
     """
     if show not in (None, *SHOWN):
         raise InputError(
@@ -69,9 +69,9 @@ def run_widget(
 
 
 def robot_widget(robot: Arm | Robot, q: ArrayLike | None = None, *, height: int = HEIGHT) -> AnyWidget:
-    """An arm at the joint coordinates ``q`` (n,), rad or m (zero where they are not given), to turn around.
+    """Show an arm at the joint coordinates ``q`` (n,), rad or m; the default is zero. The view can rotate.
 
-    Raises ``InputError`` for a wrong count of coordinates, ``MissingLibraryError`` where anywidget is not
+    Raises ``InputError`` for a wrong number of coordinates, ``MissingLibraryError`` if anywidget is not
     installed.
     """
     described = robot.robot if isinstance(robot, Arm) else robot
@@ -90,7 +90,7 @@ def _arm(path: str, robot: Robot, q: ArrayLike | None = None) -> dict[str, Any]:
 
 
 def _record(views: Sequence[tuple[str, View]], result: SimulationResult) -> tuple[str, dict[str, Any], bytes]:
-    """Key, description and samples of what the views show, as the page takes them of a run."""
+    """Key, description and samples of the signals in the views, in the format of the front end."""
     wanted = [f"{name}/{signal}" for name, view in views for signal in view.signals]
     aliases = {name: result.resolve(name) for name in wanted}
     names = list(dict.fromkeys(aliases.values()))
@@ -114,7 +114,7 @@ def _record(views: Sequence[tuple[str, View]], result: SimulationResult) -> tupl
         ],
         "aliases": aliases,
     }
-    # The content says which result it is: the same for all of its widgets, and for no other.
+    # The key is a hash of the samples, so that all widgets of one result share it.
     key = hashlib.sha256(result.name.encode() + result.time.tobytes() + signals.tobytes()).hexdigest()[:16]
     return key, run, sample_frame(key, 0, result.time, signals)
 
@@ -125,7 +125,7 @@ def _widget(title: str, height: int, shown: dict[str, Any], frame: bytes) -> Any
 
 @cache
 def _page() -> str:
-    """The frame's page: one document with its script and its styles inside."""
+    """The HTML document inside the frame, with its script and styles inline."""
     folder = built_page() / "notebook"
     script = (folder / "frame.js").read_text(encoding="utf-8").replace("</script", "<\\/script")
     styles = (folder / "frame.css").read_text(encoding="utf-8").replace("</style", "<\\/style")

@@ -1,8 +1,8 @@
 """The objects that an edit changes, for the detection of conflicts between concurrent edits.
 
-An aspect is a tuple: the names of subsystems and block on the way, and last what of it was changed: ``""``
-that it is there at all, ``place``, ``u <- wire``, or a parameter's name. For a diagram itself ``/`` stands in
-the place of the block: no block's name holds it.
+An aspect is a tuple: the names of the enclosing subsystems and of the block, followed by the changed part of
+the block. The part is ``""`` (the block was added or removed), ``place``, ``u <- wire``, ``u <- bends`` or
+the name of a parameter. For the diagram itself, ``/`` replaces the block name; no block name contains ``/``.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ Aspect = tuple[str, ...]
 
 
 def changed_aspects(before: Diagram, after: Diagram, path: Aspect = ()) -> set[Aspect]:
-    """All differences between two diagrams; identical objects are skipped."""
+    """Return the aspects in which two diagrams differ; identical objects are skipped."""
     if before is after:
         return set()
     found: set[Aspect] = set()
@@ -44,7 +44,7 @@ def changed_aspects(before: Diagram, after: Diagram, path: Aspect = ()) -> set[A
 
 
 def clash(mine: Iterable[Aspect], theirs: Set[Aspect]) -> bool:
-    """Whether two aspects conflict. Adding or removing a block concerns all its parts."""
+    """Whether two sets of aspects conflict. Adding or removing a block conflicts with every change inside."""
     mine = set(mine)
     if mine & theirs:
         return True

@@ -1,4 +1,4 @@
-"""The open documents of both kinds: requests of pages, and notifications to pages."""
+"""The open documents of both kinds: handlers of requests, and notifications to pages."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from armblocks.studio.protocol.page import Page, Pages
 
 
 class DocumentDesk:
-    """Handles the requests about documents, and notifies all pages that show a changed document."""
+    """Handles the requests about documents and notifies all pages that show a changed document."""
 
     def __init__(
         self, folder: ProjectFolder, pages: Pages, presenters: Mapping[say.DocumentKind, Presenter[Any]]
@@ -47,7 +47,7 @@ class DocumentDesk:
         return any(key in presenter.files for presenter in self._presenters.values())
 
     def __getitem__(self, key: str) -> OpenFile[Any]:
-        """The document of this key; raises ``UnknownNameError``."""
+        """Return the document with this key; raise ``UnknownNameError`` if there is none."""
         return self._found(key)[1]
 
     def states(self) -> list[say.DocumentState]:
@@ -55,18 +55,18 @@ class DocumentDesk:
         return [found.state() for presenter in self._presenters.values() for found in presenter.files]
 
     def recoveries(self) -> list[say.Recovery]:
-        """The documents that wait to be recovered, the latest first."""
+        """The documents that can be recovered, the latest first."""
         offers = (offer for presenter in self._presenters.values() for offer in presenter.files.left.offers())
         return sorted(offers, key=lambda offer: -offer.last)
 
     def watch(self) -> list[asyncio.Task[None]]:
-        """Start watching the files of all documents."""
+        """Start the tasks that watch the files of all documents for changes by other programs."""
         loop = asyncio.get_running_loop()
         watches = (presenter.files.watch(self.tell_state) for presenter in self._presenters.values())
         return [loop.create_task(watch) for watch in watches]
 
     def end(self) -> None:
-        """Close all documents without loss of data."""
+        """Close all documents; journals of unsaved documents remain."""
         for presenter in self._presenters.values():
             presenter.files.end()
 
@@ -79,7 +79,7 @@ class DocumentDesk:
         *,
         in_front: bool = True,
     ) -> str:
-        """Show a page a document; its key."""
+        """Show a document on a page; return its key."""
         presenter, known = self._presenters[found.document.kind], found.key in page.shows
         page.shows[found.key] = place = presenter.place(found, place, known=known)
         content = presenter.content(found, place)
@@ -90,7 +90,7 @@ class DocumentDesk:
         return found.key
 
     async def replace(self, found: OpenFile[Any], title: str, value: Any) -> None:
-        """Replace the value of a document, as one undo step."""
+        """Replace the value of a document as one undo step."""
         before, number = found.document.value, found.document.version
         self._presenters[found.document.kind].files.replace(found, title, value)
         await self._tell_change(found, before, number)
@@ -118,12 +118,12 @@ class DocumentDesk:
         return await self._show_all(page, presenter.dropped(data, request.name))
 
     async def _show_all(self, page: Page, opening: Opening[Any]) -> list[str]:
-        """Show the first document of a file; the others are in the list."""
+        """Show the first document of a file on the page; the others appear in its list of documents."""
         await self.show(page, opening.opened[0], notes=opening.notes)
         return [found.key for found in opening.opened]
 
     def _presenter_of_file(self, path: str) -> Presenter[Any]:
-        with contextlib.suppress(FormatError):  # what cannot be read may be open all the same
+        with contextlib.suppress(FormatError):  # a file that can no longer be read may still be open
             if formats.kind_of_data(self._folder.read(path), path) is formats.DocumentKind.ROBOT:
                 return self._presenters["robot"]
         return self._presenters["diagram"]
@@ -176,15 +176,14 @@ class DocumentDesk:
                 return presenter, presenter.files[key]
         raise UnknownNameError("open document", key, [state.document for state in self.states()])
 
-    # -- notifications
-    # ---------------------------------------------------------------------------------------------
+    # -- notifications ---------------------------------------------------------------------------------------
 
     async def tell_list(self) -> None:
         """Notify all pages of the open and recoverable documents."""
         await self._pages.tell(say.Documents(documents=self.states(), recoveries=self.recoveries()))
 
     async def tell_state(self, found: OpenFile[Any]) -> None:
-        """Notify the pages of a document of its state, without a change of content."""
+        """Notify the pages of a document of its state; its content has not changed."""
         await self._tell_versions(found, found.document.value, found.document.version)
 
     async def _tell_change(self, found: OpenFile[Any], before: Any, number: int) -> None:
@@ -192,12 +191,12 @@ class DocumentDesk:
         self._presenters[found.document.kind].changed(found)
 
     async def _tell_versions(self, found: OpenFile[Any], before: Any, number: int) -> None:
-        """Notify the pages of a document of the changes in the part that each page shows."""
+        """Send each page of a document the changes in the part that the page shows."""
         presenter = self._presenters[found.document.kind]
         for page in self._pages.showing(found.key):
             try:
                 change = presenter.change(found, before, page.shows[found.key])
-            except UnknownNameError:  # the part is gone, or has just come back
+            except UnknownNameError:  # the part was removed, or an undo has just restored it
                 await self.show(page, found, in_front=False)
                 continue
             await page.tell(say.Changed(state=found.state(), before=number, change=change))
@@ -208,14 +207,14 @@ def _dropped_data(request: say.Drop) -> bytes:
     suffix = PurePath(request.name).suffix.lower()
     if suffix not in formats.ROBOT_SUFFIXES:
         raise FormatError(
-            f"'{suffix or request.name[:40]}' is no kind of file that can be dropped here",
+            f"'{suffix or request.name[:40]}' is not a file type that can be dropped here",
             where=where,
             allowed=", ".join(f"{' '.join(form.suffixes)} ({form.name})" for form in formats.ROBOT_FORMATS),
-            fix="save it as one of these",
+            fix="save the file in one of these formats",
         )
     try:
         data = base64.b64decode(request.content, validate=True)
-    except ValueError:  # binascii.Error, or letters that are not ASCII
+    except ValueError:  # binascii.Error, or characters outside ASCII
         raise InputError(
             "the content is not base64", where=where, allowed="base64", fix="drop the file again"
         ) from None

@@ -15,14 +15,14 @@ More = ParamSpec("More")
 
 @dataclass(frozen=True)
 class EditEntry(Generic[Value, More]):
-    """What undo calls an edit, and the pure function from one value to the next that carries it out."""
+    """The title of an edit in the undo menu, and the pure function that applies the edit to a value."""
 
     title: Callable[[Any], str]
     carry_out: Callable[Concatenate[Any, Value, More], Value]
 
 
 class EditTable(Generic[Value, More]):
-    """One entry for each class of edits. A test checks that none is missing."""
+    """One entry for each class of edits; a test checks that the table is complete."""
 
     def __init__(self) -> None:
         self._entries: dict[type[Edit], EditEntry[Value, More]] = {}
@@ -32,7 +32,7 @@ class EditTable(Generic[Value, More]):
     ) -> Callable[
         [Callable[Concatenate[EditT, Value, More], Value]], Callable[Concatenate[EditT, Value, More], Value]
     ]:
-        """Register the function below as what carries out the edits of a class."""
+        """Register the decorated function as the implementation of a class of edits."""
 
         def register(
             carry_out: Callable[Concatenate[EditT, Value, More], Value],
@@ -44,13 +44,13 @@ class EditTable(Generic[Value, More]):
 
     @property
     def entries(self) -> Mapping[type[Edit], EditEntry[Value, More]]:
-        """What belongs to each class of edits."""
+        """The entry of each class of edits."""
         return self._entries
 
     def title(self, edit: Edit) -> str:
-        """The edit in a few words, for the menu entry "Undo …"."""
+        """A short description of the edit, for the menu entry "Undo …"."""
         return self._entries[type(edit)].title(edit)
 
     def applied(self, edit: Edit, value: Value, *more: More.args, **named: More.kwargs) -> Value:
-        """The value after an edit; raises ``ArmblocksError`` where it cannot be carried out."""
+        """The value after an edit; raises ``ArmblocksError`` if the edit cannot be applied."""
         return self._entries[type(edit)].carry_out(edit, value, *more, **named)

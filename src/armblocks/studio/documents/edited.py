@@ -15,12 +15,12 @@ from armblocks.studio.protocol.message import Edit, kind_of, messages_of
 from armblocks.studio.protocol.messages.documents import Alteration, Change, DocumentKind
 
 MOST_VERSIONS = 1000
-"""Versions that are remembered to find out what an edit of an older one runs into."""
+"""Number of stored versions, which are compared to detect conflicts of an edit made on an older version."""
 
 
 @dataclass(frozen=True)
 class Version(Generic[Value]):
-    """A version that the value had, and which page made it."""
+    """A former value, its version number, and the page that made it."""
 
     number: int
     author: str
@@ -28,7 +28,7 @@ class Version(Generic[Value]):
 
 
 class Outcome(NamedTuple, Generic[Value]):
-    """What a request would do: how the step is called, the value after it, and the gesture it belongs to."""
+    """The effect of a request: title of the undo step, new value, and gesture that the step belongs to."""
 
     title: str
     after: Value
@@ -40,9 +40,9 @@ class Edited(History[Value], ABC):
 
     kind: ClassVar[DocumentKind]
     edits: ClassVar[type[Edit]]
-    """The class of its edits."""
+    """The base class of the edits of this kind of document."""
     noun: ClassVar[str]
-    """What people call it: "drawing", "robot"."""
+    """The word for the value in messages: "drawing", "robot"."""
 
     def __init__(self, value: Value, *, version: int = 0) -> None:
         super().__init__(value, version=version)
@@ -50,11 +50,11 @@ class Edited(History[Value], ABC):
         self._versions = deque([Version(version, "", value)], maxlen=MOST_VERSIONS)
 
     def perform(self, request: Alteration) -> None:
-        """Do what a page asks.
+        """Apply the request of a page.
 
-        Raises what the edit itself raises, and ``InputError`` where there is nothing to undo or to redo, and
-        where another page has changed the same things since the version that this one saw; nothing is then
-        changed.
+        Raises the errors of the edit itself. Raises ``InputError`` if there is nothing to undo or redo, or if
+        another page has changed the same aspects since the version ``request.base``. The value is then
+        unchanged.
         """
         others = self._changed_by_others(request)
         self._author = request.author
@@ -76,31 +76,31 @@ class Edited(History[Value], ABC):
 
     @abstractmethod
     def outcome(self, request: Change) -> Outcome[Value]:
-        """What a change would do to the value as it is now; raises ``ArmblocksError`` where it cannot be."""
+        """Return the effect of a change on the present value; raise ``ArmblocksError`` if it is invalid."""
 
     @abstractmethod
     def aspects(self, before: Value, after: Value) -> set[Aspect]:
-        """All that is different between two of its forms."""
+        """Return the aspects in which two values differ."""
 
     @abstractmethod
     def written(self, value: Value, name: str) -> None:
-        """The file of this name holds ``value``, which this is or was: it is the saved one."""
+        """Mark ``value``, which is the present value or a former one, as the content of the file ``name``."""
 
     def _check_kind(self, edit: Edit) -> None:
         if not isinstance(edit, self.edits):
             raise InputError(
-                f"'{kind_of(type(edit))}' is no edit of a {self.noun}",
+                f"'{kind_of(type(edit))}' is not an edit of a {self.noun}",
                 where=f"the {self.noun}",
                 allowed=", ".join(messages_of(self.edits)),
-                fix="load the page again: it may be of another version",
+                fix="reload the page: it may come from another version of armblocks",
             )
 
     def _changed_by_others(self, request: Alteration) -> set[Aspect]:
-        """What pages other than the one that asks have changed since the version that it saw."""
+        """The aspects that other pages have changed since the version on which the request is based."""
         if request.base is None or request.base == self.version:
             return set()
         if not self._versions[0].number <= request.base <= self.version:
-            raise self._overtaken(f"the page shows a version of the {self.noun} that is long past")
+            raise self._overtaken(f"the page shows a version of the {self.noun} that is too old")
         known = [version for version in self._versions if version.number >= request.base]
         changed: set[Aspect] = set()
         for before, after in pairwise(known):
@@ -116,6 +116,6 @@ class Edited(History[Value], ABC):
         return InputError(
             what,
             where=f"the {self.noun}",
-            allowed="an edit of what this page showed",
-            fix="look at what is there now, and do it again if you still want to",
+            allowed="an edit of the version that this page showed",
+            fix="look at the present version, and repeat the edit if you still want it",
         )

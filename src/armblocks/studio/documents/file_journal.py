@@ -1,24 +1,24 @@
 """The records of the journal of a diagram or a robot, and its recovery.
 
-Records, one JSON object each; ``version`` is the one after it, ``at`` when it was made (s since 1970):
+Each record is a JSON object; ``version`` is the version after it, ``at`` the time of writing (s since 1970):
 
 ``head``
-    The first: key, path and origin, what was on the disk, and ``armblocks`` that wrote it.
+    The first record: key, path, origin, fingerprint of the file on disk, and version of ``armblocks``.
 ``whole``
-    The whole canonical drawing or robot of a version: before the first edit, and every
-    :data:`SNAPSHOT_EVERY` edits. It is written when it is ready, which may be some edits later.
+    The complete canonical document of a version, written before the first edit and every
+    :data:`SNAPSHOT_EVERY` edits. Serialisation runs in a thread, so some later edits may precede the record.
 ``perform``
-    A request of a page that was carried out, as it came; ``continued`` where it went on with the step before.
+    A request of a page that was applied, unchanged; ``continued`` where it extended the previous undo step.
 ``replace``
-    Another drawing or robot in the place of this one, as one step.
+    A new value that replaced the document as one undo step.
 ``saved``
-    The path, and which version the file holds from then on.
+    The path, and the version that the file contains from now on.
 ``kept``
-    The file holds something else, or is gone, and this one is to stay.
+    The file contains another value or was deleted, and the open document stays as it is.
 
-An edit is a pure function of what is edited and the request, so all follows from a snapshot and the requests
-after it. The latest snapshot is taken after which no version is missing and every undo finds its step; where
-an undo would find none, a snapshot is written in its place.
+An edit is a pure function of document and request, so every version follows from a snapshot and the requests
+after it. Recovery starts from the latest snapshot after which no version is missing and no undo needs a step
+from before the snapshot. Where an undo would need such a step, a snapshot is written instead of the request.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ _ALTERATIONS: TypeAdapter[Alteration] = TypeAdapter(Annotated[Alteration, AnyOf(
 
 @dataclass(kw_only=True)
 class JournaledFile(Generic[EditedT]):
-    """A drawing or a robot as its journal gives it back, and the journal's file."""
+    """A diagram or robot recovered from its journal, and the path of the journal."""
 
     key: str
     document: EditedT
@@ -55,18 +55,18 @@ class JournaledFile(Generic[EditedT]):
     on_disk: Fingerprint | None
     journal_path: Path
     whole: int
-    """Bytes of the journal that could be read."""
+    """Number of bytes at the start of the journal that could be read."""
     began: float
     last: float
     edits: int
     keys: list[str] = field(default_factory=list[str])
-    """Keys of the requests that were carried out."""
+    """Keys of the requests that were applied."""
     missing: str = ""
-    """What could not be given back; ``""`` if nothing."""
+    """Description of the edits that could not be recovered; ``""`` if there are none."""
 
 
 class FileJournal:
-    """Writes the journal of one drawing or robot. Raises ``OSError`` as the disk does."""
+    """Writes the journal of one diagram or robot. Raises the ``OSError`` of the disk."""
 
     def __init__(self, journal: Journal, kind: FileKind[Any, Any]) -> None:
         self._journal = journal
@@ -85,7 +85,7 @@ class FileJournal:
         origin: str,
         on_disk: Fingerprint | None,
     ) -> FileJournal:
-        """A new journal; what is edited itself has to follow (:meth:`begin_from`)."""
+        """Create a journal; the first snapshot must follow (:meth:`begin_from`)."""
         made = cls(Journal(path), kind)
         head = {"key": key, "path": file, "origin": origin, "on_disk": _said(on_disk)}
         made._journal.append({"head": {**head, "armblocks": version("armblocks")}, "at": _now()})
@@ -93,23 +93,23 @@ class FileJournal:
 
     @classmethod
     def go_on(cls, found: JournaledFile[Any], kind: FileKind[Any, Any]) -> FileJournal:
-        """Write on in the journal of what it gave back."""
+        """Continue the journal from which a document was recovered."""
         return cls(Journal(found.journal_path, whole=found.whole), kind)
 
     def begin_from(self, value: Any, number: int, done: str = "") -> None:
-        """Add what everything after it begins from: there is none yet, or records are missing.
+        """Write a first snapshot: the journal is new, or records are missing before it.
 
-        ``done``: the key of the request that made it so.
+        ``done``: key of the request that led to this value.
         """
         self.snapshot(self._kind.to_text(value), number, done)
         self.since_snapshot = self._past = self._future = 0
 
     def snapshot(self, text: str, number: int, done: str = "") -> None:
-        """Add the whole of a version, as text."""
+        """Write a snapshot: the complete document of a version, as text."""
         self._journal.append({"whole": text, "version": number, "at": _now(), "done": done})
 
     def performed(self, request: Alteration, number: int, after: Any, *, continued: bool = False) -> None:
-        """Add a request that was carried out."""
+        """Write a request that was applied."""
         does = "continue" if continued else request.does
         past, future = _counted(does, self._past, self._future)
         if past < 0 or future < 0:
@@ -121,45 +121,45 @@ class FileJournal:
         self.since_snapshot += 1
 
     def replaced(self, title: str, value: Any, number: int) -> None:
-        """Add that something else has taken the place of this."""
+        """Write that another value has replaced the document."""
         self._past, self._future = _counted("change", self._past, self._future)
         text = self._kind.to_text(value)
         self._journal.append({"replace": text, "title": title, "version": number, "at": _now()})
 
     def kept(self, number: int) -> None:
-        """Add that what is edited stays, though its file holds something else."""
+        """Write that the document stays as it is although its file contains another value."""
         self._journal.append({"kept": True, "version": number, "at": _now()})
 
     def saved(self, path: str, of: int, number: int, on_disk: Fingerprint | None) -> None:
-        """Add that the file of this path holds version ``of``."""
+        """Write that the file at this path contains version ``of``."""
         record = {"saved": path, "of": of, "on_disk": _said(on_disk)}
         self._journal.append({**record, "version": number, "at": _now()})
 
     def sync(self) -> None:
-        """Return when the disk has everything; may be called from another thread."""
+        """Flush all records to disk; may be called from another thread."""
         self._journal.sync()
 
     @property
     def waiting(self) -> bool:
-        """Whether there is something that the disk may not have."""
+        """Whether some records have not been flushed to disk."""
         return self._journal.waiting
 
     def close(self, *, keep: bool) -> None:
-        """End the journal; ``keep`` leaves it for a recovery."""
+        """Close the journal; with ``keep`` its file remains for a recovery, otherwise it is deleted."""
         self._journal.close(keep=keep)
 
 
 def journaled_file(path: Path, kind: FileKind[Any, EditedT]) -> JournaledFile[EditedT]:
-    """What a journal gives back, as far as it can be carried out.
+    """Return the document of a journal with as many of its edits as can be repeated.
 
-    Raises ``FormatError`` where the journal does not say even one whole drawing or robot.
+    Raises ``FormatError`` if the journal contains no complete snapshot.
     """
     records, whole = read_journal(path)
     try:
         return _replayed(records, path, whole, kind)
     except (KeyError, TypeError, AttributeError) as error:
         raise FormatError(
-            "this is no journal of the studio", where=str(path), fix="open the drawing's own file"
+            "this is not a journal of the studio", where=str(path), fix="open the drawing's own file"
         ) from error
 
 
@@ -185,10 +185,10 @@ def _replayed(
 
 
 def _snapshot(records: Sequence[Record], where: str) -> tuple[int, str]:
-    """The latest snapshot after which no undo reaches further back than it."""
+    """Return the latest snapshot from which all later records, undo included, can be repeated."""
     found = [(record["version"], record["whole"]) for record in records if "whole" in record]
     if not found:
-        raise FormatError("the journal holds no whole drawing", where=where, fix="it can be deleted")
+        raise FormatError("the journal contains no complete drawing", where=where, fix="it can be deleted")
     for number, text in sorted(found, reverse=True):
         if _follows(records, number):
             return number, text
@@ -196,7 +196,7 @@ def _snapshot(records: Sequence[Record], where: str) -> tuple[int, str]:
 
 
 def _follows(records: Sequence[Record], number: int) -> bool:
-    """Whether all after a version can be repeated: no version is missing, no undo reaches back of it."""
+    """Whether all records after a version can be repeated: no version is missing, no undo goes beyond it."""
     past = future = 0
     for record in records:
         if record.get("version", 0) <= number or "whole" in record or "kept" in record:
@@ -204,7 +204,7 @@ def _follows(records: Sequence[Record], number: int) -> bool:
         if record["version"] != number + 1:
             return False
         number += 1
-        if "saved" not in record:  # saved under another name, which is a version of its own
+        if "saved" not in record:  # saving under another name renames the value: a new version
             past, future = _counted(record.get("does", "change"), past, future)
         if past < 0 or future < 0:
             return False
@@ -212,7 +212,7 @@ def _follows(records: Sequence[Record], number: int) -> bool:
 
 
 def _counted(does: str, past: int, future: int) -> tuple[int, int]:
-    """How many steps there are to undo and to redo afterwards; negative where it needs one more."""
+    """Numbers of undo and redo steps after a request; negative where the request needs one more step."""
     match does:
         case "undo":
             return past - 1, future + 1
@@ -229,13 +229,13 @@ class _Replay(Generic[EditedT]):
         self._found = found
         self._kind = kind
         self._start = found.document.version
-        # What a snapshot shows is what the file holds only before the first edit.
+        # A snapshot equals the content of the file only if no edit precedes it.
         if not first or self._start > 0:
             found.document.saved = None
         self._values = {self._start: found.document.value}
 
     def run(self, records: Sequence[Record]) -> None:
-        """Carry out what the records say, until one cannot be."""
+        """Apply the records in order, up to the first that fails."""
         found = self._found
         for place, record in enumerate(records):
             number = int(record.get("version", 0))
@@ -250,7 +250,7 @@ class _Replay(Generic[EditedT]):
             elif number > self._start and ("perform" in record or "replace" in record):
                 try:
                     self._step(record)
-                except Exception as error:  # also a defect: what was before it is given back
+                except Exception as error:  # also a defect: the edits before it are recovered
                     lost = sum(1 for later in records[place:] if "perform" in later)
                     what = error.what if isinstance(error, ArmblocksError) else _why(error)
                     found.missing = f"the last {lost} edits could not be repeated: {what}"
@@ -286,7 +286,7 @@ class _Replay(Generic[EditedT]):
 
 def _why(error: Exception) -> str:
     if isinstance(error, ValidationError):
-        return "it is not understood"
+        return "the record is invalid"
     return f"armblocks has a defect ({type(error).__name__})"
 
 

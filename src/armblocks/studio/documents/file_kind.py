@@ -17,43 +17,43 @@ EditedT = TypeVar("EditedT", bound=Edited[Any])
 
 
 class FileKind(ABC, Generic[Value, EditedT]):
-    """How one kind of file is begun, read and written. What reads raises ``ArmblocksError``."""
+    """Creation, reading and writing of one kind of file. Reading methods raise ``ArmblocksError``."""
 
     name: ClassVar[DocumentKind]
-    """Also the suffix of its journals."""
+    """Name of the kind, also the suffix of its journals."""
 
     @abstractmethod
     def new(self) -> Value:
-        """What a new one begins as."""
+        """Return the initial value of a new document."""
 
     @abstractmethod
     def shipped(self, name: str) -> Value:
-        """The shipped one of this name."""
+        """Return the shipped example or robot of this name."""
 
     @abstractmethod
     def edited(self, value: Value, version: int = 0) -> EditedT:
-        """One that can be edited."""
+        """Return a document with undo history for a value."""
 
     @abstractmethod
     def from_file(self, data: bytes, place: Path) -> Value:
-        """What the file at ``place`` holds."""
+        """Read the file at ``place``, whose content is ``data``."""
 
     @abstractmethod
     def to_file(self, value: Value, place: Path) -> bytes:
-        """What the file at ``place`` is to hold."""
+        """Return the content of the file at ``place`` for a value."""
 
     @abstractmethod
     def renamed(self, value: Value, place: Path) -> Value:
-        """With the name that it gets from the file under which it is saved."""
+        """Return the value with the name that follows from the file name under which it is saved."""
 
     @abstractmethod
     def from_text(self, text: str, where: str) -> Value:
-        """What :meth:`to_text` has written."""
+        """Read a text that :meth:`to_text` has written."""
 
     @abstractmethod
     def to_text(self, value: Value) -> str:
-        """All of it, for the journal; this is what takes long, and may be done in another thread."""
+        """Serialise the value for the journal; may be slow, and may be called in another thread."""
 
     @abstractmethod
     def parts(self, value: Value) -> int:
-        """How many blocks or links it has."""
+        """Return the number of blocks or links."""

@@ -9,14 +9,14 @@ from typing import Generic, TypeVar
 from armblocks.errors import InputError
 
 MOST_UNDO = 10_000
-"""Edits that can be undone; older ones are forgotten."""
+"""Number of edits that can be undone; older ones are dropped."""
 
 Value = TypeVar("Value")
 
 
 @dataclass(frozen=True)
 class Step(Generic[Value]):
-    """One edit that was carried out: its name, the value before it, and the gesture that it was a part of."""
+    """One applied edit: its title, the value before it, and the gesture that it was a part of."""
 
     title: str
     before: Value
@@ -24,13 +24,13 @@ class Step(Generic[Value]):
 
 
 class History(Generic[Value]):
-    """The present form of a frozen value, what it was before, and what was undone.
+    """The present value of a frozen type, with stacks of former values for undo and redo.
 
-    Values share their parts, so the history needs little memory.
+    Values share their unchanged parts, so the history needs little memory.
 
-    ``version`` grows with every change, undo and redo included, and never returns: two pages that show the
-    same version show the same value. ``saved`` is the form that the file holds, ``None`` where no file holds
-    one of these. ``continued`` says whether the last replacement went on with the step before it.
+    ``version`` increases with every change, undo and redo included, and is never reused: two pages that show
+    the same version show the same value. ``saved`` is the value in the file, or ``None`` if no file
+    contains one of these values. ``continued`` is true if the last replacement extended the previous step.
     """
 
     def __init__(self, value: Value, *, version: int = 0) -> None:
@@ -43,23 +43,23 @@ class History(Generic[Value]):
 
     @property
     def dirty(self) -> bool:
-        """Whether the file holds another form than this one."""
+        """Whether the file contains another value than the present one."""
         return self.value is not self.saved
 
     @property
     def undo_title(self) -> str:
-        """What ``undo`` would take back; ``""`` if nothing."""
+        """Title of the step that ``undo`` would revert; ``""`` if there is none."""
         return self._past[-1].title if self._past else ""
 
     @property
     def redo_title(self) -> str:
-        """What ``redo`` would do again; ``""`` if nothing."""
+        """Title of the step that ``redo`` would repeat; ``""`` if there is none."""
         return self._future[-1].title if self._future else ""
 
     def replace(self, title: str, value: Value, gesture: str = "") -> None:
-        """Put another form in the place of this one, as one step that can be undone.
+        """Replace the present value, as one step that can be undone.
 
-        Changes in a row that name the same ``gesture`` are one step: the letters typed into one field.
+        Consecutive changes with the same ``gesture`` are one step, for example letters typed into a field.
         """
         self.continued = bool(gesture and self._past and self._past[-1].gesture == gesture)
         self.continued = self.continued and not self._future
@@ -70,8 +70,8 @@ class History(Generic[Value]):
         self._become(value)
 
     def rewrite(self, change: Callable[[Value], Value]) -> None:
-        """Change the value and all that it was and could become again: what no undo should take back."""
-        changed: dict[int, Value] = {}  # the same form stays the same, so that the saved one is recognised
+        """Apply a change that cannot be undone to the present value and to all values for undo and redo."""
+        changed: dict[int, Value] = {}  # equal objects stay equal objects, so that `saved` is still found
 
         def once(value: Value) -> Value:
             if id(value) not in changed:
@@ -84,13 +84,13 @@ class History(Generic[Value]):
         self._become(once(self.value))
 
     def undo(self) -> None:
-        """Take the last edit back; raises ``InputError`` if there is none."""
+        """Revert the last edit; raises ``InputError`` if there is none."""
         step = self._pop(self._past, "undo")
         self._future.append(Step(step.title, self.value))
         self._become(step.before)
 
     def redo(self) -> None:
-        """Do again what was undone last; raises ``InputError`` if there is nothing."""
+        """Repeat the edit that was undone last; raises ``InputError`` if there is none."""
         step = self._pop(self._future, "redo")
         self._past.append(Step(step.title, self.value))
         self._become(step.before)

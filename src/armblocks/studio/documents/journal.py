@@ -1,13 +1,13 @@
 """Journals: append-only records of the unsaved edits of a diagram or a robot.
 
-One file for each of them that was edited, in the studio's own folder and not in the project. A record is a
-line of JSON behind its length and CRC-32, so that a record torn by a crash is recognised and left out::
+There is one file for each edited document, in the studio's state folder outside the project. A record is one
+line of JSON preceded by its length and CRC-32, so that a record cut off by a crash is detected and skipped::
 
     <length> <crc32> {"change": …}\n
 
-What the records mean is the matter of :mod:`armblocks.studio.documents.file_journal`; here they are written,
-brought to the disk and read again. While a journal is open its file is locked: another studio that finds it
-leaves it alone, and the lock of one that was killed is gone with it.
+:mod:`armblocks.studio.documents.file_journal` defines the content of the records; this module writes them,
+flushes them to disk and reads them. While a journal is open its file is locked, so that another studio leaves
+it alone. The system releases the lock when the process ends, also after a crash.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from armblocks.errors import FormatError
 from armblocks.files import sync_folder
 
 SYNC_SECONDS = 1.0
-"""Whoever appends sees to it that :meth:`Journal.sync` is called within this time."""
+"""The caller of :meth:`Journal.append` calls :meth:`Journal.sync` within this time, s."""
 MOST_BYTES = 256 * 2**20
-"""A journal larger than this is not read back."""
+"""A larger journal is not read, bytes."""
 Record = Mapping[str, Any]
 
 
 class Journal:
-    """The open journal of one drawing or robot. Raises ``OSError`` as the disk does."""
+    """The open journal of one diagram or robot. Raises the ``OSError`` of the disk."""
 
     def __init__(self, path: Path, *, whole: int = 0) -> None:
-        """Open the file at ``path``; its first ``whole`` bytes are kept and the rest is cut off."""
+        """Open the file at ``path``, keep its first ``whole`` bytes and truncate the rest."""
         path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
         self.path = path
         self.size = whole
@@ -50,8 +50,8 @@ class Journal:
         os.lseek(self._file, whole, os.SEEK_SET)
 
     def append(self, record: Record) -> None:
-        """Add a record; the disk has it after the next :meth:`sync`. What could not be written whole is cut
-        off again, so that the records after it can be read."""
+        """Write a record; the next :meth:`sync` flushes it. A partly written record is removed again, so that
+        later records can be read."""
         line = _line(record)
         try:
             rest = memoryview(line)
@@ -65,7 +65,7 @@ class Journal:
         self._waiting = True
 
     def sync(self) -> None:
-        """Return when the disk has every record; may be called from another thread."""
+        """Flush every record to disk; may be called from another thread."""
         with self._using:
             if self._waiting and self._file >= 0:
                 self._waiting = False
@@ -76,11 +76,11 @@ class Journal:
 
     @property
     def waiting(self) -> bool:
-        """Whether there are records that the disk may not have."""
+        """Whether some records have not been flushed to disk."""
         return self._waiting
 
     def close(self, *, keep: bool) -> None:
-        """End the journal; ``keep`` leaves it for a recovery."""
+        """Close the journal; with ``keep`` its file remains for a recovery, otherwise it is deleted."""
         try:
             if keep:
                 self.sync()
@@ -93,9 +93,9 @@ class Journal:
 
 
 def read_journal(path: Path) -> tuple[list[Record], int]:
-    """The records of a journal up to the first torn one, and how many bytes they are.
+    """Return the records of a journal up to the first incomplete one, and their length in bytes.
 
-    Raises ``FormatError`` if not even the first is whole.
+    Raises ``FormatError`` if no record is complete.
     """
     try:
         if path.stat().st_size > MOST_BYTES:
@@ -118,12 +118,12 @@ def read_journal(path: Path) -> tuple[list[Record], int]:
         records.append(record)
         whole = end
     if not records:
-        raise FormatError("the journal holds no whole record", where=str(path), fix="it can be deleted")
+        raise FormatError("the journal contains no complete record", where=str(path), fix="delete it")
     return records, whole
 
 
 def in_use(path: Path) -> bool:
-    """Whether a studio has this journal open."""
+    """Whether a running studio has this journal open."""
     try:
         descriptor = os.open(path, os.O_RDWR)
     except OSError:
@@ -135,12 +135,12 @@ def in_use(path: Path) -> bool:
 
 
 def _locked(descriptor: int) -> bool:
-    """Lock an open file until it is closed; ``False`` if somebody else has."""
+    """Lock an open file until it is closed; return ``False`` if another process holds the lock."""
     try:
         if sys.platform == "win32":
             import msvcrt
 
-            # A byte far behind the records: a lock of Windows forbids reading what it covers.
+            # A byte far beyond the records: on Windows a locked range cannot be read.
             os.lseek(descriptor, 2**40, os.SEEK_SET)
             msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
         else:
@@ -158,7 +158,7 @@ def _line(record: Record) -> bytes:
 
 
 def _records(data: bytes) -> Iterator[tuple[Record, int]]:
-    """Each whole record with the position behind it."""
+    """Yield each complete record with the position of its end."""
     position = 0
     while position < len(data):
         length, first, rest = data[position : position + 40].partition(b" ")

@@ -15,16 +15,16 @@ from armblocks.studio.protocol.messages import documents as say
 
 
 class LeftBehind:
-    """The drawings or the robots of one project folder that can be recovered, by key."""
+    """The recoverable documents of one kind in one project folder, by key."""
 
     def __init__(self, folder: ProjectFolder, journals: Path, kind: FileKind[Any, Any]) -> None:
         self._folder = folder
         self._kind = kind
         self._read: dict[str, JournaledFile[Any]] = {}
         self._unread: dict[str, Path] = {}
-        """Journals that could not be read, by what names them to pages."""
+        """Journals that could not be read, by the key under which pages refer to them."""
         for path in sorted(journals.glob(f"*.{kind.name}")):
-            if in_use(path):  # of another server that still runs
+            if in_use(path):  # another running server uses it
                 continue
             try:
                 found = journaled_file(path, kind)
@@ -36,15 +36,15 @@ class LeftBehind:
         return key in self._read or key in self._unread
 
     def offers(self) -> list[say.Recovery]:
-        """What pages are told of what was not saved."""
+        """Descriptions of the unsaved documents, for pages."""
         found = [self._offer(entry) for entry in self._read.values() if entry.document.dirty]
         return [*found, *(self._unread_offer(key, path) for key, path in self._unread.items())]
 
     def take(self, key: str) -> JournaledFile[Any]:
-        """What a journal gives back, which waits no more.
+        """Return a recovered document and remove it from the recoverable ones.
 
-        One that could not be read is read again: what it lacked may be there now. Raises
-        ``UnknownNameError``, and ``ArmblocksError`` where it still cannot be read.
+        A journal that could not be read is read again: a missing file may exist by now. Raises
+        ``UnknownNameError`` for an unknown key, ``ArmblocksError`` if the journal still cannot be read.
         """
         self._known(key)
         if key in self._unread:
@@ -62,7 +62,7 @@ class LeftBehind:
         self._unread.pop(key, None)
 
     def end(self) -> None:
-        """The studio ends: journals of what is saved go."""
+        """Delete the journals of documents that have no unsaved edits, when the studio ends."""
         for entry in self._read.values():
             if not entry.document.dirty:
                 with contextlib.suppress(OSError):
@@ -88,7 +88,7 @@ class LeftBehind:
         )
 
     def _unread_offer(self, key: str, path: Path) -> say.Recovery:
-        """What is told of a journal that cannot be read."""
+        """Description of a journal that cannot be read, for pages."""
         last = path.stat().st_mtime if path.exists() else 0.0
         return say.Recovery(
             kind=self._kind.name,

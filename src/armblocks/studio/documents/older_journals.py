@@ -1,4 +1,4 @@
-"""Requests as the journals of earlier versions have them."""
+"""Conversion of requests from the journals of earlier versions."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ _ROBOT_EDITS_OF_0_2 = {
 
 
 def as_of_today(request: Mapping[str, Any]) -> dict[str, Any]:
-    """The request in the form of this version.
+    """Convert a journaled request to the form of this version.
 
-    In 0.2.0 robots had requests of their own, whose edits had the kinds of those of diagrams, and arranging a
-    sheet was no edit.
+    In 0.2.0, requests about robots were separate messages, their edits used the kinds of diagram edits, and
+    arranging a sheet was a request instead of an edit.
     """
     kind = request["kind"]
     if kind == "arrange":

@@ -1,8 +1,8 @@
 """The open diagrams or robots of a studio: origin, file and journal of each.
 
-Every change is written to the journal before the reply, and is on the disk within
-:data:`~armblocks.studio.documents.journal.SYNC_SECONDS`. Files are not overwritten silently: changes by other
-programs are detected, and recovered work is offered, without replacing the file.
+Every change is written to the journal before the reply, and flushed to disk within
+:data:`~armblocks.studio.documents.journal.SYNC_SECONDS`. No file is overwritten without confirmation: changes
+by other programs are detected. Recovered work is opened as a new value and does not replace the file.
 """
 
 from __future__ import annotations
@@ -29,33 +29,33 @@ from armblocks.studio.protocol.messages import documents as say
 
 MOST_OPEN = 100
 MOST_KEYS = 1000
-"""Keys of requests that are remembered, so that one sent twice is done once."""
+"""Number of stored request keys; they ensure that a request that is sent twice is applied once."""
 LOOK_SECONDS = 1.0
-"""How often the files are looked at."""
+"""Interval at which files are checked for changes, s."""
 
 
 @dataclasses.dataclass(eq=False, kw_only=True)
 class OpenFile(Generic[EditedT]):
-    """Something that is edited, with its file and its journal."""
+    """An edited document with its file and its journal."""
 
     key: str
     document: EditedT
     path: str | None = None
     origin: str = ""
-    """The shipped example or robot that it began as."""
+    """The shipped example or robot from which it was created."""
     on_disk: Fingerprint | None = None
     disk: Disk = "same"
     seen: deque[str] = dataclasses.field(default_factory=lambda: deque(maxlen=MOST_KEYS))
     journal: FileJournal | None = None
     journaled: bool = True
     behind: bool = False
-    """Whether the journal lacks something that has happened."""
+    """Whether the journal lacks a change of the document."""
     syncing: asyncio.Task[None] | None = None
     snapshot: asyncio.Task[None] | None = None
     saving: asyncio.Lock = dataclasses.field(default_factory=asyncio.Lock)
 
     def state(self) -> say.DocumentState:
-        """Where it stands, for pages."""
+        """The state of the document as pages show it."""
         document = self.document
         return say.DocumentState(
             document=self.key,
@@ -72,7 +72,7 @@ class OpenFile(Generic[EditedT]):
         )
 
     def leave(self) -> None:
-        """It is put away: what would be done about it later is not."""
+        """Cancel the pending tasks of the document, which is closed."""
         for task in (self.syncing, self.snapshot):
             if task is not None:
                 task.cancel()
@@ -82,7 +82,7 @@ OpenedT = TypeVar("OpenedT", bound=OpenFile[Any])
 
 
 class OpenFiles(ABC, Generic[OpenedT]):
-    """What is open of one kind in one project folder, by key. Used on one event loop."""
+    """The open documents of one kind in one project folder, by key. Used on one event loop."""
 
     def __init__(self, folder: ProjectFolder, kept: StateFolder, kind: FileKind[Any, Any]) -> None:
         self.folder = folder
@@ -90,13 +90,13 @@ class OpenFiles(ABC, Generic[OpenedT]):
         self.kind = kind
         self._open: dict[str, OpenedT] = {}
         self._same: dict[str, str] = {}
-        """Keys under which a page of an earlier server knows what is open under another."""
+        """Keys that pages of an earlier server use for documents that are now open under another key."""
         self.left = LeftBehind(folder, kept.journals, kind)
         self._tell: Callable[[OpenedT], Awaitable[None]] | None = None
 
     @abstractmethod
     def _made(self, key: str, document: Any) -> OpenedT:
-        """Something that is open from now on."""
+        """Create the open document of this class."""
 
     def __iter__(self) -> Iterator[OpenedT]:
         return iter(list(self._open.values()))
@@ -108,16 +108,16 @@ class OpenFiles(ABC, Generic[OpenedT]):
         return self._same.get(key, key) in self._open
 
     def __getitem__(self, key: str) -> OpenedT:
-        """What is open under this key; raises ``UnknownNameError``."""
+        """Return the open document with this key; raises ``UnknownNameError``."""
         key = self._same.get(key, key)
         if key not in self._open:
             raise UnknownNameError(f"open {self.kind.name}", key, self._open)
         return self._open[key]
 
-    # -- opening and putting away ----------------------------------------------------------------------------
+    # -- opening and closing ---------------------------------------------------------------------------------
 
     def open_path(self, path: str, key: str = "") -> OpenedT:
-        """What a file holds, which is read where it is not open yet."""
+        """Return the document of a file; the file is read if it is not open yet."""
         place = self.folder.path(path)
         path = place.relative_to(self.folder.root).as_posix()
         for found in self:
@@ -129,15 +129,15 @@ class OpenFiles(ABC, Generic[OpenedT]):
         return self.add(value, path=path, on_disk=on_disk, key=key)
 
     def open_shipped(self, name: str, key: str = "") -> OpenedT:
-        """A new one that begins as a shipped one."""
+        """Open a copy of a shipped example or robot."""
         return self.add(self.kind.shipped(name), origin=name, key=key)
 
     def new(self, key: str = "") -> OpenedT:
-        """One that begins as new ones do."""
+        """Open a new document."""
         return self.add(self.kind.new(), key=key)
 
     def attach(self, key: str, path: str | None = None, origin: str = "") -> OpenedT:
-        """What a page showed before, see :class:`~armblocks.studio.protocol.messages.documents.Attach`."""
+        """Reopen a document for a page; see :class:`~armblocks.studio.protocol.messages.documents.Attach`."""
         with contextlib.suppress(UnknownNameError):
             return self[key]
         if key in self.left:
@@ -159,24 +159,24 @@ class OpenFiles(ABC, Generic[OpenedT]):
         on_disk: Fingerprint | None = None,
         key: str = "",
     ) -> OpenedT:
-        """Something new that is open, under a key of its own unless one is given."""
+        """Open a value as a document, under the given key or a new one."""
         found = self._add(self.kind.edited(value), key or secrets.token_hex(8))
         found.path, found.origin, found.on_disk = path, origin, on_disk
         return found
 
     def close(self, found: OpenedT, *, discard: bool) -> None:
-        """Put one away; raises ``InputError`` where edits would be lost without a word."""
+        """Close a document; raises ``InputError`` if it has unsaved edits and ``discard`` is false."""
         if found.document.dirty and not discard:
             raise InputError(
-                f"'{found.document.value.name}' has edits that no file holds",
+                f"'{found.document.value.name}' has unsaved edits",
                 where=f"the {found.document.noun}",
-                allowed="to save it, or to discard the edits",
+                allowed="saving the document, or discarding its edits",
                 fix="choose one of the two",
             )
         self._put_away(found, keep=False)
 
     def end(self) -> None:
-        """The studio ends: journals of what is not saved stay, the others go."""
+        """Close all documents when the studio ends; journals of unsaved documents remain."""
         for found in self:
             with contextlib.suppress(OSError):
                 self._put_away(found, keep=found.document.dirty)
@@ -189,7 +189,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
             found.journal.close(keep=keep)
 
     def bring(self, value: Any) -> OpenedT:
-        """Something from elsewhere: no file of the project holds it, so the journal does from the first."""
+        """Open a value from outside the project; it is journaled at once, because no file contains it."""
         found = self.add(value)
         self._hold(found)
         return found
@@ -201,7 +201,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
         return found
 
     def _make_room(self) -> None:
-        """Put the one away that was opened first and needs no saving."""
+        """Close the earliest opened document that has no unsaved edits."""
         for found in self:
             if not found.document.dirty:
                 self._put_away(found, keep=False)
@@ -216,7 +216,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
     # -- changing --------------------------------------------------------------------------------------------
 
     def perform(self, found: OpenedT, request: say.Alteration) -> bool:
-        """Carry a request out, once; ``False`` where it was carried out before. Raises ``ArmblocksError``."""
+        """Apply a request; return ``False`` if it was applied before. Raises ``ArmblocksError``."""
         if request.key and request.key in found.seen:
             return False
         document, before, number = found.document, found.document.value, found.document.version
@@ -236,7 +236,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
         return True
 
     def reload(self, found: OpenedT, key: str = "") -> None:
-        """Take what the file holds now, as one step that can be undone; once for each ``key``."""
+        """Replace the document by the content of its file, as one undo step; once for each ``key``."""
         if key and key in found.seen:
             return
         if found.path is None:
@@ -251,21 +251,21 @@ class OpenFiles(ABC, Generic[OpenedT]):
             found.seen.append(key)
 
     def replace(self, found: OpenedT, title: str, value: Any) -> None:
-        """Put another drawing or robot in the place of this one, as one step that can be undone."""
+        """Replace the value of a document, as one undo step."""
         document, before, number = found.document, found.document.value, found.document.version
         document.replace(title, value)
         version = document.version
         self._write(found, before, number, lambda journal: journal.replaced(title, value, version))
 
     def keep_mine(self, found: OpenedT) -> None:
-        """What somebody else has written to the file is known; the next save overwrites it."""
+        """Accept that another program has written the file; the next save overwrites it."""
         found.disk, found.on_disk = "same", None
         if found.path is not None and self.folder.exists(found.path):
             found.on_disk = self.folder.read_known(found.path)[1]
         self._hold(found)
 
     def _hold(self, found: OpenedT) -> None:
-        """It is nowhere but here and in its journal: no file holds it any more."""
+        """Mark the document as contained in no file, and note this in the journal."""
         document = found.document
         document.saved = None
         self._write(found, document.value, document.version, lambda journal: journal.kept(document.version))
@@ -273,8 +273,8 @@ class OpenFiles(ABC, Generic[OpenedT]):
     async def save(self, found: OpenedT, path: str, *, overwrite: bool) -> str:
         """Write the file, under another path if one is given.
 
-        Raises ``FormatError`` where there is no path, where the file has changed on the disk or another one
-        would be overwritten, unless ``overwrite``, and where the disk refuses.
+        Raises ``FormatError`` if there is no path or the write fails. Unless ``overwrite`` is true,
+        also raises it if the file has changed on disk or another file would be replaced.
         """
         async with found.saving:
             path = path or found.path or ""
@@ -307,7 +307,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
         )
 
     def _saved(self, found: OpenedT, path: str, of: int) -> None:
-        """Note in the journal, where there is one, that the file holds version ``of``."""
+        """Write to an existing journal that the file contains version ``of``."""
         if found.journal is None:
             return
         now, version, on_disk = found.document.value, found.document.version, found.on_disk
@@ -317,7 +317,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
         if path != found.path:
             if self.folder.exists(path):
                 raise FormatError(
-                    "there is such a file already", where=path, fix="overwrite it, or choose another"
+                    "the file exists already", where=path, fix="overwrite it, or choose another name"
                 )
             return
         found.disk, found.on_disk = self.folder.compared(path, found.on_disk)
@@ -325,16 +325,16 @@ class OpenFiles(ABC, Generic[OpenedT]):
             raise FormatError(
                 "the file has changed on the disk since it was opened",
                 where=path,
-                allowed="to overwrite it, or to save under another name",
+                allowed="overwriting it, or saving under another name",
                 fix="choose one of the two",
             )
 
     # -- the journal -----------------------------------------------------------------------------------------
 
     def _write(self, found: OpenedT, before: Any, number: int, write: Callable[[FileJournal], None]) -> None:
-        """Write to the journal, which is begun with what was there before the first change.
+        """Write to the journal; a new journal starts with a snapshot of the value before the change.
 
-        A disk that refuses keeps nobody from editing: the pages are told, and the next change tries again.
+        A disk error does not prevent edits: pages are notified, and the next change tries again.
         """
         try:
             if found.journal is None:
@@ -359,7 +359,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
         )
 
     def _sync_later(self, found: OpenedT) -> None:
-        """See to it that the disk has the journal soon."""
+        """Flush the journal to disk within :data:`SYNC_SECONDS`."""
         if found.syncing is not None and not found.syncing.done():
             return
 
@@ -376,7 +376,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
         found.syncing = asyncio.get_running_loop().create_task(sync())
 
     def _snapshot_later(self, found: OpenedT, journal: FileJournal) -> None:
-        """Write the whole to the journal; it is made ready in a thread, while edits go on."""
+        """Write a snapshot to the journal; a thread serialises the document while edits continue."""
         journal.since_snapshot = 0
         value, number = found.document.value, found.document.version
 
@@ -391,7 +391,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
     # -- recovery --------------------------------------------------------------------------------------------
 
     async def recover(self, request: say.Recover) -> OpenedT | None:
-        """Do with a recovery what the user chose; what is open thereby."""
+        """Apply the user's choice for a recoverable document; return the document if it is now open."""
         key = request.document
         if request.action == "discard":
             self.left.discard(key)
@@ -403,7 +403,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
         return opened
 
     def _free_path(self, found: JournaledFile[Any]) -> str:
-        """The name of a recovered one's own file, beside the one that it came from."""
+        """A free file name for a recovered document, in the folder of its former file."""
         origin = PurePosixPath(found.path or f"{found.document.value.name}.json")
         when = datetime.fromtimestamp(found.last).strftime("%Y-%m-%d %H.%M.%S")
         wish = f"{origin.stem} recovered {when}"
@@ -411,17 +411,17 @@ class OpenFiles(ABC, Generic[OpenedT]):
         return next(str(p) for name in names if not self.folder.exists(str(p := origin.with_name(name))))
 
     def _restore(self, found: JournaledFile[Any]) -> OpenedT:
-        """What a journal gives back, open again, with its past; its journal goes on."""
+        """Reopen a recovered document with its history and continue its journal."""
         path = found.path
         if path is not None and any(other.path == path for other in self):
-            path = None  # the file is open already: this is another one, to be saved under another name
+            path = None  # the file is already open: this document needs another name
         opened = self._add(found.document, found.key)
         opened.path, opened.origin, opened.on_disk = path, found.origin, found.on_disk
         opened.seen.extend(found.keys)
         if path is not None:
             opened.disk, opened.on_disk = self.folder.compared(path, found.on_disk)
         if found.missing:
-            # What could not be repeated stays beside, for somebody who can read it.
+            # A journal with records that could not be repeated is kept under another suffix for inspection.
             with contextlib.suppress(OSError):
                 found.journal_path.replace(found.journal_path.with_suffix(".unread"))
                 opened.document.saved = None
@@ -433,8 +433,8 @@ class OpenFiles(ABC, Generic[OpenedT]):
     # -- the disk --------------------------------------------------------------------------------------------
 
     async def watch(self, tell: Callable[[OpenedT], Awaitable[None]]) -> None:
-        """Look at the files again and again; ``tell`` is called for one whose file has changed, and for one
-        whose journal the disk refuses.
+        """Check the files periodically; ``tell`` is called for a document whose file has changed or whose
+        journal cannot be written.
         """
         self._tell = tell
         while True:

@@ -1,4 +1,4 @@
-"""The project folder: the only files that a studio reads or writes."""
+"""The project folder; the studio reads and writes no files outside it."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ READABLE = ROBOT_SUFFIXES
 WRITABLE = (".json",)
 MOST_BYTES = 16 * 2**20
 MOST_FILES = 2000
-"""Files that the list of a folder shows."""
+"""Number of files in the list of a folder."""
 STRAY_SECONDS = 60.0
-"""A file half written that is older than this was left by a program that was killed."""
+"""Age after which a partly written file is considered abandoned by a killed process, s."""
 _HIDDEN = ("node_modules", "__pycache__")
 _STRAY = re.compile(r"\..*\.[0-9a-f]{12}\.(tmp|part)")
 _STRANGE = re.compile(r'[\x00-\x1f\x7f<>:"|?*\\]')
@@ -32,15 +32,15 @@ _DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
 LONGEST_NAME = 120
 
 Disk = Literal["same", "changed", "gone"]
-"""How a file stands, compared with what is known of it."""
+"""State of a file on disk, compared with its known fingerprint."""
 
 
 @dataclass(frozen=True)
 class Fingerprint:
-    """What tells one form of a file from another.
+    """Identifies the content of a file.
 
-    Time of change (ns), size (bytes) and number are asked of the disk often; the content's SHA-256 decides
-    where they differ, so that a file that was only touched or written again as it was is the same.
+    Modification time (ns), size (bytes) and inode are compared first, because they are cheap to read. If they
+    differ, the SHA-256 of the content decides; a file that was rewritten with the same content is unchanged.
     """
 
     modified: int
@@ -50,24 +50,23 @@ class Fingerprint:
 
     @classmethod
     def of(cls, status: os.stat_result, data: bytes) -> Fingerprint:
-        """The fingerprint of a file with this content."""
+        """Return the fingerprint of a file with this status and content."""
         digest = hashlib.sha256(data).hexdigest()
         return cls(status.st_mtime_ns, status.st_size, status.st_ino, digest)
 
     def matches(self, status: os.stat_result) -> bool:
-        """Whether the disk says nothing that is other than it was."""
+        """Whether modification time, size and inode are unchanged."""
         return (self.modified, self.size, self.number) == (status.st_mtime_ns, status.st_size, status.st_ino)
 
     def said(self) -> dict[str, Any]:
-        """As the arguments that make it again."""
+        """The constructor arguments as a dictionary, for the journal."""
         return asdict(self)
 
 
 class ProjectFolder:
-    """Files below one folder, by paths relative to it. Every path is resolved, links included, before use.
+    """Files below one folder, by relative path. Every path is resolved, symbolic links included, before use.
 
-    Raises ``FormatError`` for a path that leads out of the folder or has a suffix that the studio does not
-    touch.
+    Raises ``FormatError`` for a path outside the folder and for a suffix that the studio does not open.
     """
 
     def __init__(self, root: str | Path) -> None:
@@ -76,14 +75,14 @@ class ProjectFolder:
             raise FormatError("there is no such folder", where=str(root), fix="give a folder that exists")
 
     def path(self, relative: str, suffixes: tuple[str, ...] = READABLE) -> Path:
-        """The file that ``relative`` means."""
+        """Return the resolved path of ``relative``."""
         allowed = f"a file of the project folder that ends in {' or '.join(suffixes)}"
-        # A share or a drive of Windows is refused before the disk is touched: asking for it would already
-        # send the user's credentials (CVE-2024-35178).
+        # A Windows share or drive is refused before the file system is accessed: the access alone would send
+        # the user's credentials to the share (CVE-2024-35178).
         strange = "\0" in relative or "\\" in relative or ":" in relative or relative.startswith("/")
         if not relative or strange or len(relative) > 1000:
             raise FormatError(
-                f"{relative[:80]!r} is no path of the project",
+                f"{relative[:80]!r} is not a path of the project",
                 allowed=allowed,
                 where="project folder",
                 fix="choose a file of the project",
@@ -106,19 +105,19 @@ class ProjectFolder:
         return found
 
     def read(self, relative: str) -> bytes:
-        """The content of a file."""
+        """Return the content of a file."""
         return read_bounded(self.path(relative), MOST_BYTES)
 
     def read_known(self, relative: str) -> tuple[bytes, Fingerprint]:
-        """The content of a file, and by what it is told from what may stand there later."""
+        """Return the content of a file and its fingerprint."""
         path = self.path(relative)
-        # Asked before the reading: who writes in between is noticed once too often rather than never.
+        # The status is read before the content: a concurrent write is then reported twice rather than missed.
         status = path.stat() if path.is_file() else None
         data = read_bounded(path, MOST_BYTES)
         return data, Fingerprint.of(status or path.stat(), data)
 
     def read_library(self, path: Path) -> bytes:
-        """The library that a diagram is linked to, by its resolved path: a shipped one, or of the project."""
+        """Read a linked library by its resolved path: a shipped one, or a file of the project."""
         if path.parent != shipped_folder("libraries").resolve() and not path.is_relative_to(self.root):
             raise FormatError(
                 f"the library '{path.name}' lies outside of the project folder",
@@ -129,7 +128,7 @@ class ProjectFolder:
         return read_bounded(path, MOST_BYTES)
 
     def write(self, relative: str, data: bytes) -> Fingerprint:
-        """Replace a file, all or nothing; folders on the way are made."""
+        """Replace a file atomically and return its fingerprint; missing folders are created."""
         path = self.path(relative, WRITABLE)
         check_file_name(relative)
         try:
@@ -143,11 +142,11 @@ class ProjectFolder:
         return Fingerprint.of(write_atomically(path, data), data)
 
     def exists(self, relative: str) -> bool:
-        """Whether there is such a file."""
+        """Whether the file exists."""
         return self.path(relative).exists()
 
     def compared(self, relative: str, known: Fingerprint | None) -> tuple[Disk, Fingerprint | None]:
-        """How a file stands now, and its fingerprint where it is the known one or has the same content."""
+        """Return the state of a file, and its present fingerprint if it is known or has the same content."""
         path = self.path(relative)
         try:
             status = path.stat()
@@ -161,7 +160,7 @@ class ProjectFolder:
         return ("same", now) if known is not None and known.digest == now.digest else ("changed", known)
 
     def sweep(self, used: Iterable[str]) -> None:
-        """Remove what a studio that was killed during a save left half written beside these files."""
+        """Remove partly written temporary files beside these files, left by a studio killed during a save."""
         folders = {self.root, *((self.root / name).resolve().parent for name in used)}
         for folder in folders:
             if not (folder.is_relative_to(self.root) and folder.is_dir()):
@@ -172,7 +171,7 @@ class ProjectFolder:
                         path.unlink()
 
     def files(self) -> list[str]:
-        """The files that can be opened, by path, hidden folders left out; at most :data:`MOST_FILES`."""
+        """Paths of the files that can be opened, without hidden folders; at most :data:`MOST_FILES`."""
         return sorted(_first(self._walk(), MOST_FILES))
 
     def _walk(self) -> Iterator[str]:
@@ -184,7 +183,7 @@ class ProjectFolder:
                 yield (Path(folder) / name).relative_to(self.root).as_posix()
 
     def robot_path(self, name: str, shipped: tuple[str, ...]) -> str:
-        """What ``load_robot`` is to be given for a robot that a page names; raises for other files."""
+        """Return the argument of ``load_robot`` for a robot named by a page; raise for files elsewhere."""
         if name in shipped:
             return name
         if Path(name).suffix.lower() not in READABLE:
@@ -197,20 +196,20 @@ def _first(names: Iterator[str], most: int) -> list[str]:
 
 
 def check_file_name(relative: str) -> None:
-    """Raise ``FormatError`` for a path that some system could not store or would not show."""
+    """Raise ``FormatError`` for a path that some operating system cannot store or does not display."""
     for part in relative.split("/"):
         if not part or part != part.strip() or part.startswith(".") or part.endswith("."):
-            reason = "is empty, or begins with a dot or space, or ends with one"
+            reason = "is empty, or begins or ends with a dot or space"
         elif _STRANGE.search(part):
-            reason = "holds a character that not every system stores"
+            reason = "contains a character that some systems cannot store"
         elif _DEVICES.fullmatch(part):
-            reason = "is the name of a device"
+            reason = "is a reserved device name"
         elif len(part) > LONGEST_NAME:
             reason = f"has {len(part)} characters"
         else:
             continue
         raise FormatError(
-            f"'{part[:80]}' cannot be a file's name: it {reason}",
+            f"'{part[:80]}' cannot be a file name: it {reason}",
             allowed=f"letters, digits, spaces, - and _, at most {LONGEST_NAME} characters",
             fix="choose another name",
             where="project folder",

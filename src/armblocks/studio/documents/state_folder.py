@@ -1,7 +1,7 @@
-"""Private files of the studio, outside the project folder and readable by its user only.
+"""Private files of the studio, outside the project folder, with access rights for their user only.
 
-One folder for each project folder holds the journals of what is drawn, the files used last, and the secret by
-which a page is known again after the server was started anew.
+There is one folder for each project folder. It contains the journals of unsaved documents, the list of recent
+files, and the session secret with which pages reconnect after a restart of the server.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from armblocks.files import read_bounded, write_atomically
 MOST_RECENT = 12
 MOST_BYTES = 64 * 1024
 SESSION_SECONDS = 12 * 3600.0
-"""A session that was not used for so long is not taken up again."""
+"""Age after which a session is not resumed, s."""
 
 
 @dataclass(frozen=True)
 class Session:
-    """By what a page is known again: the port that it speaks to, and the value of its cookie."""
+    """The port of the server and the session cookie with which pages reconnect after a restart."""
 
     port: int
     secret: str
 
 
 class StateFolder:
-    """The studio's own files for one project folder."""
+    """The state files of the studio for one project folder."""
 
     def __init__(self, project: Path) -> None:
         name = hashlib.sha256(os.fsencode(project.resolve())).hexdigest()[:24]
@@ -42,7 +42,7 @@ class StateFolder:
         self.journals = self.root / "journals"
 
     def session(self) -> Session | None:
-        """The session of the server that was here last; ``None`` if there was none, or long ago."""
+        """The session of the previous server; ``None`` if there was none or it has expired."""
         try:
             age = time() - self._session.stat().st_mtime
             found = json.loads(read_bounded(self._session, MOST_BYTES))
@@ -52,7 +52,7 @@ class StateFolder:
         return session if age < SESSION_SECONDS and len(session.secret) >= 32 else None
 
     def begin_session(self, port: int, *, afresh: bool = False) -> Session:
-        """The session for this port: the last one where it was of this port, unless ``afresh``."""
+        """Return the session for this port: the previous one if its port is the same, unless ``afresh``."""
         last = self.session()
         kept = last is not None and last.port == port and not afresh
         session = last if last is not None and kept else Session(port, secrets.token_urlsafe(32))
@@ -60,7 +60,7 @@ class StateFolder:
         return session
 
     def recent(self) -> list[str]:
-        """Files of the project that were opened or saved last, the latest first."""
+        """Recently opened or saved project files, the latest first."""
         try:
             found: Any = json.loads(read_bounded(self._recent, MOST_BYTES))
             return [str(name) for name in found["files"]][:MOST_RECENT]
@@ -68,7 +68,7 @@ class StateFolder:
             return []
 
     def use(self, path: str) -> None:
-        """Note that a file was opened or saved."""
+        """Add a file to the recent files."""
         recent = self.recent()
         if recent[:1] != [path]:
             files = [path, *(other for other in recent if other != path)]
@@ -83,7 +83,7 @@ class StateFolder:
         return self.root / "recent.json"
 
     def _write(self, path: Path, value: object) -> None:
-        """Write a small file of this folder; where that cannot be, the studio goes on without."""
+        """Write a small file of this folder; write errors are ignored."""
         try:
             self.root.mkdir(parents=True, exist_ok=True, mode=0o700)
             write_atomically(path, json.dumps(value).encode(), mode=0o600)
@@ -92,7 +92,7 @@ class StateFolder:
 
 
 def state_base() -> Path:
-    """Where programs of this system keep their state for a user; raises ``FormatError`` if nowhere."""
+    """The folder for per-user program state on this system; raises ``FormatError`` if there is none."""
     folder = user_folders.state_folder()
     if folder is None:
         raise FormatError(

@@ -15,20 +15,20 @@ Answer = Callable[["Page", RequestT], Awaitable[Any]]
 
 
 class Answers:
-    """One handler for each class of requests. A test checks that every request has one of its reply type."""
+    """One handler for each class of requests. A test checks completeness and the types of the replies."""
 
     def __init__(self) -> None:
         self._handlers: dict[type[Request[Any]], Answer[Any]] = {}
 
     def on(self, request: type[RequestT], answer: Answer[RequestT]) -> None:
-        """Register the handler of a class of requests; its result is the value of the reply."""
+        """Register the handler of a class of requests; the handler returns the value of the reply."""
         self._handlers[request] = answer
 
     async def to(self, page: Page, request: Request[ReplyT]) -> ReplyT:
-        """The value of the reply to a request. Raises ``ArmblocksError`` where it is refused."""
+        """Return the value of the reply to a request. Raises ``ArmblocksError`` if the request is refused."""
         return await self._handlers[type(request)](page, request)
 
     @property
     def handlers(self) -> Mapping[type[Request[Any]], Answer[Any]]:
-        """The handler of each class of requests."""
+        """Return the handler of each class of requests."""
         return self._handlers

@@ -1,9 +1,8 @@
 """The text messages of the websocket: numbered requests, their replies, and events.
 
-A front end sends a :class:`Request` with a number of its own choosing; the server answers each with a
-:class:`Reply` of the same number, and sends an :class:`Event` whenever something happened: also to the other
-front ends that show the same document. Samples of a run come as binary frames, see
-:mod:`armblocks.studio.protocol.frames`.
+A front end sends a :class:`Request` with a number that it chooses. The server answers with a :class:`Reply`
+of the same number. It sends an :class:`Event` after each change, also to the other front ends that show the
+same document. Samples of a run are sent as binary frames, see :mod:`armblocks.studio.protocol.frames`.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ class Envelope(Message):
 
 
 class Reply(Event):
-    """The answer to a request: ``fault`` where it was refused."""
+    """The reply to a request; ``fault`` is set if the request was refused."""
 
     kind: Literal["reply"] = "reply"
     number: int
@@ -30,6 +29,6 @@ class Reply(Event):
 
 
 class ServerMessage(Message):
-    """Only for the types of the front end: everything that the server sends as text."""
+    """All text messages of the server, for the generated types of the front end."""
 
     event: Annotated[Event, AnyOf()]

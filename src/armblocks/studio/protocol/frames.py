@@ -1,4 +1,4 @@
-"""Samples of a run as a binary frame: small header, then plain numbers that a page may use as they lie.
+"""Samples of a run as a binary frame: a short header, then numbers that a front end uses without conversion.
 
 ::
 
@@ -6,7 +6,7 @@
     header       JSON, padded with spaces so that the numbers begin at a multiple of 8
                  {"run": …, "first": index of the first sample, "count": N}
     time         N float64, little-endian
-    columns      one after the other, N float64 each: the channels in order, each row by row
+    columns      N float64 each, one after the other: channels in order, entries of a matrix row by row
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 
 def sample_frame(run: str, first: int, time: NDArray[np.float64], signals: NDArray[np.float64]) -> bytes:
-    """The frame of samples ``first`` and after: ``time`` (N,) s, ``signals`` (ny, N) in column layout."""
+    """Encode the samples from number ``first`` on: ``time`` (N,) s, ``signals`` (ny, N) in column layout."""
     header = json.dumps({"run": run, "first": first, "count": int(time.size)}).encode()
     header += b" " * (-(4 + len(header)) % 8)
     numbers = np.ascontiguousarray(np.concatenate([time[None, :], signals]), dtype="<f8")
@@ -28,10 +28,10 @@ def sample_frame(run: str, first: int, time: NDArray[np.float64], signals: NDArr
 def thinned(
     time: NDArray[np.float64], signals: NDArray[np.float64], stride: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Two samples in the place of every ``stride``: of each signal the least and the greatest, as they came.
+    """Replace each ``stride`` samples by two: minimum and maximum of each signal, in their order of time.
 
-    ``time`` (N,) s and ``signals`` (ny, N) give rows that draw the same picture where a pixel is wider than a
-    stride. What does not fill a stride at the end is one too.
+    ``time`` is (N,) s, ``signals`` (ny, N). A plot of the result looks the same if one pixel covers more than
+    a stride. An incomplete stride at the end is reduced in the same way.
     """
     whole = time.size - time.size % stride
     if whole == 0:

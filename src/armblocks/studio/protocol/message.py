@@ -1,8 +1,8 @@
-"""What all messages between front end and server have in common, and how the messages of a class are found.
+"""The base classes of all messages between front end and server, and the search for the messages of a class.
 
-A request says which value its reply has: ``class Find(Request[list[Found]])``. The union that pydantic reads
-and the types of the front end follow from :func:`messages_of`: a message is added by its class alone, in a
-file of :mod:`armblocks.studio.protocol.messages`.
+A request declares the type of the value in its reply: ``class Find(Request[list[Found]])``. The union that
+pydantic reads and the types of the front end follow from :func:`messages_of`. A new message needs only its
+class, in a file of :mod:`armblocks.studio.protocol.messages`.
 """
 
 from __future__ import annotations
@@ -20,28 +20,28 @@ MessageT = TypeVar("MessageT", bound="Message")
 
 
 class Message(BaseModel):
-    """A value that travels between front end and server: unknown members are refused.
+    """A value that travels between front end and server; unknown fields are rejected.
 
-    Its validator is built when it is first used: then every file of messages is imported, see :class:`AnyOf`.
+    The validator is built at its first use, when all files of messages are imported; see :class:`AnyOf`.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
 
 class Request(Message, Generic[ReplyT]):
-    """What a front end asks of the server. The type argument is the type of the value in the reply."""
+    """A message from a front end to the server. The type argument is the type of the value in the reply."""
 
 
 class Event(Message):
-    """What the server tells a front end of its own accord."""
+    """A message from the server to front ends that is not a reply."""
 
 
 class Edit(Message):
-    """One step of work on a document, as data: what can be undone."""
+    """One undoable change of a document, as data."""
 
 
 class Fault(Message):
-    """Why a request was refused, in the parts of an ``ArmblocksError``."""
+    """The reason for a refused request: the fields of an ``ArmblocksError``."""
 
     what: str
     where: str
@@ -50,23 +50,23 @@ class Fault(Message):
 
 
 def reply_type(request: type[Request[Any]]) -> Any:
-    """The type of the value in the reply to a request."""
+    """Return the type of the value in the reply to a request."""
     for base in request.__mro__:
         given = base.__pydantic_generic_metadata__["args"] if issubclass(base, Request) else ()
         if given and not isinstance(given[0], TypeVar):
             return given[0]
-    raise TypeError(f"{request.__name__} does not say which reply it has")
+    raise TypeError(f"{request.__name__} does not declare the type of its reply")
 
 
 def messages_of(base: type[MessageT]) -> dict[str, type[MessageT]]:
-    """The messages of a class by their kind: of all classes below it those that have one."""
+    """Return the subclasses of a message class that have a kind, by kind."""
     list(modules_in("armblocks.studio.protocol.messages"))  # imports them
     found = {kind: message for message in _below(base) if (kind := kind_of(message))}
     return dict(sorted(found.items()))
 
 
 def kind_of(message: type[Message]) -> str:
-    """The kind by which a message is told from others of its class; ``""`` where it has none."""
+    """Return the kind that identifies a message within its class; ``""`` for a class without a kind."""
     field = message.model_fields.get("kind")
     given = get_args(field.annotation) if field is not None else ()
     return given[0] if len(given) == 1 else ""
@@ -79,7 +79,7 @@ def _below(base: type[MessageT]) -> Iterator[type[MessageT]]:
 
 
 class AnyOf:
-    """Marks a member as any message of a class, told apart by kind: ``Annotated[Event, AnyOf()]``."""
+    """Marks a field that takes any message of a class, selected by kind: ``Annotated[Event, AnyOf()]``."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         base = source.__pydantic_generic_metadata__["origin"] or source

@@ -1,4 +1,4 @@
-"""The queue of messages to one page. A slow page never blocks the server."""
+"""The queue of messages to one page, so that a slow page never blocks the server."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from collections.abc import Awaitable, Callable
 Said = str | bytes
 """A message as JSON, or a frame of samples."""
 BEHIND_BYTES = 4 * 2**20
-"""A page that has so much to come is told of a run no faster than it listens."""
+"""Above this queue size, samples of a run are added only as fast as the page receives them, bytes."""
 MOST_BYTES = 64 * 2**20
-"""A page that has so much to come is given up; when it listens again it comes anew."""
+"""Above this queue size the connection is closed; the page reconnects when it is responsive again, bytes."""
 
 
 class Outbox:
-    """Messages and frames in the order in which they are to go. Used on one event loop."""
+    """Queue of messages and frames in sending order. Used on one event loop."""
 
     def __init__(
         self, send_text: Callable[[str], Awaitable[None]], send_bytes: Callable[[bytes], Awaitable[None]]
@@ -28,15 +28,15 @@ class Outbox:
         self._room = asyncio.Event()
         self._room.set()
         self.given_up = False
-        """Whether nothing goes any more: the page has left, or has not listened for too long."""
+        """Whether the queue is closed: the page has disconnected, or the queue exceeded its size limit."""
 
     @property
     def behind(self) -> bool:
-        """Whether the page has so much to come that no more of a run should be added."""
+        """Whether the queue is so long that no more samples of a run should be added."""
         return not self._room.is_set()
 
     async def put(self, said: Said) -> None:
-        """Add what is to be sent; returns at once."""
+        """Add a message; does not wait."""
         if self.given_up:
             return
         self._waiting.append(said)
@@ -48,11 +48,11 @@ class Outbox:
             self.give_up()
 
     async def room(self) -> None:
-        """Return when the page is not behind."""
+        """Wait until :attr:`behind` is false."""
         await self._room.wait()
 
     async def empty(self) -> None:
-        """Send what is there, and what comes, until it is given up; raises what sending raises."""
+        """Send all messages, also later ones, until the queue is closed; raises connection errors."""
         try:
             while not self.given_up:
                 while self._waiting and not self.given_up:
@@ -68,7 +68,7 @@ class Outbox:
             self.give_up()
 
     def give_up(self) -> None:
-        """Forget what is there; nothing goes any more."""
+        """Close the queue and discard its messages."""
         self.given_up = True
         self._waiting.clear()
         self._size = 0

@@ -1,4 +1,4 @@
-"""The connected pages, with their connections and displayed documents."""
+"""The connected pages, with their connections and the documents that they show."""
 
 from __future__ import annotations
 
@@ -16,44 +16,44 @@ if TYPE_CHECKING:
     from armblocks.studio.protocol.message import Message
 
 GONE = (RuntimeError, ConnectionError, WebSocketDisconnect)
-"""What sending to a page raises that has left."""
+"""Exceptions raised by sending to a disconnected page."""
 SendText = Callable[[str], Awaitable[None]]
 SendBytes = Callable[[bytes], Awaitable[None]]
 
 
 class NoRequestError(ValueError):
-    """What a page has sent is no request of the studio."""
+    """The text from a page is not a request of the studio."""
 
 
 @dataclass(eq=False)
 class Page:
-    """One page. Its documents, runs and robots are the hub's affair."""
+    """One connected browser page. The hub manages its documents, runs and robots."""
 
     send_text: SendText
     send_bytes: SendBytes
     outbox: Outbox | None = None
-    """Through which both send, where the page may be slower than what is sent."""
+    """The queue through which both functions send, if there is one."""
     shows: dict[str, tuple[str, ...]] = field(default_factory=dict[str, tuple[str, ...]])
-    """Documents that it shows, and the path of the sheet that it looks at."""
+    """Displayed documents, with the path of the displayed sheet."""
     hears: dict[str, int] = field(default_factory=dict[str, int])
-    """Runs that it is told from their record, and how far: until then it gets nothing else of them."""
+    """Runs whose record is being sent, with the number of sent messages; live messages are withheld."""
 
     @property
     def behind(self) -> bool:
-        """Whether it has so much to come that it should not get more of a run yet."""
+        """Whether its queue is so long that no more samples of a run should be added."""
         return self.outbox is not None and self.outbox.behind
 
     async def room(self) -> None:
-        """Return when it is not behind."""
+        """Wait until :attr:`behind` is false."""
         if self.outbox is not None:
             await self.outbox.room()
 
     async def tell(self, event: Message) -> None:
-        """Send an event; a page that is gone is nobody's trouble."""
+        """Send an event; a disconnected page is ignored."""
         await self.send(event.model_dump_json())
 
     async def send(self, said: Said) -> None:
-        """Send a message or a frame as it is."""
+        """Send a message or a frame without conversion."""
         with contextlib.suppress(*GONE):
             await (self.send_text(said) if isinstance(said, str) else self.send_bytes(said))
 
@@ -71,11 +71,11 @@ class Pages:
         return iter(list(self._connected))
 
     def add(self, page: Page) -> None:
-        """A page has come."""
+        """Add a page that has connected."""
         self._connected.add(page)
 
     def discard(self, page: Page) -> None:
-        """A page has gone."""
+        """Remove a page that has disconnected."""
         self._connected.discard(page)
 
     def showing(self, document: str) -> list[Page]:
@@ -83,9 +83,9 @@ class Pages:
         return [page for page in self if document in page.shows]
 
     async def tell(self, event: Message) -> None:
-        """Tell every page."""
+        """Send an event to every page."""
         await asyncio.gather(*(page.tell(event) for page in self))
 
     async def tell_of(self, document: str, event: Message) -> None:
-        """Tell every page that shows a document."""
+        """Send an event to every page that shows a document."""
         await asyncio.gather(*(page.tell(event) for page in self.showing(document)))

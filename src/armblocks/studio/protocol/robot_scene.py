@@ -1,6 +1,6 @@
-"""A robot as front ends draw it: its bodies once, after that only poses.
+"""A robot as front ends draw it: its bodies are sent once, then only poses.
 
-Notebooks show robots as well: this file needs no pydantic.
+Notebook widgets use this file without pydantic.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Literal
 
 @dataclass(frozen=True, kw_only=True)
 class SceneBody:
-    """A body of a robot, which moves with a ``row`` of the poses: 0 is the base, then come the links.
+    """A body of a robot; its pose is ``row`` of the poses: row 0 is the base, the links follow.
 
     ``corners`` (F, 3, 3) m and unit ``normals`` (F, 3, 3) of its triangles: base64 of little-endian float32.
     """
@@ -24,12 +24,12 @@ class SceneBody:
 
 @dataclass(frozen=True, kw_only=True)
 class SceneJoint:
-    """A joint: the link of ``row`` moves against that of ``carrier``.
+    """A joint: the link of ``row`` moves relative to the body of row ``carrier``.
 
-    ``frame`` is its pose in the frame of ``carrier`` and ``moving`` its pose in the link's own frame, (16,)
-    row by row; z is the joint's axis. The x of ``moving`` has turned from that of ``frame`` by q + ``offset``
-    (of a prismatic joint: its origin has moved so far). ``limits`` are in rad or m, ``radius`` (m) is that of
-    the drum that is drawn on the joint.
+    ``frame`` is the joint frame in the frame of ``carrier``, ``moving`` the joint frame in the link frame,
+    both (16,) row by row; z is the joint axis. For a revolute joint, x of ``moving`` is rotated from x of
+    ``frame`` by q + ``offset``; for a prismatic joint, its origin is displaced by q + ``offset``. ``limits``
+    are in rad or m, ``radius`` (m) is that of the cylinder drawn at the joint.
     """
 
     name: str
@@ -47,8 +47,8 @@ class SceneJoint:
 class RobotScene:
     """Bodies, joints and size of a robot.
 
-    ``reach`` (m) of the arm; ``foot`` (m): how far the bodies of the base reach below its frame. There are
-    ``rows`` poses: of base, links and tool.
+    ``reach`` (m) of the arm; ``foot`` (m): distance by which the bodies of the base extend below its frame.
+    ``rows`` is the number of poses: base, links and tool.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""The JSON Schema of all messages and of the values in replies: the front end's types are made from it."""
+"""The JSON Schema of all messages and reply values; the types of the front end are generated from it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from armblocks.studio.protocol.message import Request, messages_of, reply_type
 
 
 def message_schema() -> dict[str, Any]:
-    """One schema with a definition of every message, and the reply type of every request by its kind."""
+    """Return one schema that defines every message, and the reply type of each request by its kind."""
     replies = {kind: reply_type(request) for kind, request in messages_of(Request).items()}
     inputs: list[tuple[str, JsonSchemaMode, TypeAdapter[Any]]] = [
         ("Envelope", "validation", TypeAdapter(Envelope)),
@@ -24,9 +24,9 @@ def message_schema() -> dict[str, Any]:
     definitions: dict[str, Any] = together["$defs"]
     for definition in definitions.values():
         for name, member in definition.get("properties", {}).items():
-            member.pop("title", None)  # it would become a type of its own
+            member.pop("title", None)  # a title would generate a separate type
             if "const" in member and name not in definition.setdefault("required", []):
-                definition["required"].append(name)  # the discriminator of a message is required
+                definition["required"].append(name)  # every message contains its kind
     members: dict[str, Any] = {
         "envelope": schemas["Envelope", "validation"],
         "server": schemas["ServerMessage", "serialization"],
@@ -46,7 +46,7 @@ def _object(members: dict[str, Any], title: str) -> dict[str, Any]:
 
 
 def _with_tuples(schema: Any) -> Any:
-    """The schema with tuples as JSON Schema wrote them before 2020: the generator of types knows these."""
+    """Convert tuples to the form of JSON Schema before 2020, which the type generator supports."""
     match schema:
         case list():
             return [_with_tuples(value) for value in cast("list[Any]", schema)]

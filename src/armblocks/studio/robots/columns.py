@@ -1,8 +1,8 @@
-"""The columns of the robot editor's tables, declared once for page and edits.
+"""The columns of the robot editor's tables, declared once for front end and edits.
 
-The tables are those of the paper: ``kinematics`` is its Table 1 (D-H row, ranges, speeds), ``dynamics`` its
-Table 2 (mass, centre, inertia, motor), both in :mod:`armblocks.studio.robots.link_columns`; what a robot has
-once, as base, tool and gravity, is here.
+The tables follow the paper: ``kinematics`` is its Table 1 (D-H row, ranges, speeds), ``dynamics`` its Table 2
+(mass, centre, inertia, motor). Both are in :mod:`armblocks.studio.robots.link_columns`. This file has the
+properties of the whole robot, such as base, tool and gravity.
 """
 
 from __future__ import annotations
@@ -20,25 +20,25 @@ Owner = TypeVar("Owner", Link, Robot)
 
 
 class Quantity(Enum):
-    """What a cell holds, as far as reading and showing it goes. Values are SI, whatever the table shows."""
+    """Type of a cell, which determines how it is parsed and displayed. Values are SI."""
 
     NUMBER = "number"
     ANGLE = "angle"
-    """rad; shown in degrees or radians."""
+    """rad; displayed in degrees or radians."""
     COORDINATE = "coordinate"
-    """Of a joint: rad where it turns, m where it slides."""
+    """Joint coordinate: rad for a revolute joint, m for a prismatic one."""
     RATE = "rate"
-    """Of a joint: rad/s or m/s."""
+    """Joint speed: rad/s or m/s."""
     TEXT = "text"
     CHOICE = "choice"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Column(Generic[Owner]):
-    """One thing that can be typed: of every link, or of the robot.
+    """One editable property, of every link or of the robot.
 
-    ``read`` gives the SI value, ``None`` where there is none; ``write`` a changed owner, and is given
-    ``None`` only where the column is ``optional``. ``locked`` says why there is nothing to type, or ``""``.
+    ``read`` returns the SI value, ``None`` for an empty cell. ``write`` returns a changed owner; it receives
+    ``None`` only if the column is ``optional``. ``locked`` returns why the cell cannot be edited, or ``""``.
     """
 
     name: str
@@ -51,12 +51,12 @@ class Column(Generic[Owner]):
     optional: bool = False
     choices: tuple[str, ...] = ()
     group: str = ""
-    """Columns of one group stand together under its heading."""
+    """Columns of one group are adjacent, under a common heading."""
     locked: Callable[[Owner], str] = lambda _: ""
 
 
 def number_of(value: Value) -> float:
-    """The number of a cell; 0 where it is empty."""
+    """Return the number in a cell; 0 for an empty one."""
     return float(value or 0.0)
 
 
@@ -125,13 +125,13 @@ def _text_column(name: str, doc: str) -> Column[Robot]:
 
 
 ROBOT: tuple[Column[Robot], ...] = (
-    _text_column("name", "what the robot is called"),
-    _text_column("manufacturer", "who makes it"),
-    _text_column("comment", "where its numbers come from"),
+    _text_column("name", "name of the robot"),
+    _text_column("manufacturer", "manufacturer of the robot"),
+    _text_column("comment", "source of the data"),
     Column(
         name="friction_model",
         title="friction",
-        doc="how motor friction comes through the gear, by release of the Robotics Toolbox",
+        doc="model of motor friction at the joint, by release of the Robotics Toolbox",
         quantity=Quantity.CHOICE,
         choices=tuple(model.value for model in FrictionModel),
         read=lambda robot: robot.friction_model.value,

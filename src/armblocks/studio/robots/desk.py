@@ -1,4 +1,4 @@
-"""Requests about the motion of robots, in the editor and in blocks."""
+"""Requests about the motion of robots, in the editor and in diagrams."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _PICTURE_SIZE = (760.0, 560.0)
 
 
 class RobotDesk:
-    """Answers what pages ask about robots."""
+    """Handles the requests about robots."""
 
     def __init__(
         self,
@@ -43,7 +43,7 @@ class RobotDesk:
         self._diagrams = diagrams
 
     def register(self, answers: Answers) -> None:
-        """Register what answers the requests about robots."""
+        """Register the handlers of the requests about robots."""
         answers.on(say.RobotOfBlock, self._open_of_block)
         answers.on(say.AskRobotTables, self._tables)
         answers.on(say.AskScene, self._scene)
@@ -72,16 +72,16 @@ class RobotDesk:
 
     async def _picture(self, _: Page, request: say.AskPicture) -> str:
         robot = self._robot(request.document, request.inside, request.block)
-        link_frames_of(robot, request.q)  # refuses a wrong count
+        link_frames_of(robot, request.q)  # raises for a wrong number of coordinates
         return await asyncio.to_thread(arm_picture_svg, robot, request.q, _PICTURE_SIZE, request.theme)
 
     async def _readings(self, _: Page, request: say.AskReadings) -> say.Readings:
         found = self._robots[request.document]
-        async with found.reading:  # of many that come while one compiles, each finds it compiled
+        async with found.reading:  # concurrent requests compile the arm only once
             return await asyncio.to_thread(readings, found.arm, request.q, request.qd, request.qdd)
 
     def _robot(self, document: str, path: Sequence[str], block: str) -> Robot:
-        """The robot of a document, or of a block of a diagram."""
+        """Return the robot of a document, or of a block of a diagram."""
         if document in self._robots:
             return self._robots[document].robot
         return self._block_robot(document, path, block)

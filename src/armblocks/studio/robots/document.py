@@ -1,4 +1,4 @@
-"""A robot that is open in the studio, with its past, its future and the pages that edit it."""
+"""An open robot with its undo history and the pages that edit it."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ class RobotDocument(Edited[Robot]):
     noun = "robot"
 
     def outcome(self, request: Change) -> Outcome[Robot]:
-        """What the step is called, the robot after it, and the cell that is being typed into."""
-        with warnings.catch_warnings():  # what it warns of stands among the findings
+        """Return title, new robot and edited cell of a change."""
+        with warnings.catch_warnings():  # the tables show these warnings as findings
             warnings.simplefilter("ignore", ArmblocksWarning)
             after = ROBOT_EDITS.applied(request.edit, self.value)
         return Outcome(ROBOT_EDITS.title(request.edit), after, request.gesture)
 
     def aspects(self, before: Robot, after: Robot) -> set[Aspect]:
-        """The cells that differ, links that came or went, and the order of the links."""
+        """Return the cells that differ, links that were added or removed, and changes of the link order."""
         found = {
             ("/", name) for name, column in ROBOT_COLUMNS.items() if column.read(before) != column.read(after)
         }
@@ -42,7 +42,7 @@ class RobotDocument(Edited[Robot]):
         return found
 
     def written(self, value: Robot, name: str) -> None:
-        """The file of this name holds ``value``; a robot keeps its own name whatever its file is called."""
+        """Mark ``value`` as saved; the name of a robot does not depend on its file name."""
         self.saved = value
 
 

@@ -1,8 +1,8 @@
-"""Each edit of a robot is a pure function from one robot to the next.
+"""The edits of robots; each is a pure function from one robot to the next.
 
-Texts of cells are read as those of block parameters are (:mod:`armblocks.studio.sheet.parameter_values`):
-numbers and formulas of numbers, by the interpreter of MATLAB scripts. A robot is always whole: an edit that
-no arm could have is refused with the reason, and nothing changes.
+Cell texts are parsed like block parameters (:mod:`armblocks.studio.sheet.parameter_values`): numbers and
+numeric formulas, by the interpreter of MATLAB scripts. A robot is always valid: an edit that leads to an
+invalid robot is refused with the reason, and the robot is unchanged.
 """
 
 from __future__ import annotations
@@ -55,9 +55,7 @@ def _set_cell(edit: SetCell, robot: Robot) -> Robot:
     column = _known(LINK_COLUMNS, edit.column)
     where = f"link '{link.name}', {column.title}"
     if why := column.locked(link):
-        raise InputError(
-            "there is nothing to type here", where=where, allowed=why, fix="type into another cell"
-        )
+        raise InputError("this cell cannot be edited", where=where, allowed=why, fix="edit another cell")
     changed = column.write(link, _typed(column, link, edit, where, turns=bool(link.joint.turn)))
     return replace(robot, links=tuple(changed if each is link else each for each in robot.links))
 
@@ -74,23 +72,23 @@ def _known(columns: Mapping[str, Column[Owner]], name: str) -> Column[Owner]:
 
 
 def _typed(column: Column[Owner], owner: Owner, edit: SetCell, where: str, *, turns: bool) -> Value:
-    """The SI value of what was typed."""
+    """Return the SI value of the typed text."""
     text = edit.text.strip()
     if column.quantity is Quantity.TEXT:
         return text
     if column.quantity is Quantity.CHOICE:
         if text not in column.choices:
             raise InputError(
-                f"'{text[:40]}' is no choice",
+                f"'{text[:40]}' is not a choice",
                 where=where,
                 allowed=", ".join(column.choices),
-                fix="take one of the list",
+                fix="choose one from the list",
             )
         return text
     if not text:
         if column.optional:
             return None
-        raise InputError("the cell is empty", where=where, allowed="a number", fix="type 0 for none")
+        raise InputError("the cell is empty", where=where, allowed="a number", fix="type 0 for no value")
     angular = column.quantity is Quantity.ANGLE or (
         turns and column.quantity in (Quantity.COORDINATE, Quantity.RATE)
     )
@@ -103,10 +101,10 @@ def _typed(column: Column[Owner], owner: Owner, edit: SetCell, where: str, *, tu
 
 
 def angle_value(text: str, where: str, unit: Literal["deg", "rad"]) -> float:
-    """The angle in rad that a text means; a plain number is in ``unit``.
+    """Parse an angle, in rad; a plain number is in ``unit``.
 
-    A text that says ``pi``, ``deg``, ``°`` or ``rad`` says its unit itself: ``pi/2`` is a right angle also in
-    a table of degrees. Whole degrees give the float that ``math.radians`` gives.
+    A text that contains ``pi``, ``deg``, ``°`` or ``rad`` has its own unit: ``pi/2`` is a right angle also in
+    a table in degrees. Whole degrees give the same float as ``math.radians``.
     """
     if degrees := _DEGREES.fullmatch(text):
         return math.radians(_one_number(degrees.group(1), where))
@@ -148,7 +146,7 @@ def _is_chain(robot: Robot) -> bool:
 
 @ROBOT_EDITS.on(AddJoint, lambda edit: "new joint")
 def _add_joint(edit: AddJoint, robot: Robot) -> Robot:
-    """A new revolute link of the neighbour's convention between a link and what hangs on it."""
+    """Insert a revolute link with the convention of its neighbour between a link and its children."""
     after = edit.after
     links = list(robot.links)
     place = links.index(robot.link(after)) + 1 if after else 0
@@ -156,7 +154,7 @@ def _add_joint(edit: AddJoint, robot: Robot) -> Robot:
     convention = near.convention if near is not None else DhConvention.STANDARD
     name = _free_name(links)
     made = link_from_dh(name, DhRow(a=0.2, convention=convention), parent=after or None)
-    # In a tree what is put at the base is a second foot, and not a new root under all the others.
+    # In a tree, a link inserted at the base is a second root, not the parent of the others.
     takes_over = bool(after) or _is_chain(robot)
     hung = [
         replace(link, parent=name) if takes_over and link.parent == made.parent else link for link in links
@@ -174,9 +172,9 @@ def _remove_joint(edit: RemoveJoint, robot: Robot) -> Robot:
     gone = robot.link(edit.link)
     if len(robot.links) == 1:
         raise RobotError(
-            "a robot has one link at least",
+            "a robot has at least one link",
             where=f"robot '{robot.name}'",
-            allowed="more than one link, to take one out",
+            allowed="removing a link of several",
             fix="change this link instead",
         )
     links = tuple(
@@ -196,12 +194,12 @@ def _move_joint(edit: MoveJoint, robot: Robot) -> Robot:
         raise RobotError(
             "the links do not form a single chain",
             where=f"robot '{robot.name}'",
-            allowed="links of a chain change places; those of a tree do not",
+            allowed="reordering the links of a chain, not of a tree",
             fix="change the parents of the links",
         )
     if not 0 <= place + by < len(links):
         raise InputError(
-            "there is no neighbour on that side",
+            "there is no link on that side",
             where=f"link '{name}'",
             allowed="the other direction",
             fix="move it the other way",

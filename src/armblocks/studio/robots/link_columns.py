@@ -1,4 +1,4 @@
-"""The columns of the two tables that have a row for each link."""
+"""The columns of the two tables with one row for each link."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ JOINT_WORDS = ("revolute", "prismatic")
 
 # -- links: Table 1 ------------------------------------------------------------------------------------------
 
-_NO_ROW = "this link is placed by transforms of its file, not by a D-H row"
+_NO_ROW = "the pose of this link is given by transforms in its file, not by a D-H row"
 _HOLDS = "this joint is fixed"
 
 
@@ -27,12 +27,12 @@ def _not_moving(link: Link) -> str:
 
 
 def variable_of(link: Link) -> str:
-    """The D-H number where the joint coordinate stands: ``"theta"`` or ``"d"``, ``""`` without a row."""
+    """The D-H parameter that is the joint coordinate: ``"theta"`` or ``"d"``; ``""`` without a D-H row."""
     return "" if link.dh is None else "d" if link.dh.sigma else "theta"
 
 
 def with_row(link: Link, limits: JointLimits | None = None, **changes: object) -> Link:
-    """The link with another D-H row: joint and transforms follow it. ``limits``: its own where left out."""
+    """Return the link with changed D-H parameters, joint and transforms; ``limits`` default to its own."""
     if link.dh is None:
         raise RobotError(
             _NO_ROW,
@@ -57,7 +57,7 @@ def with_row(link: Link, limits: JointLimits | None = None, **changes: object) -
 def _rownumber_of(name: str, title: str, doc: str, quantity: Quantity, unit: str) -> Column[Link]:
     def locked(link: Link) -> str:
         if name == variable_of(link):
-            return "here stands the joint coordinate; what is added to it is the offset"
+            return "this parameter is the joint coordinate; its constant part is the offset"
         return _without_row(link)
 
     def read(link: Link) -> Value:
@@ -80,7 +80,7 @@ def _with_joint_type(link: Link, value: Value) -> Link:
     sigma = JOINT_WORDS.index(str(value))
     if link.dh is not None and sigma == link.dh.sigma:
         return link
-    # Ranges and speeds were angles, or lengths: they mean nothing any more.
+    # Range and speed limits change their unit between angle and length, so they are removed.
     return with_row(link, JointLimits(torque=None), sigma=sigma)
 
 
@@ -125,21 +125,21 @@ KINEMATICS: tuple[Column[Link], ...] = (
     Column(
         name="joint",
         title="joint",
-        doc="whether the joint turns or slides; its range and speed are then to be given anew",
+        doc="revolute or prismatic; a change removes range and speed limits",
         quantity=Quantity.CHOICE,
         choices=JOINT_WORDS,
         read=lambda link: type(link.joint).__name__.lower(),
         write=_with_joint_type,
         locked=_without_row,
     ),
-    _rownumber_of("alpha", "α", "twist: turn about x between the two joint axes", Quantity.ANGLE, "rad"),
+    _rownumber_of("alpha", "α", "twist: angle about x between the two joint axes", Quantity.ANGLE, "rad"),
     _rownumber_of("a", "a", "length of the common normal of the two joint axes", Quantity.NUMBER, "m"),
-    _rownumber_of("d", "d", "way along the joint axis to the common normal", Quantity.NUMBER, "m"),
-    _rownumber_of("theta", "θ", "turn about the joint axis", Quantity.ANGLE, "rad"),
+    _rownumber_of("d", "d", "distance along the joint axis to the common normal", Quantity.NUMBER, "m"),
+    _rownumber_of("theta", "θ", "angle about the joint axis", Quantity.ANGLE, "rad"),
     Column(
         name="offset",
         title="offset",
-        doc="what is added to the joint coordinate before anything is computed from it",
+        doc="constant that is added to the joint coordinate in all kinematics",
         quantity=Quantity.COORDINATE,
         unit="rad, m",
         group="D-H row",
@@ -147,12 +147,12 @@ KINEMATICS: tuple[Column[Link], ...] = (
         write=_with_offset,
         locked=_not_moving,
     ),
-    _range_end(0, "lowest", "from", "lowest joint coordinate; empty where it is not known"),
-    _range_end(1, "highest", "to", "highest joint coordinate; empty where it is not known"),
+    _range_end(0, "lowest", "from", "lowest joint coordinate; empty if unknown"),
+    _range_end(1, "highest", "to", "highest joint coordinate; empty if unknown"),
     Column(
         name="speed",
         title="speed",
-        doc="greatest joint speed; empty where it is not known",
+        doc="greatest joint speed; empty if unknown",
         quantity=Quantity.RATE,
         unit="rad/s, m/s",
         optional=True,
@@ -164,7 +164,7 @@ KINEMATICS: tuple[Column[Link], ...] = (
     Column(
         name="torque",
         title="torque",
-        doc="greatest torque (force) at the joint, after the gear; empty where it is not known",
+        doc="greatest torque (force) at the joint, after the gear; empty if unknown",
         unit="N m",
         optional=True,
         group="Greatest",
@@ -203,7 +203,7 @@ INERTIA_PLACES: Mapping[str, tuple[int, int]] = {
     "Iyz": (1, 2),
     "Ixz": (0, 2),
 }
-"""The six numbers of an inertia in the toolbox's order, and where they stand in the matrix."""
+"""The six inertia entries in the toolbox's order, with their indices in the matrix."""
 
 
 def _inertia(name: str, place: tuple[int, int]) -> Column[Link]:
@@ -224,7 +224,7 @@ def _inertia(name: str, place: tuple[int, int]) -> Column[Link]:
 
 
 def _motor(name: str, title: str, doc: str, unit: str, index: int | None = None) -> Column[Link]:
-    """A number of the motor; typing one gives a motor to a link without."""
+    """A column for a number of the motor; a typed number adds a motor to a link without one."""
 
     def read(link: Link) -> Value:
         if link.motor is None:
@@ -267,7 +267,7 @@ DYNAMICS: tuple[Column[Link], ...] = (
     *(_centre(axis) for axis in range(3)),
     *(_inertia(name, place) for name, place in INERTIA_PLACES.items()),
     _motor("inertia", "Jm", "inertia of the rotor", "kg m²"),
-    _motor("gear_ratio", "G", "motor turns per joint turn; its sign says the direction", ""),
+    _motor("gear_ratio", "G", "motor turns per joint turn; negative if the directions are opposite", ""),
     _motor("viscous_friction", "B", "viscous friction", "N m s/rad"),
     _motor("coulomb_friction", "Tc+", "Coulomb friction of forward motion", "N m", 0),
     _motor("coulomb_friction", "Tc-", "Coulomb friction of backward motion, not above zero", "N m", 1),

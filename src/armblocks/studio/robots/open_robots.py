@@ -1,4 +1,4 @@
-"""The robots that a studio has open."""
+"""The open robots of a studio."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ class OpenRobot(OpenFile[RobotDocument]):
     """A robot with its file, its journal, and the compiled arm of its present form."""
 
     notes: tuple[str, ...] = ()
-    """What was said when the file was read."""
+    """Warnings issued while the file was read."""
     reading: asyncio.Lock = dataclasses.field(default_factory=asyncio.Lock)
     _arm: Arm | None = None
 
     @property
     def robot(self) -> Robot:
-        """The robot as it is now."""
+        """The present robot."""
         return self.document.value
 
     @property
     def arm(self) -> Arm:
-        """Its equations, compiled when first asked for."""
+        """The compiled equations of the present robot, compiled at first use."""
         if self._arm is None or self._arm.robot is not self.robot:
             self._arm = Arm(self.robot)
         return self._arm

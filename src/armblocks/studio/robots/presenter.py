@@ -1,4 +1,4 @@
-"""Opening and display of robots, with the notes from reading their file."""
+"""Opening and display of robots, with the warnings from reading their file."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Result = TypeVar("Result")
 
 
 class RobotPresenter(Presenter[OpenRobot]):
-    """Shows pages the tables of robots. ``robot_saved`` is called with a robot whose file was written."""
+    """Shows the tables of robots on pages; ``robot_saved`` is called with a robot whose file was written."""
 
     def __init__(
         self,
@@ -33,7 +33,7 @@ class RobotPresenter(Presenter[OpenRobot]):
         self._robot_saved = robot_saved
 
     def open_file(self, path: str) -> Opening[OpenRobot]:
-        """The robot of a file, or the robots of a script: these are saved as files of the studio."""
+        """Open the robot of a file, or the robots of a script; robots of a script have no file yet."""
         if path.lower().endswith(".json"):
             found, notes = _noted(lambda: self.files.open_path(path))
             found.notes = notes or found.notes
@@ -43,26 +43,26 @@ class RobotPresenter(Presenter[OpenRobot]):
         return self._brought((dataclasses.replace(robot, source=source) for robot in robots.values()), notes)
 
     def dropped(self, data: bytes, name: str) -> Opening[OpenRobot]:
-        """The robots of a file or a script from elsewhere."""
+        """Open the robots of a file or script from outside the project."""
         robots, notes = _read(data, name)
         return self._brought(robots.values(), notes)
 
     def content(self, found: OpenRobot, place: Place) -> RobotContent:
-        """The tables of a robot."""
+        """Return the tables of a robot."""
         return robot_content(found.robot)
 
     def change(self, found: OpenRobot, before: Robot, place: Place) -> RobotChange:
-        """All of the robot."""
+        """Return the complete robot; changes are not split."""
         return RobotChange(content=robot_content(found.robot))
 
     async def saved(self, found: OpenRobot) -> None:
-        """Diagrams that use the robot take its new form."""
+        """Update the diagrams that use the robot."""
         if found.path is not None:
             source = str(self._folder.path(found.path))
             await self._robot_saved(dataclasses.replace(found.robot, source=source))
 
     def _brought(self, robots: Iterable[Robot], notes: tuple[str, ...]) -> Opening[OpenRobot]:
-        """Robots that have no file."""
+        """Open robots that have no file."""
         opened = [self.files.bring(robot) for robot in robots]
         for found in opened:
             found.notes = notes
@@ -70,20 +70,20 @@ class RobotPresenter(Presenter[OpenRobot]):
 
 
 def _read(data: bytes, name: str) -> tuple[Mapping[str, Robot], tuple[str, ...]]:
-    """The robots of a file, and what was said while it was read."""
+    """Return the robots of a file, and the warnings issued while it was read."""
     robots, notes = _noted(lambda: formats.read_robots(data, name))
     if not robots:
         raise FormatError(
             "the file defines no robot",
             where=name,
             allowed="kuka = robot(L, …) or SerialLink(L, …)",
-            fix="let the script make a robot, or choose another file",
+            fix="define a robot in the script, or choose another file",
         )
     return robots, notes
 
 
 def _noted(read: Callable[[], Result]) -> tuple[Result, tuple[str, ...]]:
-    """What is read, and what was warned of meanwhile."""
+    """Return the result of ``read`` and the warnings that it issued."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", ArmblocksWarning)
         result = read()

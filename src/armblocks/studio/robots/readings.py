@@ -15,15 +15,15 @@ from armblocks.spatial import Transform
 from armblocks.studio.protocol.messages.robots import Readings
 
 SINGULAR = 1e-6
-"""Ratio of the least to the greatest singular value below which the arm counts as singular."""
+"""Ratio of smallest to greatest singular value below which the arm is called singular."""
 NEARLY = 0.02
 """Ratio below which joint speeds exceed fifty times the tool speed."""
 _PART = 0.1
-"""Fraction of the greatest entry from which on a joint or a direction is named."""
+"""Fraction of the greatest entry above which a joint or a direction is named."""
 
 
 def readings(arm: Arm, q: Sequence[float], qd: Sequence[float], qdd: Sequence[float]) -> Readings:
-    """All read-outs at ``q, qd, qdd`` (rad, m and per second), from the compiled kernels."""
+    """Compute all read-outs at ``q, qd, qdd`` (rad, m and per second) with the compiled kernels."""
     for name, values in (("q", q), ("qd", qd), ("qdd", qdd)):
         _check_count(arm.robot, name, values)
     T, J = arm.fkine(q), arm.jacob0(q)
@@ -52,11 +52,11 @@ def _check_count(robot: Robot, name: str, values: Sequence[float]) -> None:
 
 
 def singularity(J: NDArray[np.float64], joints: Sequence[str], length: float) -> str:
-    """A description of the lost motion in a singular configuration; ``""`` if it is regular.
+    """Describe the lost motion in a singular configuration; ``""`` if the configuration is regular.
 
-    ``J`` (6, n) as of ``jacob0``. Its linear rows are divided by ``length`` (m, the arm's reach), so that
-    metres and radians can be compared. It names the joints that can move without motion of the tool, or else
-    the lost direction.
+    ``J`` (6, n) is the result of ``jacob0``. Its linear rows are divided by ``length`` (m, the arm's reach),
+    so that metres and radians can be compared. The text names the joints that can move without motion of the
+    tool, or otherwise the lost direction.
     """
     scaled = J.copy()
     scaled[:3] /= length
@@ -70,15 +70,15 @@ def singularity(J: NDArray[np.float64], joints: Sequence[str], length: float) ->
     still = np.abs(right[len(values) - 1])
     named = [joint for joint, part in zip(joints, still) if part > _PART * still.max()]
     if len(named) == 1:
-        return f"{how}: {named[0]} moves and the tool stays where it is."
-    words = f"{', '.join(named[:-1])} and {named[-1]} can move against each other while the tool stays"
+        return f"{how}: {named[0]} moves without motion of the tool."
+    words = f"{', '.join(named[:-1])} and {named[-1]} can move together without motion of the tool"
     if len(joints) < 6:
         return f"{how}: {words}."
     return f"{how}: {words}; the tool cannot {_direction(left[:, len(values) - 1])}."
 
 
 def _direction(lost: NDArray[np.float64]) -> str:
-    """The lost motion of the tool, in world axes."""
+    """Describe the lost motion of the tool, in world axes."""
     linear, angular = lost[:3], lost[3:]
     slides = float(np.linalg.norm(linear)) >= float(np.linalg.norm(angular))
     way = linear if slides else angular
@@ -92,14 +92,14 @@ def _direction(lost: NDArray[np.float64]) -> str:
 
 
 def limit_words(robot: Robot, q: Sequence[float], qd: Sequence[float], tau: NDArray[np.float64]) -> list[str]:
-    """The joints outside their range, or beyond their speed or torque limits."""
+    """Describe the joints outside their range, or beyond their speed or torque limits."""
     found: list[str] = []
     for link, position, speed, torque in zip(robot.moving_links, q, qd, tau.tolist()):
         limits = link.joint.limits
         if limits.position and not limits.position[0] <= position <= limits.position[1]:
-            found.append(f"{link.name} stands outside of its range")
+            found.append(f"{link.name} is outside its range")
         if limits.speed is not None and abs(speed) > limits.speed:
-            found.append(f"{link.name} is faster than it may be")
+            found.append(f"{link.name} exceeds its speed limit")
         if limits.torque is not None and abs(torque) > limits.torque:
-            found.append(f"{link.name} needs more torque than it has")
+            found.append(f"{link.name} exceeds its torque limit")
     return found

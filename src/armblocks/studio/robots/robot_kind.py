@@ -1,4 +1,4 @@
-"""How the studio begins, reads and writes the files of robots."""
+"""Creation, reading and writing of robot files in the studio."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from armblocks.studio.robots.document import RobotDocument
 
 
 class RobotKind(FileKind[Robot, RobotDocument]):
-    """Robots as the editor's tables show them."""
+    """Robots in the form of the editor's tables."""
 
     name = "robot"
 
@@ -23,7 +23,7 @@ class RobotKind(FileKind[Robot, RobotDocument]):
         self._folder = folder
 
     def new(self) -> Robot:
-        """Two links of half a metre."""
+        """Two links of 0.5 m."""
         first = standard_dh("link1", a=0.5, mass=1.0, centre_of_mass=(-0.25, 0.0, 0.0))
         second = standard_dh("link2", parent="link1", a=0.5, mass=1.0, centre_of_mass=(-0.25, 0.0, 0.0))
         return Robot(name="new robot", links=(first, second))
@@ -37,21 +37,21 @@ class RobotKind(FileKind[Robot, RobotDocument]):
         return RobotDocument(value, version=version)
 
     def from_file(self, data: bytes, place: Path) -> Robot:
-        """The robot of a file of ours, which knows its file."""
+        """The robot of a project file; the robot refers to its file."""
         (robot,) = formats.read_robots(data, place.name).values()
         return replace(robot, source=str(place))
 
     def to_file(self, value: Robot, place: Path) -> bytes:
-        """Its canonical document."""
+        """The canonical document of the robot."""
         return formats.write_robot(value)
 
     def renamed(self, value: Robot, place: Path) -> Robot:
-        """A robot keeps its own name, whatever its file is called."""
+        """Return the robot unchanged: its name does not depend on its file name."""
         return value
 
     def from_text(self, text: str, where: str) -> Robot:
-        """A robot of the journal."""
-        with warnings.catch_warnings():  # what it warns of stands among the findings
+        """Read a robot from its journal."""
+        with warnings.catch_warnings():  # the tables show these warnings as findings
             warnings.simplefilter("ignore", ArmblocksWarning)
             (robot,) = formats.read_robots(text.encode(), "journal.json").values()
         return robot
@@ -61,5 +61,5 @@ class RobotKind(FileKind[Robot, RobotDocument]):
         return formats.write_robot(value).decode()
 
     def parts(self, value: Robot) -> int:
-        """Links."""
+        """Number of links."""
         return len(value.links)

@@ -1,4 +1,4 @@
-"""A robot as front ends draw it: bodies once, then only poses. Front ends know no kinematics."""
+"""A robot as front ends draw it: bodies are sent once, then only poses, which the server computes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from armblocks.studio.protocol.robot_scene import RobotScene, SceneBody, SceneJo
 
 
 def scene_of(robot: Robot) -> RobotScene:
-    """Bodies, joints and size of a robot."""
+    """Return the bodies, joints and size of a robot."""
     rows: dict[str | None, int] = {link.name: row for row, link in enumerate(robot.links, start=1)}
     rows[None] = 0
     radii = drum_radii(robot)
@@ -55,7 +55,7 @@ def scene_of(robot: Robot) -> RobotScene:
 
 
 def _along(link: Link) -> Transform:
-    """The turn of the joint's frame that brings z onto the joint's axis."""
+    """The rotation of the joint frame that aligns z with the joint axis."""
     x, y, z = link.joint.axis
     sine = math.hypot(x, y)
     if sine < 1e-12:
@@ -64,7 +64,7 @@ def _along(link: Link) -> Transform:
 
 
 def link_frames_of(robot: Robot, q: Sequence[float]) -> list[list[list[float]]]:
-    """Poses of base, links and tool at ``q``, (L+2, 4, 4); raises ``InputError`` for a wrong count."""
+    """Poses of base, links and tool at ``q``, (L+2, 4, 4); raises ``InputError`` for a wrong length."""
     if len(q) != len(robot.moving_links):
         raise InputError(
             f"{len(q)} joint coordinates were given",

@@ -1,4 +1,4 @@
-"""A robot as the tables of its editor: columns as declared, values, and what no arm could have."""
+"""The tables of the robot editor: columns, values, and physically impossible values."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from armblocks.studio.robots.link_columns import (
 
 
 def robot_tables() -> say.RobotTables:
-    """Every column that can be typed into."""
+    """Return all editable columns."""
     return say.RobotTables(
         kinematics=[_column(column) for column in KINEMATICS],
         dynamics=[_column(column) for column in DYNAMICS],
@@ -26,7 +26,7 @@ def robot_tables() -> say.RobotTables:
 
 
 def robot_content(robot: Robot) -> say.RobotContent:
-    """A robot as a page shows it."""
+    """Return the data of a robot that a page displays."""
     return say.RobotContent(
         name=robot.name,
         convention=_convention(robot),
@@ -115,7 +115,7 @@ def _friction_findings(robot: Robot) -> list[say.RobotFinding]:
 
 
 def _weightless(robot: Robot) -> list[say.RobotFinding]:
-    """Where nothing resists a joint, forward dynamics has no answer."""
+    """Find joints without inertia, for which forward dynamics has no solution."""
     last = robot.links[-1]
     light = last.mass == 0 and not any(any(row) for row in last.inertia)
     if not light or (last.motor is not None and last.motor.reflected_inertia > 0) or not last.joint.moves:
@@ -125,6 +125,6 @@ def _weightless(robot: Robot) -> list[say.RobotFinding]:
             link=last.name,
             columns=["mass"],
             what="Nothing resists the last joint: it has no mass, no inertia and no rotor.",
-            fix="Give it a mass or an inertia, or Jm of its motor; poses and joint torques work without.",
+            fix="Give it a mass or an inertia, or Jm of its motor; poses and joint torques do not need it.",
         )
     ]

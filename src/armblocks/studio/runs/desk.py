@@ -20,11 +20,11 @@ from armblocks.studio.sheet.open_documents import OpenDocuments
 from armblocks.studio.sheet.parameter_values import ResolveRobot
 
 PAGE_SECONDS = 1.5
-"""A page that has its document draws for so long: the process for its first run is made after that."""
+"""Delay of the first worker process after a page was opened, so that the page can draw first, s."""
 
 
 class RunDesk:
-    """Starts runs, passes commands on to them, and tells every page that shows their diagram."""
+    """Starts runs, passes commands to them, and sends their messages to all pages that show the diagram."""
 
     def __init__(
         self,
@@ -43,27 +43,27 @@ class RunDesk:
         self._telling: set[asyncio.Task[None]] = set()
 
     def register(self, answers: Answers) -> None:
-        """Register what answers the requests about runs."""
+        """Register the handlers of the requests about runs."""
         answers.on(say.Run, self._run)
         for command in (say.Control, say.SetSpeed, say.Rewind, say.Tune):
             answers.on(command, self._command)
 
     def of(self, document: str) -> str | None:
-        """The key of the run of a diagram, ``None`` where there is none."""
+        """The key of the run of a diagram, or ``None``."""
         return next((run.key for run in self.processes.values() if run.document == document), None)
 
     def shown(self, page: Page, document: str) -> None:
-        """A page has just come to a diagram: tell it of the run, and make the process of the next one."""
+        """Send a page that opened a diagram the record of its run, and start the process of the next run."""
         if (run := self.of(document)) is not None:
             self._tell_later(page, run, 0)
         self.workers.prepare(after=PAGE_SECONDS)
 
     async def report(self, document: str) -> bytes:
-        """The report of the last run of a diagram as an HTML page; raises ``ArmblocksError``."""
+        """Return the report of the last run of a diagram as HTML; raises ``ArmblocksError``."""
         key = self._diagrams[document].key
         jobs = [run.job for run in self.processes.values() if run.document == key]
         if not jobs:
-            raise InputError("there is no run to report", where="report", fix="run the model first")
+            raise InputError("there is no run for a report", where="report", fix="run the model first")
         return await report_of(jobs[-1])
 
     def close(self) -> None:
@@ -115,11 +115,13 @@ class RunDesk:
             raise UnknownNameError("run", request.run, self.processes)
         self.processes[request.run].obey(request)
 
-    # -- telling ---------------------------------------------------------------------------------------------
+    # -- messages to pages -----------------------------------------------------------------------------------
 
     def _tell_later(self, page: Page, run: str, said: int) -> None:
-        """Tell a page what a run has said but for the first ``said``, as fast as it listens: one that has
-        just come, or that is behind. Until it has caught up it gets nothing else of the run.
+        """Send a page the messages of a run from number ``said`` on, as fast as the page receives them.
+
+        This serves pages that have just connected or are behind. Live messages of the run are withheld from
+        the page until it has received the record.
         """
         page.hears[run] = said
         telling = asyncio.get_running_loop().create_task(self._tell(page, run))

@@ -1,8 +1,8 @@
 """A run with checkpoints: it can return to one and continue with identical results.
 
-Simulink's Step Back works the same way: it restores a snapshot. Here the instants between two marks can be
-reached as well, because a run from a mark to there repeats the same steps bit for bit. Tuned values are not
-taken back: they hold from the instant to which the run has returned.
+Simulink's Step Back works the same way: it restores a snapshot. Instants between two checkpoints can be
+reached as well, because a run that restarts from a checkpoint repeats the same steps bit for bit. Tuned
+values are not restored: they apply from the instant to which the run returns.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from armblocks.simulation import RunState, Samples, Simulation
 
 Array = NDArray[np.float64]
 MOST_BYTES = 64 * 2**20
-"""All marks together; when they are more, every second one goes."""
+"""Limit of the memory of all checkpoints, bytes; beyond it every second checkpoint is removed."""
 FEWEST_MARKS = 8
 
 
 @dataclass(frozen=True)
 class Mark:
-    """Where a run stood, with the values of then; ``state`` is ``None`` before its first step."""
+    """A checkpoint: state and parameters of a run; ``state`` is ``None`` before the first step."""
 
     recorded: int
     state: RunState | None
@@ -37,12 +37,12 @@ class Mark:
 
     @property
     def time(self) -> float:
-        """Time at which the run stood, s."""
+        """Time of the checkpoint, s."""
         return -math.inf if self.state is None else self.state.time
 
     @property
     def size(self) -> int:
-        """Bytes, roughly."""
+        """Approximate size, bytes."""
         if self.state is None:
             return 0
         parts = [self.state.states, self.state.discrete, self.state.algebraic, self.state.past]
@@ -52,18 +52,18 @@ class Mark:
 
 
 class RunHistory:
-    """One run of a model, with marks at which it can be taken up again; instants are numbered through."""
+    """One run of a model with checkpoints; instants are numbered from the start of the first segment."""
 
     def __init__(self, model: CompiledDiagram) -> None:
         self.run: DiagramRun = model.begin()
         self._marks = [Mark(0, None, self.run.diagram, self.run.parameters)]
         self._begin = 0
-        """Number of the first instant of the present run that is new."""
+        """Number of the first instant that the present segment records."""
 
     @property
     def recorded(self) -> int:
-        """How many instants are recorded so far."""
-        # A run that goes on records first the instant at which it begins: it is there already.
+        """Number of recorded instants."""
+        # A resumed run records its initial instant, which the previous segment has recorded already.
         return self._begin + max(0, self.run.recorded - (self._begin > 0))
 
     def samples(self, begin: int) -> Samples:
@@ -72,7 +72,7 @@ class RunHistory:
         return dataclasses.replace(fresh, begin=begin)
 
     def mark(self) -> None:
-        """Remember where the run stands."""
+        """Add a checkpoint at the present state."""
         run, marks = self.run, self._marks
         if run.finished or self.recorded <= marks[-1].recorded:
             return
@@ -81,27 +81,27 @@ class RunHistory:
             del marks[1:-1:2]
 
     def step(self) -> None:
-        """Go on until at least one more instant is recorded: a step of the solver may record several."""
+        """Advance until at least one more instant is recorded; one solver step may record several."""
         self.mark()
         before = self.recorded
         while self.recorded == before and not self.run.finished:
             self.run.advance(steps=1)
 
     def tune(self, path: str, value: object) -> None:
-        """Change a parameter from here on; raises what :meth:`DiagramRun.set` raises."""
+        """Change a parameter from the present instant on; raises the errors of :meth:`DiagramRun.set`."""
         self.mark()
         self.run.set(path, np.asarray(value, dtype=np.float64))
 
     def back_to(self, recorded: int) -> None:
-        """Stand as late as possible where at most so many instants were recorded, at least those of one step.
+        """Return to the latest state with at most ``recorded`` instants, but not before the first step.
 
-        The values that are tuned now hold from there on.
+        The present tuned values apply from there on.
         """
         tuned = self.run.diagram
         while len(self._marks) > 1 and self._marks[-1].recorded > recorded:
             self._marks.pop()
         self._resume(self._marks[-1])
-        # Step by step: the step that would go too far is taken back by its own mark.
+        # One checkpoint a step: a step that records too many instants is reverted to its own checkpoint.
         while self.recorded < recorded and not self.run.finished:
             self.step()
         if self.recorded > recorded and len(self._marks) > 1:
@@ -109,7 +109,7 @@ class RunHistory:
         self._tune_to(tuned)
 
     def stand_at(self, time: float) -> None:
-        """Stand exactly at a time (s) beyond which the last step went: it is taken again, up to there."""
+        """Return to exactly ``time`` (s), which the last step has passed; the step is repeated up to it."""
         while len(self._marks) > 1 and self._marks[-1].time > time:
             self._marks.pop()
         tuned = self.run.diagram
@@ -124,7 +124,7 @@ class RunHistory:
         self._begin = mark.recorded
 
     def _tune_to(self, diagram: Diagram) -> None:
-        """Give the tunable parameters the values that they have in another form of the diagram."""
+        """Set the tunable parameters to their values in another version of the diagram."""
         values = tuned_parameters(self.run.diagram, diagram)
         if values and not self.run.finished:
             self.run.simulation.set(values)

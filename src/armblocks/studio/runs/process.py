@@ -1,7 +1,7 @@
 """A run in a separate process, whose failures do not affect the editor.
 
-The hub's side of it. The worker is :mod:`armblocks.studio.runs.worker`; between them runs a pipe of bytes:
-the first byte of a message says whether JSON (``J``) or a frame of samples (``S``) follows.
+This is the side of the hub; the worker is :mod:`armblocks.studio.runs.worker`. They communicate through a
+pipe of bytes. The first byte of a message is ``J`` for JSON or ``S`` for a frame of samples.
 """
 
 from __future__ import annotations
@@ -26,25 +26,25 @@ from armblocks.studio.runs.workers import Worker
 TellRun = Callable[[say.Message | bytes], Awaitable[None]]
 _EVENTS: TypeAdapter[say.RunEvent] = TypeAdapter(Annotated[say.RunEvent, AnyOf()])
 STOP_SECONDS = 0.8
-"""A worker that has not stopped by itself after this long is ended."""
+"""Time after which a worker that has not obeyed ``stop`` is killed, s."""
 SILENT_SECONDS = 600.0
-"""A worker that says nothing for so long, and is not paused, hangs: it is ended."""
+"""Time without a message after which a running worker counts as hung and is killed, s."""
 MOST_SECONDS = 24 * 3600.0
-"""No run lasts longer than this, however long it is paused."""
+"""Longest duration of a run, pauses included, s."""
 JOIN_SECONDS = 5.0
-"""A process whose pipe is closed is gone after this long."""
+"""Time within which a process ends after its pipe was closed, s."""
 ENDED = ("done", "stopped", "failed")
 
 
 class RunProcess:
-    """One run of one document. Made by the hub; ``tell`` gets its events and frames, on the hub's loop."""
+    """One run of one document. The hub creates it; ``tell`` receives its events and frames in its loop."""
 
     def __init__(self, key: str, document: str, worker: Worker, tell: TellRun) -> None:
         self.key = key
         self.document = document
         self.state = "running"
         self.job: dict[str, Any] = {}
-        """What the worker was given."""
+        """The job that was sent to the worker."""
         self._worker = worker
         self._tell = tell
         self._loop = asyncio.get_running_loop()
@@ -52,13 +52,13 @@ class RunProcess:
         self._commands: SimpleQueue[bytes | None] = SimpleQueue()
         self._until = monotonic() + MOST_SECONDS
         self._forced = False
-        """Whether it was told to stop and did not."""
+        """Whether the worker was killed because it did not obey ``stop``."""
         self._broken: str = ""
-        """Why it was ended, where it was not told to stop."""
+        """The reason for killing the worker, other than ``stop``."""
         self._passing: asyncio.Task[None] | None = None
 
     def start(self, job: dict[str, Any]) -> None:
-        """Hand the worker its job, see :func:`armblocks.studio.runs.worker.work`."""
+        """Send the worker its job, see :func:`armblocks.studio.runs.worker.work`."""
         self.job = {**job, "run": self.key, "document": self.document}
         self._commands.put(json.dumps(self.job).encode())
         for going in (self._read, self._write):
@@ -66,7 +66,7 @@ class RunProcess:
         self._passing = self._loop.create_task(self._pass_on())
 
     def obey(self, request: say.RunCommand) -> None:
-        """Pass a command on to the worker; raises ``InputError`` where the run has ended."""
+        """Send a command to the worker; raises ``InputError`` if the run has ended."""
         if self.state in ENDED:
             raise InputError("the run has ended", where="run", fix="start the model again")
         self._commands.put(request.model_dump_json().encode())
@@ -74,7 +74,7 @@ class RunProcess:
             self._loop.call_later(STOP_SECONDS, self._force)
 
     def end(self) -> None:
-        """End the run and its process; nobody is told any more."""
+        """Kill the process of the run; no more messages are passed on."""
         if self._passing is not None:
             self._passing.cancel()
         self._commands.put(None)
@@ -86,7 +86,7 @@ class RunProcess:
             self._worker.process.kill()
 
     def _read(self, pipe: Connection) -> None:
-        """In a thread of its own: everything that the worker says, and ``None`` when it is gone."""
+        """Receive all messages of the worker, in a separate thread; ``None`` marks the end of the process."""
         try:
             while True:
                 message = pipe.recv_bytes()
@@ -97,15 +97,15 @@ class RunProcess:
             self._loop.call_soon_threadsafe(self._queue.put_nowait, None)
 
     def _write(self, pipe: Connection) -> None:
-        """In a thread of its own: what the worker is told. One that does not listen keeps nobody waiting."""
+        """Send commands to the worker, in a separate thread, so that an unresponsive worker blocks nobody."""
         try:
             while (command := self._commands.get()) is not None:
                 pipe.send_bytes(command)
-        except OSError:  # it is gone: the thread that reads says so
+        except OSError:  # the process has ended; `_read` reports this
             pass
 
     async def _heard(self) -> bytes | None:
-        """What the worker says next; it is ended where it says nothing, or goes on, for too long."""
+        """Return the next message of the worker; kill a worker that is silent or runs for too long."""
         rest = max(self._until - monotonic(), 0.0)
         patience = min(SILENT_SECONDS, rest) if self.state == "running" else rest
         try:
@@ -122,7 +122,7 @@ class RunProcess:
         last: say.RunProgress | None = None
         while (message := await self._heard()) is not None:
             if self._broken:
-                continue  # it is being ended; what it says of its own end is not so
+                continue  # the worker is being killed; its last messages are not valid
             if message[:1] == b"S":
                 await self._tell_samples(message[1:])
                 continue
@@ -137,7 +137,7 @@ class RunProcess:
             await self._tell(self._lost(last))
 
     async def _tell_samples(self, frame: bytes) -> None:
-        """Pass a frame on; where the disk does not take it the run is ended."""
+        """Pass a frame on; end the run if the disk cannot store it."""
         try:
             await self._tell(frame)
         except OSError as error:
@@ -145,11 +145,11 @@ class RunProcess:
             self._worker.process.kill()
 
     def _lost(self, last: say.RunProgress | None) -> say.RunProgress:
-        """What is said of a worker that ended without a word."""
+        """The final progress message for a worker that ended without one."""
         fault = say.Fault(
             what=self._broken or _cause(self._worker.process.exitcode),
             where="run",
-            allowed="a run within the limits of memory and time",
+            allowed="a run within the memory and time limits",
             fix="run the model again; if it happens again, record fewer samples or shorten the run",
         )
         return say.RunProgress(
@@ -163,15 +163,15 @@ class RunProcess:
 
 
 def _cause(exitcode: int | None) -> str:
-    """Why a process ended that said nothing about it."""
+    """The reason for the end of a process that sent no result."""
     if exitcode is None or exitcode >= 0:
         return "the process of the run ended without a result"
     names = {one.value: one.name for one in signal.Signals}
     name = names.get(-exitcode, f"signal {-exitcode}")
     match name:
         case "SIGKILL":
-            return "the system ended the process of the run (SIGKILL): its memory may have been used up"
+            return "the system ended the process of the run (SIGKILL): the memory may be exhausted"
         case "SIGXCPU":
-            return "the run has used all the processor time that it may have (SIGXCPU)"
+            return "the run has exceeded its limit of processor time (SIGXCPU)"
         case _:
             return f"the process of the run crashed ({name})"

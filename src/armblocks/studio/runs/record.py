@@ -1,8 +1,8 @@
-"""The stored messages of a run, for pages that connect later: after a reload or a lost connection, or as a
-second page.
+"""The stored messages of a run, for pages that connect later: after a reload, after a lost connection, or as
+a second page.
 
-It lies in a file without a name, which the system removes with the process: a long run costs no memory. Where
-the disk is full no more samples are taken; that the run ends thereby is still kept.
+The messages are in an unnamed temporary file, so that a long run needs no memory; the system removes the file
+with the process. If the disk is full, no more samples are stored, but the final message of the run still is.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from armblocks.studio.protocol.outbox import Said
 
 
 class RunRecord:
-    """Everything that a run has said, in order."""
+    """All messages of a run, in order."""
 
     def __init__(self) -> None:
         self._file = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115 - it lives as long as the run
         self._words: dict[int, str] = {}
-        """Messages that the disk did not take, by their number."""
+        """Messages that could not be written to disk, by their number."""
         self._spots: list[tuple[int, int, bool]] = []
         self._size = 0
 
@@ -34,7 +34,7 @@ class RunRecord:
         return data.decode() if text else data
 
     def append(self, said: Said) -> None:
-        """Keep what was said last; raises ``OSError`` for a frame that the disk does not take."""
+        """Store a message; raises ``OSError`` for a frame that cannot be written to disk."""
         data = said.encode() if isinstance(said, str) else said
         try:
             self._write(data)
@@ -54,5 +54,5 @@ class RunRecord:
             rest = rest[self._file.write(rest) :]
 
     def close(self) -> None:
-        """Forget everything."""
+        """Delete all messages."""
         self._file.close()

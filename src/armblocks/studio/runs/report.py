@@ -1,7 +1,7 @@
 """The report of a run, as from the command line, written in a separate process.
 
-The model is run again with the values with which the run began; the same steps give the same numbers. What
-was tuned or stopped on the way is not repeated.
+The model is run again with the initial values of the run; the same steps give the same numbers. Parameter
+changes during the run and its interruption are not repeated.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ MOST_SECONDS = 300.0
 
 
 async def report_of(job: Mapping[str, Any]) -> bytes:
-    """The page, HTML, for the job of a run (see :mod:`armblocks.studio.runs.worker`).
+    """Return the report as HTML, for the job of a run (see :mod:`armblocks.studio.runs.worker`).
 
-    Raises ``SimulationError`` with what the run or the report refused, or where it takes too long.
+    Raises ``SimulationError`` with the error of the run or of the report, or if the report takes too long.
     """
     context = process_context()
     ours, theirs = context.Pipe(duplex=False)
@@ -44,7 +44,7 @@ def _received(pipe: Connection) -> bytes:
         said = b""
     if not said:
         raise SimulationError(
-            "the report could not be made in the time and memory it may have",
+            "the report exceeded its time or memory limit",
             where="report",
             fix="shorten the run, or use 'armblocks run'",
         )
@@ -56,7 +56,7 @@ def _received(pipe: Connection) -> bytes:
 
 
 def write(pipe: Connection, job: dict[str, Any]) -> None:
-    """In the process: run the model, write the report, send its page."""
+    """Run the model, write the report and send it; executed in the separate process."""
     limit_process()
     from armblocks.report import write_report
 
@@ -70,6 +70,6 @@ def write(pipe: Connection, job: dict[str, Any]) -> None:
     except ArmblocksError as error:
         pipe.send_bytes(b"E" + str(error).encode())
     except MemoryError:
-        pass  # what there is of it frees itself, and that nothing was sent says enough
-    except Exception as error:  # a defect: told to who asked, and not to the terminal
+        pass  # memory is freed on return; an empty pipe reports the failure
+    except Exception as error:  # a defect is sent to the client, not printed to the terminal
         pipe.send_bytes(f"Earmblocks has a defect ({type(error).__name__})".encode())

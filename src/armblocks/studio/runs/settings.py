@@ -15,30 +15,30 @@ _RULES = (
         "solver",
         "Solver",
         "",
-        "auto begins with an explicit method and goes on with one for stiff systems where that is needed; "
-        "after the run it says what it chose, and why.",
+        "auto starts with an explicit method and switches to a method for stiff systems if needed; "
+        "the log of the run states the choice and its reason.",
     ),
     (
         "rtol",
         "Relative tolerance",
         "",
-        "An adaptive step is accepted where its error is below atol + rtol |x|.",
+        "An adaptive step is accepted if its error is below atol + rtol |x|.",
     ),
-    ("atol", "Absolute tolerance", "", "The error that states near zero may have, in their own units."),
+    ("atol", "Absolute tolerance", "", "Allowed error of states near zero, in their own units."),
     ("max_step", "Largest step", "s", "Bounds the steps of an adaptive solver; empty: the solver chooses."),
     ("step", "Fixed step", "s", "Size of every step of a fixed-step solver; empty: as the sample time."),
     (
         "sample_time",
         "Sample time of the record",
         "s",
-        "Spacing of the recorded instants; it changes no step. Empty: the fixed step, else a thousandth of "
-        "the run.",
+        "Spacing of the recorded instants; no effect on the steps. Empty: the fixed step, else a thousandth "
+        "of the run.",
     ),
 )
 
 
 def setting_rules() -> list[SettingRule]:
-    """The settings in the order of the dialog, with their defaults."""
+    """Return the settings in the order of the dialog, with their defaults."""
     defaults = dataclasses.asdict(SimulationOptions())
     return [
         SettingRule(name=name, title=title, unit=unit, doc=doc, default=defaults[name])
@@ -47,9 +47,9 @@ def setting_rules() -> list[SettingRule]:
 
 
 def solver_choices() -> list[SolverChoice]:
-    """The solvers by name; the first is the automatic choice."""
+    """Return the solvers by name; the first is the automatic choice."""
     automatic = SolverChoice(
-        name="auto", title="chosen by armblocks, while it runs", adaptive=True, stiff=False
+        name="auto", title="chosen automatically during the run", adaptive=True, stiff=False
     )
     stiff = {tableau.name for tableau in TABLEAUX if isinstance(tableau, RosenbrockTableau)}
     return [

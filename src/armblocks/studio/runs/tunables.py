@@ -12,11 +12,11 @@ from armblocks.studio.protocol.messages.runs import Tunable
 from armblocks.studio.sheet.parameter_values import parameter_json
 
 LONGEST = 64
-"""Numbers of a parameter that a page would show: longer tables are edited in their file."""
+"""Limit of the numbers in a displayed parameter; larger tables are edited in their file."""
 
 
 def tunables(diagram: Diagram) -> list[Tunable]:
-    """The tunable parameters of masks and blocks, by ``block.parameter``, with the values that they have."""
+    """Return the tunable parameters of masks and blocks, ``block.parameter``, with their present values."""
     return [
         Tunable(
             path=path,

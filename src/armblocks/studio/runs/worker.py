@@ -1,9 +1,9 @@
 """The worker process of one run: started in advance, given one job, ended with the run.
 
-A job is JSON: ``diagram`` (a canonical document), ``folder`` (for the robot files that it names), ``run``
-and ``document`` (keys), ``speed`` (simulated seconds per second, ``null`` as fast as possible), ``tuned``
-(values of tunable parameters that are tried). Commands arrive as the requests of
-:mod:`armblocks.studio.protocol.messages`; between two pieces of the run they are obeyed.
+A job is JSON: ``diagram`` (a canonical document), ``folder`` (for robot files of the project), ``run`` and
+``document`` (keys), ``speed`` (simulated seconds per second, ``null`` for as fast as possible), ``tuned``
+(trial values of tunable parameters). Commands are the requests of :mod:`armblocks.studio.protocol.messages`;
+the worker executes them between two parts of the run.
 """
 
 from __future__ import annotations
@@ -41,14 +41,14 @@ from armblocks.studio.sheet.parameter_values import tuned_value
 Array = NDArray[np.float64]
 FRAME_SECONDS = 1 / 60
 MOST_MEMORY = 8 * 2**30
-"""Bytes of address space of a worker."""
+"""Limit of the address space of a worker, bytes."""
 MOST_CPU_SECONDS = 3600
 MOST_NUMBERS = 16_000_000
-"""Numbers of one run that a page is sent, 128 MB: of more, the extremes."""
+"""Numbers of one run that a page receives, 128 MB; beyond it, only extreme values are sent."""
 
 
 def work(pipe: Connection) -> None:
-    """Get ready for any run, wait for the job, run it."""
+    """Prepare for any run, wait for the job, and run it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C in the terminal is for the server
     limit_process()
     host_target()  # starts LLVM, which takes longer than most runs
@@ -58,24 +58,24 @@ def work(pipe: Connection) -> None:
 
 
 def stride_of(run: DiagramRun) -> int:
-    """Of how many instants a page gets the extremes: 1, which is all, unless they would fill its memory."""
+    """Number of instants that are reduced to their extremes; 1 unless the samples fill the page's memory."""
     numbers = run.simulation.planned * (1 + run.simulation.compiled.signals_layout.size)
     return 1 if numbers <= MOST_NUMBERS else math.ceil(2 * numbers / MOST_NUMBERS)
 
 
 def limit_process() -> None:
-    """Give this process no more memory and time than a run may have."""
+    """Limit memory and processor time of this process."""
     if sys.platform == "win32":
         return
     import resource
 
     resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
-    # The signal of the lower limit says which one it was; that of the upper one would be taken for no memory.
+    # The soft limit sends SIGXCPU, which identifies its cause; the hard limit would look like lack of memory.
     resource.setrlimit(resource.RLIMIT_CPU, (MOST_CPU_SECONDS, MOST_CPU_SECONDS + 5))
 
 
 def begun(job: Mapping[str, Any]) -> RunHistory:
-    """The run of a job before its first step; raises ``ArmblocksError``."""
+    """Return the run of a job before its first step; raises ``ArmblocksError``."""
     folder = Path(job["folder"])
     diagram = formats.diagram_from_bytes(
         job["diagram"].encode(),
@@ -84,7 +84,7 @@ def begun(job: Mapping[str, Any]) -> RunHistory:
         formats.load_robot,
         folder=folder,
         read_library=ProjectFolder(folder).read_library,
-        draft=True,  # what cannot run is refused when it is traced, and what was traced once needs no check
+        draft=True,  # tracing rejects diagrams that cannot run
     )
     history = RunHistory(CompiledDiagram(diagram))
     for path, value in job["tuned"].items():
@@ -102,16 +102,16 @@ class _Run:
         self.tuned: dict[str, Any] = job["tuned"]
         self.state: Literal["running", "paused", "done", "stopped", "failed"] = "running"
         self.time = 0.0
-        """How far the page is told; the run itself may be further by a step, where the clock is not."""
+        """Time up to which samples were sent, s; without a real-time factor the run may be one step ahead."""
         self.count = 0
-        """How many recorded instants have been told."""
+        """Number of recorded instants that were sent."""
         self.stride = 1
-        """Of so many instants a page gets the extremes only."""
+        """Number of instants that are reduced to their extremes."""
         self.times: Array = np.empty(0)
         self.began = perf_counter()
 
     def run(self) -> None:
-        """The whole run, to its end or to the reason why it has none."""
+        """Execute the run to its end or to an error."""
         try:
             self._go()
         except SimulationError as error:
@@ -121,10 +121,10 @@ class _Run:
             self._fail(error)
         except MemoryError:
             fix = "record fewer samples, or shorten the run"
-            self._fail(SimulationError("the run needs more memory than it may have", fix=fix, where="run"))
+            self._fail(SimulationError("the run exceeds its memory limit", fix=fix, where="run"))
         except OSError:
-            raise  # the server is gone
-        except Exception as error:  # a defect: it is told, and the model is not harmed
+            raise  # the server has ended
+        except Exception as error:  # a defect is reported; the model is not affected
             self._fail(_defect(error))
 
     def _go(self) -> None:
@@ -146,7 +146,7 @@ class _Run:
                 return
 
     def _advance(self, history: RunHistory) -> None:
-        """Go on for one frame: one instant while paused, as far as the clock says, or as far as it gets."""
+        """Advance by one instant if paused, else up to the clock time or for the duration of a frame."""
         run = history.run
         if self.state == "paused":
             history.step()
@@ -157,7 +157,7 @@ class _Run:
             run.advance(None if due == math.inf else due, wall_time=FRAME_SECONDS)
 
     def _listen(self, history: RunHistory) -> bool:
-        """Obey what has been said, wait while paused or ahead of the clock; ``False`` to stop."""
+        """Execute pending commands, wait if paused or ahead of the clock; return ``False`` to stop."""
         while True:
             wait = 0.0
             if self.state == "paused":
@@ -196,7 +196,7 @@ class _Run:
         self._progress()
 
     def _tune(self, history: RunHistory, parameter: str, value: Any) -> None:
-        """Change a parameter from here on; a refusal is told and the run goes on."""
+        """Change a parameter from the present instant on; report an invalid value and continue."""
         try:
             self._stand_where_shown(history)
             history.tune(parameter, tuned_value(value, parameter))
@@ -207,7 +207,7 @@ class _Run:
             self._tell(say.RunTuned(run=self.key, time=self.time, parameter=parameter, value=value))
 
     def _go_back(self, history: RunHistory, recorded: int) -> None:
-        """Stand where at most so many instants are recorded; what is tuned holds from there on."""
+        """Return to at most ``recorded`` recorded instants; tuned values apply from there on."""
         history.back_to(max(recorded, 1))
         self.count, self.time = history.recorded, history.run.time
         told = self.count if self.stride == 1 else int(np.searchsorted(self.times, self.time, "right"))
@@ -216,12 +216,12 @@ class _Run:
         self._become("paused")
 
     def _stand_where_shown(self, history: RunHistory) -> None:
-        """Return to what is shown, where the run is beyond it, and tell all that is recorded until then."""
+        """Return to the displayed time if the run is beyond it, and send all samples up to there."""
         if history.run.time > self.time:
             history.stand_at(self.time)
             self._send_samples(history)
 
-    # -- what the hub is told --------------------------------------------------------------------------------
+    # -- messages to the hub ---------------------------------------------------------------------------------
 
     def _tell(self, event: say.Message) -> None:
         self.pipe.send_bytes(b"J" + event.model_dump_json().encode())
@@ -256,7 +256,7 @@ class _Run:
         )
 
     def _send_samples(self, history: RunHistory) -> None:
-        """What is recorded and due by the clock; while paused, all."""
+        """Send the recorded samples that are due by the clock; if paused, all."""
         fresh = history.samples(self.count)
         due = math.inf if self.state == "paused" else self.pace.due
         ready = int(np.searchsorted(fresh.time, due, "right"))
@@ -278,7 +278,7 @@ class _Run:
         self.times = np.concatenate([self.times, time])
 
     def _send_rest(self, partial: object) -> None:
-        """What is good of a run that failed."""
+        """Send the valid samples of a failed run."""
         if isinstance(partial, SimulationResult) and partial.time.size > self.count:
             self._send(partial.time[self.count :], partial.signals[:, self.count :], last=True)
             self.time = float(partial.time[-1])
@@ -305,7 +305,7 @@ class _Run:
     ) -> None:
         self.state = state
         self._progress(message, solver=solver, reason=reason)
-        # The pipe's end must not overtake what is in it.
+        # The end of the pipe must not overtake the messages in it.
         sleep(0.05)
 
     def _fail(self, error: ArmblocksError) -> None:
@@ -318,8 +318,8 @@ def _defect(error: Exception) -> SimulationError:
     return SimulationError(
         f"armblocks has a defect ({type(error).__name__}: {str(error)[:200]})",
         where="run",
-        allowed="a model that runs, or words about why it does not",
-        fix="report it with the model; your drawing is not harmed",
+        allowed="a run, or an error that explains why it is impossible",
+        fix="report it with the model; your drawing is not affected",
     )
 
 

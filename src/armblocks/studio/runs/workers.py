@@ -1,8 +1,8 @@
 """The pool of worker processes: each is used once, and the next one is started in advance.
 
-On Linux a worker is a copy of a process that has imported all that a run needs and does nothing else
-(Python's fork server): it is there in some milliseconds and shares that memory. Elsewhere every worker
-imports for itself, ahead of time.
+On Linux, a worker is forked from a process that has imported all modules for a run and does nothing else
+(Python's fork server): it starts within milliseconds and shares that memory. On other systems every worker
+imports the modules itself, in advance.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from multiprocessing.context import ForkServerContext, SpawnContext
 
 COPIED = ("__main__", "armblocks.studio.runs.worker", "armblocks.studio.runs.report")
-"""Modules that the process imports of which workers are copies."""
+"""Modules that the fork server imports."""
 
 
 def process_context() -> ForkServerContext | SpawnContext:
-    """How processes of the studio begin: never as a copy of the server, which has threads and sockets."""
+    """The start method of processes; the server is never forked, because it has threads and sockets."""
     if sys.platform != "linux":
         return multiprocessing.get_context("spawn")
     context = multiprocessing.get_context("forkserver")
@@ -32,13 +32,13 @@ def process_context() -> ForkServerContext | SpawnContext:
 
 
 def _work(pipe: Connection) -> None:
-    from armblocks.studio.runs.worker import work  # the server itself need not import what only a run needs
+    from armblocks.studio.runs.worker import work  # the server does not need these imports
 
     work(pipe)
 
 
 class Worker:
-    """A process that waits for a run, with all that is slow to import already there."""
+    """A process that has imported all modules and waits for a run."""
 
     def __init__(self) -> None:
         context = process_context()
@@ -48,17 +48,17 @@ class Worker:
         theirs.close()
 
     def end(self) -> None:
-        """End the process at once."""
+        """Kill the process."""
         self.process.kill()
         self.pipe.close()
 
 
 PAUSE_SECONDS = 0.5
-"""A run that begins has the machine for itself for so long: then the next worker is made."""
+"""Delay between the start of a run and the start of the next worker, so that the run starts alone, s."""
 
 
 class Workers:
-    """Gives out workers; while one runs, the next is made aside."""
+    """Provides workers; during a run the next worker is started in advance."""
 
     def __init__(self, pause: float = PAUSE_SECONDS) -> None:
         self._pause = pause
@@ -66,7 +66,7 @@ class Workers:
         self._later: asyncio.TimerHandle | None = None
 
     def prepare(self, after: float = 0.0) -> None:
-        """Have a worker made, if none is, ``after`` so many seconds in which others may need the machine."""
+        """Start a worker after ``after`` seconds, if none is waiting."""
         if self._later is not None:
             self._later.cancel()
         if after > 0.0:
@@ -75,7 +75,7 @@ class Workers:
             self._next = asyncio.get_running_loop().create_task(asyncio.to_thread(Worker))
 
     async def take(self) -> Worker:
-        """A worker for one run. Raises ``SimulationError`` where the system gives no process."""
+        """Return a worker for one run. Raises ``SimulationError`` if no process can be started."""
         while True:
             self.prepare()
             made, self._next = self._next, None
@@ -86,7 +86,7 @@ class Workers:
                 raise SimulationError(
                     f"no process for the run could be started ({error})",
                     where="run",
-                    allowed="a process of its own for each run",
+                    allowed="a separate process for each run",
                     fix="close other programs, and run the model again",
                 ) from None
             if worker.process.is_alive():
@@ -94,7 +94,7 @@ class Workers:
                 return worker
 
     def end(self) -> None:
-        """End the worker that waits."""
+        """Kill the waiting worker."""
         if self._later is not None:
             self._later.cancel()
         if self._next is None:

@@ -1,1 +1,1 @@
-"""The web server: keys, requests, the life of the program."""
+"""The web server: access control, request handling, start and end of the program."""

@@ -1,16 +1,15 @@
 """Access control of the studio: checked first, for HTTP and websockets.
 
-Everything is refused but what passes all of this; the only routes open without a session are those of
-``Guard.OPEN``:
+A request must pass all of these checks; only the routes in ``Guard.OPEN`` need no session:
 
-1. one ``Host`` header, and it names this server (against DNS rebinding: CVE-2026-21883 and its kin);
-2. an ``Origin``, where there is one, that is this server's own, compared as a whole, never by a pattern
-   (CVE-2026-40110); a websocket without an ``Origin`` must carry the token as a bearer;
-3. ``Sec-Fetch-Site`` other than ``same-origin`` or ``none`` may not change anything;
-4. the session: the cookie that the one-time login link set, or ``Authorization: Bearer TOKEN``;
-5. a request that changes something carries the header ``X-Armblocks``: no plain form can send it.
+1. exactly one ``Host`` header, which names this server (against DNS rebinding: CVE-2026-21883 and similar);
+2. an ``Origin``, if present, equals this server's own, compared as a whole string, never by a pattern
+   (CVE-2026-40110); a websocket without an ``Origin`` must send the token as a bearer;
+3. a request with ``Sec-Fetch-Site`` other than ``same-origin`` or ``none`` may not change anything;
+4. the session: the cookie from the one-time login link, or ``Authorization: Bearer TOKEN``;
+5. a request that changes something has the header ``X-Armblocks``, which a plain HTML form cannot send.
 
-It is written at the level of ASGI because the middleware of web frameworks does not see websockets
+The guard is an ASGI wrapper because the middleware of web frameworks does not see websockets
 (CVE-2026-39987, CVE-2024-28179).
 """
 
@@ -31,7 +30,7 @@ App = Callable[[Scope, Receive, Send], Awaitable[None]]
 SAFE = ("GET", "HEAD")
 CHANGE_HEADER = "x-armblocks"
 POLICY_VIOLATION = 4403
-"""Close code of a refused websocket."""
+"""Close code of a rejected websocket."""
 
 SECURITY_HEADERS: tuple[tuple[bytes, bytes], ...] = (
     (
@@ -50,10 +49,10 @@ SECURITY_HEADERS: tuple[tuple[bytes, bytes], ...] = (
 
 
 class Keys:
-    """The secrets of one server, made at its start.
+    """The secrets of one server, created at its start.
 
-    ``token`` opens everything as a bearer; ``login`` is good for one visit, which it turns into the cookie
-    ``session``. A ``session`` that is given is that of a server before this one, whose pages are to go on.
+    ``token`` grants full access as a bearer. ``login`` is valid once; the login sets the cookie ``session``.
+    A given ``session`` is that of the previous server, so that its pages can reconnect.
     """
 
     def __init__(self, port: int, session: str = "") -> None:
@@ -64,17 +63,17 @@ class Keys:
         self._logins: list[str] = []
 
     def secrets(self) -> tuple[str, ...]:
-        """All that must not be said to anybody else, also what is not good any more."""
+        """All secrets that must not be logged, including invalid ones."""
         return (self.token, self.session, *self._logins)
 
     def new_login(self) -> str:
-        """A fresh one-time login; the one before it is void."""
+        """Create a new one-time login; the previous one becomes invalid."""
         self._login = secrets.token_urlsafe(32)
         self._logins.append(self._login)
         return self._login
 
     def spend_login(self, given: str) -> bool:
-        """Whether ``given`` is the login that is open now; it is void from then on."""
+        """Whether ``given`` is the valid login; it becomes invalid."""
         good = self._login is not None and hmac.compare_digest(given.encode(), self._login.encode())
         if good:
             self._login = None
@@ -82,19 +81,19 @@ class Keys:
 
 
 class Guard:
-    """Wraps an ASGI application; see the module."""
+    """Wraps an ASGI application with the checks of this module."""
 
     OPEN = ("/login", "/health")
 
     def __init__(self, app: App, keys: Keys, hosts: frozenset[str]) -> None:
-        """``hosts``: the values of ``Host`` that mean this server, ``127.0.0.1:8642``."""
+        """``hosts``: the ``Host`` values of this server, for example ``127.0.0.1:8642``."""
         self._app = app
         self._keys = keys
         self._hosts = hosts
         self._origins = frozenset(f"http://{host}" for host in hosts)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Refuse, or hand on with the security headers added to the answer."""
+        """Reject the request, or pass it on and add the security headers to the response."""
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
             return
@@ -118,7 +117,7 @@ class Guard:
         await self._app(scope, receive, send_guarded)
 
     def refusal(self, scope: Scope) -> tuple[int, str] | None:
-        """Status and words of a refusal, ``None`` for a request that may pass."""
+        """Return status and text of a rejection, or ``None`` for a valid request."""
         headers: list[tuple[str, str]] = [
             (name.decode("latin-1").lower(), value.decode("latin-1")) for name, value in scope["headers"]
         ]
@@ -128,7 +127,7 @@ class Guard:
 
         hosts, origins = values("host"), values("origin")
         if len(hosts) != 1 or hosts[0].lower() not in self._hosts:
-            return 403, "this server answers to its own address only"
+            return 403, "this server accepts requests to its own address only"
         if len(origins) > 1 or (origins and origins[0].lower() not in self._origins):
             return 403, "requests from other pages are refused"
         websocket = scope["type"] == "websocket"

@@ -1,4 +1,4 @@
-"""Where pages, documents and runs meet: one hub a server, on one event loop."""
+"""The hub of one server: it connects pages, documents and runs, on one event loop."""
 
 from __future__ import annotations
 
@@ -39,22 +39,22 @@ from armblocks.studio.sheet.shown import library
 
 LOG = logging.getLogger(__name__)
 NO_REQUEST = Fault(
-    what="this is no request of the studio",
+    what="this is not a request of the studio",
     where="page",
-    allowed="what the page of this version asks",
-    fix="load the page again: it may be of another version",
+    allowed="requests of the page of this version",
+    fix="reload the page: it may come from another version of armblocks",
 )
 DEFECT = Fault(
     what="armblocks has a defect",
     where="studio",
-    allowed="what was asked, or words about why it cannot be",
-    fix="report it with what you did; what you have drawn is not harmed",
+    allowed="a reply, or an error that explains why it is impossible",
+    fix="report it with the steps that led to it; your drawing is not affected",
 )
 _NUMBERED = re.compile(r'\s*\{\s*"number"\s*:\s*(\d{1,15})\s*,')
 
 
 class Hub:
-    """Reads what pages ask, has it answered, and replies."""
+    """Parses the requests of pages, passes them to their handlers, and sends the replies."""
 
     def __init__(self, folder: ProjectFolder) -> None:
         self._folder = folder
@@ -81,12 +81,12 @@ class Hub:
         self._watching: list[asyncio.Task[None]] = []
 
     def prepare(self) -> None:
-        """Look after the files from now on."""
+        """Start to watch the files."""
         self._folder.sweep(self._kept.recent())
         self._watching = self.documents.watch()
 
     def close(self) -> None:
-        """End every run, and leave the documents so that nothing is lost."""
+        """End all runs and close the documents; journals of unsaved documents remain."""
         for task in self._watching:
             task.cancel()
         self.documents.end()
@@ -95,7 +95,7 @@ class Hub:
     # -- pages -----------------------------------------------------------------------------------------------
 
     async def welcome(self, page: Page) -> None:
-        """A page has come."""
+        """Add a page that has connected, and send it the welcome message."""
         self._pages.add(page)
         await page.tell(
             Welcome(
@@ -113,14 +113,14 @@ class Hub:
         )
 
     def leave(self, page: Page) -> None:
-        """A page has gone; what it showed stays open for when it returns."""
+        """Remove a page that has disconnected; its documents stay open for a reconnection."""
         self._pages.discard(page)
 
     async def answer(self, page: Page, text: str) -> None:
-        """Carry out one request and reply to it, whatever becomes of it.
+        """Handle one request; every request with a number gets a reply, also an invalid one.
 
-        A page that gets no reply asks again: so also what is no request is answered, and what meets a defect.
-        Raises ``NoRequestError`` for what has not even a number.
+        A page repeats a request without a reply, so invalid requests and defects are reported in a reply.
+        Raises ``NoRequestError`` for a text without a request number.
         """
         try:
             envelope = Envelope.model_validate_json(text)
@@ -136,7 +136,7 @@ class Hub:
         except ArmblocksError as error:
             fault = Fault(what=error.what, where=error.where, allowed=error.allowed, fix=error.fix)
         except Exception as error:
-            LOG.exception("a request met a defect")
+            LOG.exception("a request failed because of a defect")
             fault = DEFECT.model_copy(update={"what": f"{DEFECT.what} ({type(error).__name__})"})
         await page.tell(Reply(number=number, value=value, fault=fault))
 
@@ -159,24 +159,24 @@ class Hub:
     async def drawing(
         self, document: str, kind: str, *, sheet: str, theme: Literal["light", "dark"] | None
     ) -> bytes:
-        """A sheet of a diagram as a file; drawn aside, so that nobody else waits for it."""
+        """Return a sheet of a diagram as a file; a thread draws it, so that other requests do not wait."""
         diagram = self._diagrams[document].document.diagram
         return await asyncio.to_thread(drawing_bytes, diagram, kind, sheet=sheet, theme=theme)
 
     async def example_drawing(self, name: str) -> bytes:
-        """A shipped example as SVG; raises ``UnknownNameError``."""
+        """Return the drawing of a shipped example as SVG; raises ``UnknownNameError``."""
         return await asyncio.to_thread(_example_drawing, name)
 
     # -- robots of diagrams ----------------------------------------------------------------------------------
 
     def _resolve_robot(self, name: str) -> Robot:
-        """A shipped robot or a robot file of the project."""
-        with warnings.catch_warnings():  # the robot editor marks them
+        """Return a shipped robot or a robot file of the project."""
+        with warnings.catch_warnings():  # the robot editor shows them
             warnings.simplefilter("ignore", InertiaWarning)
             return formats.load_robot(self._folder.robot_path(name, formats.list_robots()))
 
     async def _robot_saved(self, robot: Robot) -> None:
-        """The file of a robot has changed: diagrams that use it take it anew, as a step of undo."""
+        """Update the diagrams that use a robot whose file was saved, as one undo step each."""
         for found in self._diagrams:
             after = with_robot(found.document.diagram, robot)
             if after is not found.document.diagram:

@@ -1,4 +1,4 @@
-"""Starting the studio: a free port on this machine, a link that works once, and a clean end."""
+"""Start of the studio: a free local port, a one-time login link, and an orderly shutdown."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ def serve(
     announce: Callable[[str], None],
     afresh: bool = False,
 ) -> None:
-    """Serve until Ctrl-C. ``announce`` gets the login link. ``port`` 0 takes a free one.
+    """Serve until Ctrl-C. ``announce`` receives the login link. ``port`` 0 selects a free port.
 
-    With ``port`` 0 the port of the server that was in this folder last is tried first, and pages of that
-    server go on with this one, unless ``afresh``. Only this machine can reach it: the socket is bound to
-    127.0.0.1. Raises ``InputError`` where the port is taken, ``FormatError`` where the page was not built.
+    With ``port`` 0, the port of the previous server for this folder is tried first, and its pages reconnect
+    to this server, unless ``afresh``. The socket is bound to 127.0.0.1, so only this machine can connect.
+    Raises ``InputError`` if the port is in use, ``FormatError`` if the page is not built.
     """
     import uvicorn
 
@@ -61,7 +61,7 @@ def serve(
         app,
         log_level="warning",
         log_config=log_settings(keys.secrets),
-        access_log=False,  # its lines would hold the login link
+        access_log=False,  # access logs would contain the login link
         server_header=False,
         ws_max_size=MOST_MESSAGE_BYTES,
         ws="websockets-sansio",
@@ -75,11 +75,11 @@ def serve(
     hub.made.add_done_callback(give_up)
     server.run(sockets=[listener])
     if hub.made.done():
-        hub.made.result()  # what kept it from being made is the reason of the end
+        hub.made.result()  # raises the error that prevented the creation of the hub
 
 
 def _listener_as_before(kept: StateFolder) -> socket.socket | None:
-    """The port at which pages of the server before this one still ask, where it is free."""
+    """Listen at the port of the previous server, if it is free, so that its pages can reconnect."""
     last = kept.session()
     if last is not None:
         with contextlib.suppress(InputError):
@@ -92,7 +92,7 @@ def _listener(port: int) -> socket.socket:
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listener.bind(("127.0.0.1", port))
-        listener.listen()  # before the link is told: who follows it at once waits, and is not refused
+        listener.listen()  # before the link is printed, so that an immediate click is not refused
     except OSError as error:
         listener.close()
         raise InputError(

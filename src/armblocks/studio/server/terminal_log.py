@@ -1,8 +1,8 @@
 """The terminal log of the studio's server: locations of errors, without secrets.
 
-A terminal is copied into reports and its log kept by others, so no key stands in it but the login link that
-``armblocks studio`` prints itself, and no content of files: of an error its place and its type are said, and
-not its words, which may quote what was read.
+Users copy terminal output into bug reports, so it contains no secrets except the login link that ``armblocks
+studio`` prints, and no file contents. Of an exception only type and traceback are logged; its message may
+quote file contents.
 """
 
 from __future__ import annotations
@@ -17,21 +17,21 @@ Raised = tuple[type[BaseException], BaseException, TracebackType | None] | tuple
 
 
 class DiscreetFormatter(logging.Formatter):
-    """Formats what is logged without secrets and without the words of exceptions."""
+    """Formats log records without secrets and without exception messages."""
 
     def __init__(self, secrets: Callable[[], tuple[str, ...]]) -> None:
         super().__init__("%(levelname)s: %(message)s")
         self._secrets = secrets
 
     def formatException(self, ei: Raised) -> str:
-        """Where it was raised, in each of the calls, and what kind of exception it is."""
+        """Return the traceback and the type of the exception, without its message."""
         kind, _, place = ei
         frames = "".join(traceback.format_tb(place))
         return f"{frames}{kind.__name__ if kind is not None else ''}".rstrip()
 
     def format(self, record: logging.LogRecord) -> str:
-        """The whole text, secrets left out."""
-        record.exc_text = None  # what another formatter may have made of it
+        """Return the formatted record with secrets replaced by an ellipsis."""
+        record.exc_text = None  # discards a text cached by another formatter
         text = super().format(record)
         for secret in self._secrets():
             text = text.replace(secret, "…")
@@ -39,7 +39,7 @@ class DiscreetFormatter(logging.Formatter):
 
 
 def log_settings(secrets: Callable[[], tuple[str, ...]]) -> dict[str, Any]:
-    """Settings of ``logging.config`` for the server's process; ``secrets`` gives what must not be said."""
+    """Settings of ``logging.config`` for the server process; ``secrets`` returns the texts to be removed."""
     return {
         "version": 1,
         "disable_existing_loggers": False,

@@ -1,7 +1,7 @@
-"""The studio's server: one page, one websocket, a few downloads. Everything passes the guard first.
+"""The web application of the studio: one page, one websocket, a few downloads, behind the guard.
 
-The page needs nothing of what stands behind it, so it is there at once: the hub, whose imports take longer
-than a page takes to come, is made meanwhile (:class:`HubToCome`), and what asks for it waits.
+The page itself needs no hub and is served at once. The imports of the hub take longer than loading the page,
+so the hub is created in a thread meanwhile (:class:`HubToCome`), and requests that need it wait.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ if TYPE_CHECKING:
 DRAWING_TYPES = {"svg": "image/svg+xml", "png": "image/png", "pdf": "application/pdf"}
 THEMES = ("light", "dark", None)
 FOREVER = "private, max-age=31536000, immutable"
-"""How long a browser may keep a file whose name says its content."""
+"""Cache lifetime of a file whose name contains a hash of its content."""
 
 
 class Assets(StaticFiles):
-    """Files of the page whose names change with their content: a browser asks for each of them once."""
+    """Files of the page whose names contain a content hash: a browser requests each of them once."""
 
     def file_response(
         self,
@@ -48,14 +48,14 @@ class Assets(StaticFiles):
         scope: MutableMapping[str, Any],
         status_code: int = 200,
     ) -> Response:
-        """The file, to be kept for good."""
+        """Return the file with a permanent cache lifetime."""
         answer = super().file_response(full_path, stat_result, scope, status_code)
         answer.headers["cache-control"] = FOREVER
         return answer
 
 
 class HubToCome:
-    """The hub of a folder, made in a thread of its own from the moment at which it is first asked for."""
+    """The hub of a folder, created in a thread when it is first requested."""
 
     def __init__(self, folder: ProjectFolder) -> None:
         self.made: Future[Hub] = Future()
@@ -63,13 +63,13 @@ class HubToCome:
         self._begun = False
 
     def begin(self) -> None:
-        """Have it made, if nobody has yet."""
+        """Start to create the hub, once."""
         if not self._begun:
             self._begun = True
             Thread(target=self._make, name="hub").start()
 
     async def here(self) -> Hub:
-        """The hub, as soon as it is there; raises what kept it from being made."""
+        """Return the hub when it exists; raise the error that prevented its creation."""
         self.begin()
         return await asyncio.shield(asyncio.wrap_future(self.made))
 
@@ -78,7 +78,7 @@ class HubToCome:
             from armblocks.studio.server.hub import Hub
             from armblocks.studio.sheet.shown import library
 
-            library()  # the first page asks for it
+            library()  # fills its cache for the first page
             self.made.set_result(Hub(self._folder))
         except BaseException as error:
             self.made.set_exception(error)
@@ -86,18 +86,18 @@ class HubToCome:
 
 @dataclass(frozen=True)
 class Answers:
-    """What the server answers; each method is the endpoint of a route."""
+    """The endpoints of the routes, one method each."""
 
     hub: HubToCome
     keys: Keys
     web: Path
 
     async def health(self, _: Request) -> Response:
-        """Whether it is the studio that answers here."""
+        """Report that the studio is running here."""
         return PlainTextResponse("armblocks studio")
 
     async def login(self, request: Request) -> Response:
-        """Turn the one-time key of the link into the cookie of the session."""
+        """Exchange the one-time key of the link for the session cookie."""
         if not self.keys.spend_login(request.query_params.get("key", "")):
             return PlainTextResponse("this login link was used or is wrong: start the studio again", 401)
         answer = RedirectResponse("/", status_code=303)
@@ -107,15 +107,15 @@ class Answers:
         return answer
 
     async def index(self, _: Request) -> Response:
-        """The page."""
+        """Return the page."""
         return FileResponse(self.web / "index.html", headers={"cache-control": "no-cache"})
 
     async def drawing(self, request: Request) -> Response:
-        """A sheet as a file to keep."""
+        """Return a sheet as a file for download."""
         asked, kind = request.query_params, request.path_params["kind"]
         theme = asked.get("theme")
         if theme not in THEMES:
-            return PlainTextResponse("a theme is light or dark", 422)
+            return PlainTextResponse("the theme must be light or dark", 422)
         hub, document = await self.hub.here(), request.path_params["document"]
         try:
             data = await hub.drawing(document, kind, sheet=asked.get("sheet", ""), theme=theme)
@@ -124,7 +124,7 @@ class Answers:
         return Response(data, media_type=DRAWING_TYPES[kind])
 
     async def example(self, request: Request) -> Response:
-        """The drawing of a shipped example, for the gallery."""
+        """Return the drawing of a shipped example, for the gallery."""
         hub = await self.hub.here()
         try:
             data = await hub.example_drawing(request.path_params["name"])
@@ -133,7 +133,7 @@ class Answers:
         return Response(data, media_type=DRAWING_TYPES["svg"])
 
     async def report(self, request: Request) -> Response:
-        """The report of the last run of a document."""
+        """Return the report of the last run of a document."""
         hub = await self.hub.here()
         try:
             data = await hub.runs.report(request.path_params["document"])
@@ -142,7 +142,7 @@ class Answers:
         return Response(data, media_type="text/html")
 
     async def talk(self, socket: WebSocket) -> None:
-        """The websocket of a page, for as long as it is there."""
+        """Serve the websocket of a page until it disconnects."""
         await socket.accept()
         outbox = Outbox(socket.send_text, socket.send_bytes)
         hub, page = await self.hub.here(), Page(outbox.put, outbox.put, outbox)
@@ -152,7 +152,7 @@ class Answers:
             while (text := await _received(socket, sending)) is not None:
                 await hub.answer(page, text)
         except (NoRequestError, KeyError):
-            await socket.close(1008, "this is no request of the studio")
+            await socket.close(1008, "this is not a request of the studio")
         except WebSocketDisconnect:
             pass
         finally:
@@ -162,7 +162,7 @@ class Answers:
 
 
 async def _received(socket: WebSocket, sending: asyncio.Task[None]) -> str | None:
-    """What the page says next; ``None`` where nothing can be sent to it any more."""
+    """Return the next message of the page; ``None`` if nothing can be sent to the page any more."""
     receiving = asyncio.create_task(socket.receive_text())
     try:
         await asyncio.wait((receiving, sending), return_when=asyncio.FIRST_COMPLETED)
@@ -173,7 +173,7 @@ async def _received(socket: WebSocket, sending: asyncio.Task[None]) -> str | Non
 
 
 def studio_app(hub: HubToCome, keys: Keys, hosts: frozenset[str], web: Path) -> Guard:
-    """The whole application, guarded. ``hosts``: the ``Host`` values that mean this server."""
+    """Create the guarded application. ``hosts``: the ``Host`` values of this server."""
 
     @asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncGenerator[None]:

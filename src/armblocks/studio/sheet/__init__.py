@@ -1,1 +1,1 @@
-"""Diagrams in the studio: edits, what a sheet shows, checks, search."""
+"""Diagrams in the studio: edits, data of sheets, checks, search."""

@@ -1,4 +1,4 @@
-"""Checks of an incomplete diagram: findings at blocks and ports, without preventing edits."""
+"""Checks of an incomplete diagram; the findings refer to blocks and ports and do not prevent edits."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _QUOTED = re.compile(r"block '([^']+)'")
 
 
 def check(diagram: Diagram) -> tuple[list[Finding], dict[str, WireKind]]:
-    """The findings, and what runs on the wires of every output as far as it can be told."""
+    """Return the findings, and type and shape of each output signal as far as they can be determined."""
     try:
         levels = levels_of(diagram)
     except DiagramError as error:
@@ -28,7 +28,7 @@ def check(diagram: Diagram) -> tuple[list[Finding], dict[str, WireKind]]:
         if PortRef(name, port.name) not in level.drivers
     ]
     if open_inputs:
-        # Nothing else can be told before every input has a driver.
+        # Shapes and loops can be checked only when every input has a driver.
         return [_open_input(block, port) for block, port in open_inputs], {}
     known = [joined(path, name) for path, level in levels.items() for name in level.blocks]
     try:
@@ -67,7 +67,7 @@ def _wires(diagram: Diagram) -> dict[str, WireKind]:
 
 
 def _origins(diagram: Diagram) -> Mapping[str, str]:
-    """The user's blocks behind the blocks that flattening adds; empty where it fails."""
+    """Map the blocks that flattening adds to the blocks of the sheet; empty if flattening fails."""
     try:
         return flatten_hierarchy(diagram).origins
     except ArmblocksError:
@@ -75,10 +75,10 @@ def _origins(diagram: Diagram) -> Mapping[str, str]:
 
 
 def _findings(error: ArmblocksError, known: Collection[str], origins: Mapping[str, str]) -> list[Finding]:
-    """One finding at every block that a message names, so that each can be marked.
+    """Return one finding for every block that the message names, so that each block can be marked.
 
-    A copy of a block for a signal of a bus, and the control of a conditional subsystem, mark the block of the
-    sheet that they come from.
+    Copies of a block for the signals of a bus, and control blocks of conditional subsystems, are mapped to
+    the block of the sheet from which they were created.
     """
     blocks: list[str] = []
     if isinstance(error, AlgebraicLoopError):

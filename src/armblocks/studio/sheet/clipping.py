@@ -1,7 +1,7 @@
 """Copy and paste: the clipboard contains the text of a diagram file.
 
-So a copy has all that a file keeps: what is inside of subsystems, links to libraries, formulas, robots, the
-ways that wires were led, notes.
+A copy thus contains everything that a file contains: the diagrams of subsystems, links to libraries,
+formulas, robots, user-drawn routes of wires, notes.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from armblocks.studio.sheet.parameter_values import ResolveRobot
 from armblocks.studio.sheet.placing import placed
 
 ReadDiagram = Callable[[str, str], Diagram]
-"""From the text of a diagram file, and what messages call it, to the diagram, which may be a draft."""
+"""Reads a diagram, possibly incomplete, from the text of a diagram file and a name for messages."""
 
 
 def reader(resolve_robot: ResolveRobot) -> ReadDiagram:
-    """Reads drawings in progress that need no files of a project but robots."""
+    """Return a reader for incomplete diagrams whose only external files are robots."""
 
     def read(text: str, where: str) -> Diagram:
         return formats.diagram_from_bytes(text.encode(), where, BLOCKS, resolve_robot, draft=True)
@@ -40,7 +40,7 @@ def clipped(
     resolve_robot: ResolveRobot,
     folder: Path | None = None,
 ) -> str:
-    """Some blocks of a sheet, the wires among them and some notes, as the text of a diagram file."""
+    """Return some blocks of a sheet, the wires between them and some notes, as the text of a diagram file."""
     chosen = {name: diagram.block(name) for name in names}
     part = Diagram(
         name=diagram.name,
@@ -61,10 +61,10 @@ def clipped(
 
 
 def pasted(diagram: Diagram, copied: Diagram, names: Mapping[str, str], shift: float) -> Diagram:
-    """The diagram with all that was copied on it, under other names where ``names`` has some.
+    """Return the diagram with the copied blocks and notes, renamed according to ``names``.
 
-    A formula stays one where the sheet declares all its names; elsewhere its value is taken. Raises
-    ``DiagramError`` for a name that is taken.
+    A formula remains if the sheet declares all its names; otherwise it is replaced by its value. Raises
+    ``DiagramError`` if a name is in use.
     """
     where = f"diagram '{diagram.name}'"
     copied = placed(copied)
@@ -75,9 +75,9 @@ def pasted(diagram: Diagram, copied: Diagram, names: Mapping[str, str], shift: f
     notes = {names.get(name, name): note for name, note in copied.notes.items()}
     if any(name in diagram.notes for name in notes):
         raise DiagramError(
-            "a note of this name is already there",
+            "a note with this name exists already",
             where=where,
-            allowed="every name once",
+            allowed="unique names",
             fix="give the pasted note another name",
         )
 
@@ -106,7 +106,7 @@ def pasted(diagram: Diagram, copied: Diagram, names: Mapping[str, str], shift: f
 
 
 def _at_home(block: Block, diagram: Diagram) -> Block:
-    """A block whose formulas over what the diagram does not declare have become values."""
+    """Replace the formulas of a block that contain undeclared names by their values."""
     known = set(diagram.mask_values)
     foreign = [name for name, text in block.formulas if not formula_names(text) <= known]
     return block.with_parameters(**{name: block.parameter_value(name) for name in foreign})

@@ -1,4 +1,4 @@
-"""How the studio begins, reads and writes the files of diagrams."""
+"""Creation, reading and writing of diagram files in the studio."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from armblocks.studio.sheet.placing import placed
 
 
 class DiagramKind(FileKind[Diagram, Document]):
-    """Diagrams, complete or not."""
+    """Diagrams, complete or incomplete."""
 
     name = "diagram"
 
@@ -26,7 +26,7 @@ class DiagramKind(FileKind[Diagram, Document]):
         self._resolve_robot = resolve_robot
 
     def new(self) -> Diagram:
-        """An empty sheet."""
+        """An empty diagram."""
         return Diagram(name="untitled", blocks={})
 
     def shipped(self, name: str) -> Diagram:
@@ -37,11 +37,11 @@ class DiagramKind(FileKind[Diagram, Document]):
         return placed(formats.load_diagram(name, BLOCKS))
 
     def edited(self, value: Diagram, version: int = 0) -> Document:
-        """A drawing."""
+        """An open diagram."""
         return Document(value, self._resolve_robot, version=version, read_diagram=self.from_text)
 
     def from_file(self, data: bytes, place: Path) -> Diagram:
-        """The diagram, every block with a place; it may link to libraries of the project."""
+        """Read a diagram and place every block; it may be linked to libraries of the project."""
         read = formats.diagram_from_bytes(
             data,
             place.name,
@@ -54,17 +54,17 @@ class DiagramKind(FileKind[Diagram, Document]):
         return placed(read)
 
     def to_file(self, value: Diagram, place: Path) -> bytes:
-        """Its canonical document; robots of the project are named from there."""
+        """The canonical document of the diagram; paths of project robots are relative to its folder."""
         return formats.diagram_to_bytes(value, self._resolve_robot, folder=place.parent)
 
     def renamed(self, value: Diagram, place: Path) -> Diagram:
-        """A diagram is called as its file."""
+        """Return the diagram with the name of its file."""
         return replace(value, name=place.stem)
 
     def from_text(self, text: str, where: str) -> Diagram:
-        """A drawing of the journal, or what was copied of one.
+        """Read a diagram from its journal or from the clipboard.
 
-        The sheets of library blocks do not stand in the text: they are placed as where the file was opened.
+        The text does not contain the sheets of library blocks; their layout is that of the opened file.
         """
         read = formats.diagram_from_bytes(
             text.encode(),
@@ -78,9 +78,9 @@ class DiagramKind(FileKind[Diagram, Document]):
         return placed(read)
 
     def to_text(self, value: Diagram) -> str:
-        """The canonical document."""
+        """The canonical document of the diagram."""
         return formats.diagram_to_bytes(value, self._resolve_robot, folder=self._folder.root).decode()
 
     def parts(self, value: Diagram) -> int:
-        """Blocks of the top sheet."""
+        """Number of blocks of the top sheet."""
         return len(value.blocks)

@@ -1,4 +1,4 @@
-"""A drawing that is open in the studio: a diagram with its past, its future and the pages that edit it."""
+"""An open diagram with its undo history and the pages that edit it."""
 
 from __future__ import annotations
 
@@ -36,29 +36,29 @@ class Document(Edited[Diagram]):
 
     @property
     def diagram(self) -> Diagram:
-        """The diagram as it is now."""
+        """The present diagram."""
         return self.value
 
     def edit(self, edit: DiagramEdit, path: Sequence[str] = ()) -> None:
-        """Carry out an edit in the diagram inside the subsystem of this path.
+        """Apply an edit to the diagram inside the subsystem at this path.
 
-        Raises what :func:`~armblocks.studio.sheet.edits.applied` and
-        :func:`~armblocks.studio.sheet.nesting.inside` raise, and ``DiagramError`` for a sheet of a library;
-        nothing is then changed.
+        Raises the errors of :func:`~armblocks.studio.sheet.edits.applied` and
+        :func:`~armblocks.studio.sheet.nesting.inside`, and ``DiagramError`` for a sheet of a library. The
+        diagram is then unchanged.
         """
         self.perform(Change(document="", inside=list(path), edit=edit))
 
     def written(self, value: Diagram, name: str) -> None:
-        """The file of this name holds ``value``, which this drawing is or was: it is the saved one.
+        """Mark ``value``, which is the present diagram or a former one, as the content of the file ``name``.
 
-        Where the diagrams had another name they get this one, past and future ones too.
+        A diagram with another name is renamed, together with the diagrams for undo and redo.
         """
         self.saved = value
         if value.name != name:
             self.rewrite(lambda given: replace(given, name=name))
 
     def outcome(self, request: Change) -> Outcome[Diagram]:
-        """What the step is called, and the diagram after it."""
+        """Return the title of the step and the diagram after it."""
         edit, title = request.edit, EDITS.title(request.edit)
         if isinstance(edit, ModelEdit):
             return Outcome(title, EDITS.applied(edit, self.diagram, self._context), request.gesture)
@@ -67,5 +67,5 @@ class Document(Edited[Diagram]):
         return Outcome(title, with_inside(self.diagram, request.inside, after), request.gesture)
 
     def aspects(self, before: Diagram, after: Diagram) -> set[Aspect]:
-        """All that is different between two diagrams."""
+        """Return the aspects in which two diagrams differ."""
         return changed_aspects(before, after)

@@ -1,11 +1,11 @@
-"""What edits do: each is a pure function from one diagram to the next.
+"""The edits of diagrams; each is a pure function from one diagram to the next.
 
-A drawing in progress is a :class:`~armblocks.diagram.Diagram` that nobody has checked: inputs may be open and
-widths may disagree; that is told beside the blocks, it does not forbid the edit. What an edit does refuse is
-what no drawing could show: a name that is taken, a port that is not there, a second driver of one input, a
-parameter that its block does not allow.
+An edited diagram is an unchecked :class:`~armblocks.diagram.Diagram`: inputs may be open and shapes may
+disagree. The background check reports this at the blocks; it does not prevent the edit. An edit is refused
+only if the result cannot be drawn: a name in use, an unknown port, a second driver of an input, a parameter
+value that the block does not allow.
 
-Parameters arrive as JSON values and are checked by the block's own declarations. Nothing is evaluated.
+Parameters arrive as JSON values and are checked by the declarations of the block. No code is executed.
 """
 
 from __future__ import annotations
@@ -64,14 +64,14 @@ from armblocks.studio.sheet.placing import arranged, placed
 from armblocks.studio.sheet.typed_settings import with_settings
 
 DEFAULT_ROBOT = "puma560"
-"""The arm that a robot block starts with when it is dropped on the sheet."""
+"""The robot of a new robot block."""
 MOST_BLOCKS = 20_000
-"""Blocks that one sheet may hold in the editor."""
+"""Largest number of blocks on a sheet in the editor."""
 
 
 @dataclasses.dataclass(frozen=True)
 class EditContext:
-    """What edits need besides the diagram: to find the robots that they name, and to read what was copied."""
+    """Functions that edits need besides the diagram: search for robots, and reading of copied blocks."""
 
     resolve_robot: ResolveRobot
     read_diagram: ReadDiagram
@@ -86,10 +86,10 @@ def applied(
     resolve_robot: ResolveRobot,
     read_diagram: ReadDiagram | None = None,
 ) -> Diagram:
-    """The diagram after an edit; the one given stays as it is. ``resolve_robot`` finds the robots it names.
+    """Return the diagram after an edit. ``resolve_robot`` finds the robots that the edit names.
 
-    ``read_diagram`` reads what was copied; without it only what needs no files of a project can be pasted.
-    Raises ``DiagramError``, ``UnknownNameError`` or ``InputError`` for an edit that cannot be carried out.
+    ``read_diagram`` reads copied blocks; without it, only blocks that need no project files can be pasted.
+    Raises ``DiagramError``, ``UnknownNameError`` or ``InputError`` if the edit cannot be applied.
     """
     context = EditContext(resolve_robot, read_diagram or reader(resolve_robot))
     return EDITS.applied(edit, diagram, context)
@@ -117,7 +117,7 @@ def _add(edit: AddBlocks, diagram: Diagram, context: EditContext) -> Diagram:
 
 @EDITS.on(PasteBlocks, lambda edit: "paste")
 def _paste(edit: PasteBlocks, diagram: Diagram, context: EditContext) -> Diagram:
-    copied = context.read_diagram(edit.text, "what was copied")
+    copied = context.read_diagram(edit.text, "the copied blocks")
     _check_room(diagram, len(copied.blocks))
     return pasted(diagram, copied, edit.names, edit.shift)
 
@@ -125,7 +125,7 @@ def _paste(edit: PasteBlocks, diagram: Diagram, context: EditContext) -> Diagram
 def _check_room(diagram: Diagram, more: int) -> None:
     if len(diagram.blocks) + more > MOST_BLOCKS:
         raise DiagramError(
-            f"the sheet would hold {len(diagram.blocks) + more} blocks",
+            f"the sheet would have {len(diagram.blocks) + more} blocks",
             where=f"diagram '{diagram.name}'",
             allowed=f"at most {MOST_BLOCKS}",
             fix="group some of them into subsystems",
@@ -145,7 +145,7 @@ def _made(new: NewBlock, scope: Scope, resolve_robot: ResolveRobot) -> Block:
             default = DEFAULT_ROBOT if rule.kind is ParameterKind.ROBOT else None
             values[name] = parameter_value(rule, default, f"block '{new.name}'", resolve_robot)
     made = kind(**values)
-    # What is inside of a new subsystem can be looked at as well.
+    # The sheet of a new subsystem must be drawable as well.
     return dataclasses.replace(made, diagram=placed(made.diagram)) if isinstance(made, DiagramBlock) else made
 
 
@@ -182,10 +182,10 @@ def _without(edit: RemoveBlocks, diagram: Diagram) -> Diagram:
 def _present(wire: Connection, diagram: Diagram) -> Connection:
     if wire not in diagram.connections:
         raise DiagramError(
-            f"there is no wire {wire}",
+            f"the wire {wire} does not exist",
             where=f"diagram '{diagram.name}'",
             allowed="a wire of this sheet",
-            fix="reload the page if it shows one there",
+            fix="reload the page if it shows this wire",
         )
     return wire
 
@@ -232,7 +232,7 @@ def _port(text: str) -> PortRef:
     block, slash, port = text.rpartition("/")
     if not slash:
         raise DiagramError(
-            f"'{text}' is no port",
+            f"'{text}' is not a port",
             allowed="block/port",
             fix="name the block and the port",
             where="connection",

@@ -1,4 +1,4 @@
-"""Editing the parameters that a diagram declares, its mask: what the dialog "Edit mask" asks for."""
+"""Editing the mask of a diagram, for the dialog "Edit mask"."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _TRUTH = {"true": True, "1": True, "false": False, "0": False}
 
 
 def mask_of(diagram: Diagram) -> SetMask:
-    """The mask of a diagram as the edit that would make it anew."""
+    """Return the mask of a diagram as the edit that declares it."""
     return SetMask(name=diagram.name, parameters=[_stated(rule) for rule in diagram.mask])
 
 
@@ -41,11 +41,11 @@ def _stated(rule: Parameter) -> MaskParameter:
 
 
 def with_mask(edit: SetMask, diagram: Diagram, resolve_robot: ResolveRobot) -> Diagram:
-    """The diagram after its mask, or that of one of its subsystems, was edited.
+    """Return the diagram after an edit of its mask or of the mask of one of its subsystems.
 
-    What had another name is renamed in all formulas; what is set keeps its value. Raises ``DiagramError`` for
-    a block without a mask of its own and for a parameter that is removed while a formula reads it, else what
-    the declarations and the values raise.
+    Renamed parameters are renamed in all formulas; parameters keep their values. Raises ``DiagramError`` for
+    a block without a mask and for removing a parameter that a formula reads, and the errors of invalid
+    declarations and values.
     """
     if not edit.block:
         return _masked(edit, diagram, resolve_robot)
@@ -64,7 +64,7 @@ def with_mask(edit: SetMask, diagram: Diagram, resolve_robot: ResolveRobot) -> D
         raise DiagramError(
             f"the mask belongs to the library block '{block.diagram.link}'",
             where=where,
-            allowed="other values of its parameters",
+            allowed="changing the values of its parameters",
             fix="break the link first",
         )
     names = _renamings(edit) | {rule.name: rule.name for rule in block.parameters()}
@@ -77,7 +77,7 @@ def with_mask(edit: SetMask, diagram: Diagram, resolve_robot: ResolveRobot) -> D
 
 
 def _renamings(edit: SetMask) -> dict[str, str]:
-    """New names of the parameters that stay, by their old ones."""
+    """Map the former names of the remaining parameters to their new names."""
     return {rule.was: rule.name for rule in edit.parameters if rule.was}
 
 
@@ -92,7 +92,7 @@ def _masked(edit: SetMask, diagram: Diagram, resolve_robot: ResolveRobot) -> Dia
     values: dict[str, Value] = {}
     for stated, rule in zip(edit.parameters, mask):
         before = old.get(stated.was)
-        # What is now of another kind begins at its default, and what stood at the default follows it.
+        # A parameter with a new type takes its default; a value equal to the old default takes the new one.
         if before is None or before.kind is not rule.kind:
             continue
         if (value := diagram.mask_values[stated.was]) != before.default:
@@ -105,7 +105,7 @@ def _masked(edit: SetMask, diagram: Diagram, resolve_robot: ResolveRobot) -> Dia
 
 
 def _rule(stated: MaskParameter, old: Parameter | None, where: str, resolve_robot: ResolveRobot) -> Parameter:
-    """The declaration; what the dialog does not show stays as it was."""
+    """Return the declaration; properties that the dialog does not show are unchanged."""
     kind = ParameterKind(stated.kind)
     plain = Parameter(name="", kind=kind, doc="", default=REQUIRED)
     base = plain if old is None or old.kind is not kind else old
@@ -139,7 +139,7 @@ def _typed(stated: MaskParameter, where: str) -> Any:
 
 
 def _respelled(name: str, block: Block, names: Mapping[str, str], gone: list[str]) -> Block:
-    """A block whose formulas read the parameters by their new names."""
+    """Return the block with the new parameter names in its formulas."""
     formulas: list[tuple[str, str]] = []
     for parameter, text in block.formulas:
         lost = formula_names(text) & set(gone)
@@ -147,7 +147,7 @@ def _respelled(name: str, block: Block, names: Mapping[str, str], gone: list[str
             raise DiagramError(
                 f"the mask parameter '{min(lost)}' is removed, and the formula '{text[:60]}' reads it",
                 where=f"block '{name}' ({block.title}), parameter '{parameter}'",
-                allowed="removing what no formula reads",
+                allowed="removing a parameter that no formula reads",
                 fix="change that formula first, or keep the parameter",
             )
         formulas.append((parameter, renamed_in(text, names)))
@@ -156,5 +156,5 @@ def _respelled(name: str, block: Block, names: Mapping[str, str], gone: list[str
 
 
 def renamed_in(formula: str, names: Mapping[str, str]) -> str:
-    """A formula with other names in it, all exchanged at once."""
+    """Return the formula with all names replaced at the same time, so that names can be exchanged."""
     return re.sub(r"(?<![\w.])[^\W\d]\w*", lambda found: names.get(found[0], found[0]), formula)

@@ -23,13 +23,13 @@ from armblocks.errors import ArmblocksError, DiagramError, UnknownNameError
 from armblocks.robot import Robot
 
 _MARGIN = 120.0
-"""px between the blocks of a new subsystem and its ends."""
+"""Distance between the blocks of a new subsystem and its In and Out blocks, px."""
 
 
 def inside(diagram: Diagram, path: Sequence[str]) -> Diagram:
-    """The diagram inside the subsystem of this path, the diagram itself for the empty one.
+    """Return the diagram inside the subsystem at this path; the empty path gives the diagram itself.
 
-    Raises ``UnknownNameError`` for a path on which there is no subsystem.
+    Raises ``UnknownNameError`` if the path contains a block that is not a subsystem.
     """
     for name in path:
         block = diagram.blocks.get(name)
@@ -41,27 +41,27 @@ def inside(diagram: Diagram, path: Sequence[str]) -> Diagram:
 
 
 def linked_part(diagram: Diagram, path: Sequence[str]) -> tuple[str, ...]:
-    """The path of the library block that the sheet of a path belongs to; empty for a sheet of one's own."""
+    """Return the path of the library block that contains the sheet; empty for a sheet in no library block."""
     depths = range(1, len(path) + 1)
     return next((tuple(path[:depth]) for depth in depths if inside(diagram, path[:depth]).link), ())
 
 
 def check_own(diagram: Diagram, path: Sequence[str]) -> None:
-    """Raise ``DiagramError`` for a sheet that belongs to a library: its link has to be broken first."""
+    """Raise ``DiagramError`` for a sheet inside a library block, which cannot be edited."""
     linked = linked_part(diagram, path)
     if linked:
         raise DiagramError(
             f"the sheet belongs to the library block '{inside(diagram, linked).link}'",
             where=f"block '{'/'.join(linked)}'",
-            allowed="changes of its parameters, from outside",
+            allowed="changing the parameters of the library block",
             fix="break the link first",
         )
 
 
 def unlinked(diagram: Diagram, name: str) -> Diagram:
-    """The diagram with a copy of its own in the place of a library block.
+    """Return the diagram with a library block replaced by an unlinked copy.
 
-    Raises ``DiagramError`` for a block that is none.
+    Raises ``DiagramError`` for a block without a link.
     """
     block = diagram.block(name)
     if not isinstance(block, DiagramBlock) or not block.diagram.link:
@@ -76,7 +76,7 @@ def unlinked(diagram: Diagram, name: str) -> Diagram:
 
 
 def with_inside(diagram: Diagram, path: Sequence[str], inner: Diagram) -> Diagram:
-    """The diagram with another one inside the subsystem of this path."""
+    """Return the diagram with another diagram inside the subsystem at this path."""
     if not path:
         return inner
     block = diagram.blocks[path[0]]
@@ -86,7 +86,7 @@ def with_inside(diagram: Diagram, path: Sequence[str], inner: Diagram) -> Diagra
 
 
 def with_block(diagram: Diagram, name: str, block: Block) -> Diagram:
-    """The diagram with another block in the place of one; wires to ports that it has not are removed."""
+    """Return the diagram with one block replaced; wires to ports that no longer exist are removed."""
     into = {port.name for port in block.input_ports()}
     out = {port.name for port in block.output_ports()}
     return dataclasses.replace(
@@ -103,10 +103,10 @@ def with_block(diagram: Diagram, name: str, block: Block) -> Diagram:
 
 
 def with_robot(diagram: Diagram, robot: Robot) -> Diagram:
-    """The diagram in which every block whose robot comes from the same file as this one has this one.
+    """Return the diagram with ``robot`` in every block whose robot comes from the same file, on all levels.
 
-    On all levels; the same diagram where there is no such block. A block that cannot take the robot (its
-    parameters were made for another count of joints) keeps what it has.
+    Returns the same object if no block uses the robot. A block whose parameters do not fit the new robot (for
+    example another number of joints) keeps its robot.
     """
     changed: dict[str, Block] = {}
     for name, block in diagram.blocks.items():
@@ -129,23 +129,23 @@ def _same_file(one: Robot, other: Robot) -> bool:
 
 
 def check_free(name: str, taken: Mapping[str, str], where: str) -> None:
-    """Raise ``DiagramError`` for what cannot be the name of a new block; ``taken``: names by folded ones."""
+    """Raise ``DiagramError`` for an invalid or used block name; ``taken``: used names by case-folded name."""
     check_block_name(name, where)
     other = taken.get(folded(name))
     if other is not None:
         raise DiagramError(
             f"a block is already named '{other}'",
             where=where,
-            allowed="every name once, however it is capitalised",
+            allowed="unique names, regardless of capitalisation",
             fix="choose another name",
         )
 
 
 def grouped(names: Sequence[str], name: str, diagram: Diagram) -> Diagram:
-    """The diagram with some of its blocks inside a new subsystem; no signal changes by it.
+    """Return the diagram with some of its blocks inside a new subsystem; all signals are unchanged.
 
-    Every source outside that feeds the group becomes an In block, every port of the group that feeds
-    something outside an Out block, named after that source or port.
+    Each outside source that feeds the group becomes an In block, and each port of the group that feeds an
+    outside input becomes an Out block; they are named after that source or port.
     """
     where = f"diagram '{diagram.name}'"
     group = {entry: diagram.block(entry) for entry in names}
@@ -201,7 +201,7 @@ def grouped(names: Sequence[str], name: str, diagram: Diagram) -> Diagram:
 def _inner_layout(
     diagram: Diagram, group: Sequence[str], ins: Sequence[str], outs: Sequence[str]
 ) -> dict[str, Placement]:
-    """The blocks as they stood, the ends in a column on either side."""
+    """The blocks at their former positions, with the In and Out blocks in a column on either side."""
     places = {name: diagram.layout[name] for name in group}
     left = min(place.x for place in places.values()) - _MARGIN
     right = max(place.x for place in places.values()) + _MARGIN + 60.0
@@ -213,7 +213,7 @@ def _inner_layout(
 
 
 class _FreeNames:
-    """Names for the ends of a group, each once."""
+    """Unique names for the In and Out blocks of a group."""
 
     def __init__(self, taken: dict[str, Block]) -> None:
         self._taken = {folded(name) for name in taken}

@@ -1,4 +1,4 @@
-"""The diagrams that a studio has open."""
+"""The open diagrams of a studio."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from armblocks.studio.sheet.parameter_values import ResolveRobot
 
 @dataclasses.dataclass(eq=False, kw_only=True)
 class OpenDocument(OpenFile[Document]):
-    """A drawing with its file, its journal and the background check that looks at it."""
+    """A diagram with its file, its journal and its background check."""
 
     checking: asyncio.Task[None] | None = None
 
     def leave(self) -> None:
-        """It is put away: what would be done about it later is not."""
+        """Cancel the pending tasks of the document, which is closed."""
         super().leave()
         if self.checking is not None:
             self.checking.cancel()
@@ -34,7 +34,7 @@ class OpenDocuments(OpenFiles[OpenDocument]):
         super().__init__(folder, kept, DiagramKind(folder, resolve_robot))
 
     def open_bytes(self, data: bytes, name: str) -> OpenDocument:
-        """A new drawing that begins as the content of a file from elsewhere."""
+        """Open the content of a file from outside the project as a new diagram."""
         return self.bring(self.kind.from_file(data, self.folder.root / PurePath(name).name))
 
     def _made(self, key: str, document: Document) -> OpenDocument:

@@ -1,4 +1,4 @@
-"""The outline of a model: its tree of sheets, and search."""
+"""The outline of a diagram (its tree of sheets) and the search for blocks."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from armblocks.studio.sheet.parameter_values import parameter_json
 
 MOST_FOUND = 50
 MOST_TEXT = 60
-"""Characters of a value that are shown."""
+"""Number of displayed characters of a value."""
 
 
 def outline(diagram: Diagram) -> Outline:
-    """The sheets of a diagram as a tree."""
+    """Return the sheets of a diagram as a tree."""
     inner = {name: block for name, block in diagram.blocks.items() if isinstance(block, DiagramBlock)}
     return Outline(
         name=diagram.name,
@@ -26,9 +26,9 @@ def outline(diagram: Diagram) -> Outline:
 
 
 def find(diagram: Diagram, text: str) -> list[Found]:
-    """Blocks of all sheets that hold every word of ``text`` in name, type or values; the best come first.
+    """Return the blocks of all sheets whose name, type or values contain every word of ``text``, best first.
 
-    A word that begins a name counts most, then one in a name, in a type, in a value.
+    A word at the beginning of a name ranks first, then a word in a name, in a type, in a value.
     """
     words = text.lower().split()
     ranked: list[tuple[int, int, Found]] = []
@@ -46,7 +46,7 @@ def find(diagram: Diagram, text: str) -> list[Found]:
 
 
 _NOT = 9
-"""Rank of what does not match."""
+"""Rank of a block that does not match."""
 
 
 def _rank(name: str, block: Block, word: str) -> tuple[int, str]:
@@ -66,7 +66,7 @@ def _rank(name: str, block: Block, word: str) -> tuple[int, str]:
 
 
 def _text(value: object) -> str:
-    """A value as the dialogs show it."""
+    """Format a value as the dialogs show it."""
     if isinstance(value, dict):
         return str(value.get("source", ""))  # pyright: ignore[reportUnknownMemberType, reportUnknownArgumentType]
     if isinstance(value, float) and value.is_integer():

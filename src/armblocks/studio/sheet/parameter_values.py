@@ -1,7 +1,7 @@
 """Conversion between the text of a parameter's field and the value of the block.
 
-Numbers and arrays may be typed as formulas, ``2*pi``, ``[1 2; 3 4]``, ``45*deg``, in the one language of all
-formulas, :mod:`armblocks.diagram.expression_language`: nothing is evaluated by Python.
+Numbers and arrays may be typed as formulas, ``2*pi``, ``[1 2; 3 4]``, ``45*deg``, in the formula language
+:mod:`armblocks.diagram.expression_language`; Python evaluates nothing.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from armblocks.errors import InputError, UnknownNameError
 from armblocks.robot import Robot
 
 ResolveRobot = Callable[[str], Robot]
-"""From what a page calls a robot (a shipped name, a file of the project) to the robot."""
+"""Finds a robot by the name that a page uses: a shipped name or a file of the project."""
 
 _NUMERIC = (ParameterKind.NUMBER, ParameterKind.ARRAY, ParameterKind.INTEGER)
 _ALLOWED = "a number, or an array such as [1 2; 3 4]; pi, + - * / ^ and brackets may be used"
@@ -28,10 +28,10 @@ _INFINITIES = {"inf": math.inf, "-inf": -math.inf}
 def parameter_value(
     rule: Parameter, typed: Any, where: str, resolve_robot: ResolveRobot, scope: Scope | None = None
 ) -> Any:
-    """The checked value of a parameter from what the page sends; ``None`` is the default.
+    """Return the checked value of a parameter that a page sends; ``None`` selects the default.
 
-    A text that names parameters of the diagram's mask, ``scope``, is a formula and stays one. Raises
-    ``InputError`` with the place ``where`` (a block) and the parameter's name.
+    A text that contains mask parameters of the diagram, ``scope``, is stored as a formula. Raises
+    ``InputError`` with the place ``where`` (a block) and the parameter name.
     """
     place = f"{where}, parameter '{rule.name}'"
     if typed is None and not rule.required:
@@ -52,22 +52,22 @@ def parameter_value(
 
 
 def number_value(text: str, where: str) -> float | list[Any]:
-    """The number, vector or matrix that a text means; a row or a column is a vector.
+    """Evaluate a text as a number, vector or matrix; a row or a column is a vector.
 
-    Raises ``UnknownNameError`` for a name that is no constant, ``InputError`` for anything else.
+    Raises ``UnknownNameError`` for a name that is not a constant, ``InputError`` for any other error.
     """
     if not text.strip() or any(mark in text for mark in "\n\r\0"):
-        raise InputError("this is no value", where=where, allowed=_ALLOWED, fix="type a value")
+        raise InputError("this is not a value", where=where, allowed=_ALLOWED, fix="type a value")
     try:
         return formula_number(text.strip(), where)
     except UnknownNameError:
         raise
-    except InputError as error:  # what else a formula may hold would bury what is wrong
+    except InputError as error:  # the list of all formula elements would hide the error
         raise InputError(error.what, where=where, allowed=_ALLOWED, fix="correct the formula") from None
 
 
 def _matrix(text: str, where: str) -> Any:
-    """The matrix that a text means where it can be nothing else: ``[1 2]`` is a row, ``[1; 2]`` a column."""
+    """Evaluate a text for a parameter that is always a matrix: ``[1 2]`` is a row, ``[1; 2]`` a column."""
     bare = text.strip()
     inner = bare[1:-1]
     if not (bare.startswith("[") and bare.endswith("]")) or "[" in inner:
@@ -78,12 +78,12 @@ def _matrix(text: str, where: str) -> Any:
 
 
 def tuned_value(typed: Any, where: str) -> Any:
-    """The number or array that a page tries for a parameter: typed as text, or numbers already."""
+    """Return the trial value of a parameter from a page, as text or as numbers."""
     return number_value(typed, where) if isinstance(typed, str) else _with_infinities(typed)
 
 
 def parameter_json(value: Any) -> Any:
-    """A checked value as the page gets it: infinities and formulas as text, robots and such by name."""
+    """Convert a checked value to JSON: infinities and formulas as text, robots and similar values by name."""
     if isinstance(value, ParameterFormula):
         return value.text
     if isinstance(value, Robot):
@@ -104,7 +104,7 @@ def parameter_json(value: Any) -> Any:
 def _robot(rule: Parameter, typed: Any, place: str, resolve_robot: ResolveRobot) -> Any:
     if not isinstance(typed, str):
         raise InputError(
-            f"a robot is asked for, and {type(typed).__name__} was given",
+            f"the value must be a robot, and {type(typed).__name__} was given",
             where=place,
             allowed="the name of a shipped robot, or a robot file of this project",
             fix="choose one from the list",

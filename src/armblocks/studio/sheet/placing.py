@@ -9,7 +9,7 @@ from armblocks.drawing.diagram_layout import boxes
 
 
 def placed(diagram: Diagram) -> Diagram:
-    """The diagram with a place for every block: its own where all have one, else laid out; subsystems too."""
+    """Return the diagram, subsystems included, with all positions; lay it out if a position is missing."""
     for name, block in diagram.blocks.items():
         if isinstance(block, DiagramBlock) and (inner := placed(block.diagram)) is not block.diagram:
             changed = dataclasses.replace(block, diagram=inner)
@@ -18,7 +18,7 @@ def placed(diagram: Diagram) -> Diagram:
 
 
 def arranged(diagram: Diagram) -> Diagram:
-    """The diagram laid out anew, from left to right."""
+    """Return the diagram with a new automatic layout, from left to right."""
     found = boxes(dataclasses.replace(diagram, layout={}))
     layout = {name: Placement(x=round(box.x), y=round(box.y)) for name, box in found.items()}
     return dataclasses.replace(diagram, layout=layout, bends={})

@@ -1,4 +1,4 @@
-"""How diagrams are opened and shown: a sheet at a time, with what the background check finds."""
+"""Opening and display of diagrams, one sheet at a time, with the findings of the background check."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from armblocks.studio.sheet.open_documents import OpenDocument, OpenDocuments
 from armblocks.studio.sheet.shown import sheet, sheet_change
 
 STILL_SECONDS = 0.15
-"""A drawing is checked when it has stood still for so long."""
+"""Delay of the background check after the last edit, s."""
 
 
 class RunsOfDiagrams(Protocol):
-    """What the presenter needs of the runs."""
+    """The functions of the run desk that the presenter uses."""
 
     def of(self, document: str) -> str | None:
-        """The key of the run of a diagram, ``None`` where there is none."""
+        """The key of the run of a diagram, or ``None``."""
         ...
 
     def shown(self, page: Page, document: str) -> None:
-        """A page has just come to a diagram."""
+        """Called after a page was sent a diagram."""
         ...
 
 
 class DiagramPresenter(Presenter[OpenDocument]):
-    """Shows each page the sheet of a diagram that it looks at."""
+    """Shows on each page the sheet of a diagram that the page has selected."""
 
     def __init__(self, files: OpenDocuments, pages: Pages, runs: RunsOfDiagrams) -> None:
         super().__init__(files)
@@ -42,11 +42,11 @@ class DiagramPresenter(Presenter[OpenDocument]):
         self._runs = runs
 
     def dropped(self, data: bytes, name: str) -> Opening[OpenDocument]:
-        """The diagram of a file from elsewhere."""
+        """Open the diagram of a file from outside the project."""
         return Opening([self._documents.open_bytes(data, name)])
 
     def place(self, found: OpenDocument, wished: Place, *, known: bool) -> Place:
-        """The path of the sheet; the top where a page that comes again looked at one that is gone."""
+        """Return the path of the sheet; the top sheet if a reconnecting page shows a deleted one."""
         try:
             inside(found.document.diagram, wished)
         except UnknownNameError:
@@ -56,7 +56,7 @@ class DiagramPresenter(Presenter[OpenDocument]):
         return wished
 
     def content(self, found: OpenDocument, place: Place) -> DiagramContent:
-        """The sheet at a path."""
+        """Return the sheet at a path."""
         diagram = found.document.diagram
         drawn, linked = sheet(inside(diagram, place)), linked_part(diagram, place)
         if linked:
@@ -70,7 +70,7 @@ class DiagramPresenter(Presenter[OpenDocument]):
         )
 
     def change(self, found: OpenDocument, before: Diagram, place: Place) -> DiagramChange:
-        """What changed on the sheet at a path."""
+        """Return the changes of the sheet at a path."""
         diagram = found.document.diagram
         return DiagramChange(
             sheet=sheet_change(inside(before, place), inside(diagram, place)),
@@ -78,13 +78,13 @@ class DiagramPresenter(Presenter[OpenDocument]):
         )
 
     def shown(self, page: Page, found: OpenDocument, *, known: bool) -> None:
-        """Tell the page of the run of the diagram, and check the diagram."""
+        """Send the page the run of the diagram, and start the background check."""
         if not known:
             self._runs.shown(page, found.key)
         self.changed(found)
 
     def changed(self, found: OpenDocument) -> None:
-        """Check the drawing once it has stood still for a moment; a check that is under way is given up."""
+        """Start the background check after a pause in the edits; a check in progress is cancelled."""
         if found.checking is not None:
             found.checking.cancel()
         found.checking = asyncio.get_running_loop().create_task(self._check(found))

@@ -1,4 +1,4 @@
-"""Requests about the sheets of open diagrams that change nothing."""
+"""Requests about the sheets of open diagrams that do not change them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from armblocks.studio.sheet.typed_settings import setting_faults
 
 
 class SheetQueries:
-    """Answers what front ends ask about diagrams."""
+    """Handles the requests of front ends about diagrams."""
 
     def __init__(
         self,
@@ -41,7 +41,7 @@ class SheetQueries:
         self._resolve_robot = resolve_robot
 
     def register(self, answers: Answers) -> None:
-        """Register what answers these requests."""
+        """Register the handlers of these requests."""
         answers.on(say.Look, self._look)
         answers.on(say.AskOutline, self._outline)
         answers.on(say.AskMask, self._mask)

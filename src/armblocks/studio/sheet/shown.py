@@ -1,5 +1,4 @@
-"""The drawing data of a diagram for the page: boxes, ports, faces, wires; and differences to another
-diagram."""
+"""The drawing data of a diagram for the front end: boxes, ports, faces, wires; and their differences."""
 
 from __future__ import annotations
 
@@ -31,7 +30,7 @@ from armblocks.studio.sheet.parameter_values import parameter_json
 
 
 def sheet(diagram: Diagram) -> Sheet:
-    """The whole drawing of a diagram whose blocks all have a place."""
+    """Return the drawing of a diagram whose blocks all have a position."""
     return Sheet(
         linked=[],
         link="",
@@ -45,7 +44,7 @@ def sheet(diagram: Diagram) -> Sheet:
 
 
 def sheet_change(before: Diagram, after: Diagram) -> SheetChange:
-    """What is other in ``after``. Blocks that are the same objects are not looked at."""
+    """Return the difference between two sheets; blocks that are the same objects are skipped."""
     blocks: dict[str, SheetBlock | None] = {name: None for name in before.blocks if name not in after.blocks}
     shown, shows = drawn_blocks(before), drawn_blocks(after)
     for name, block in after.blocks.items():
@@ -67,7 +66,7 @@ def sheet_change(before: Diagram, after: Diagram) -> SheetChange:
 
 @lru_cache(maxsize=1)
 def library() -> tuple[BlockType, ...]:
-    """Every type of block, for the palette and the dialogs."""
+    """Return all block types, for the palette and the dialogs."""
     return tuple(_block_type(kind) for kind in BLOCKS.values())
 
 
@@ -125,7 +124,7 @@ def _sheet_block(name: str, block: Block, diagram: Diagram) -> SheetBlock:
 
 @lru_cache(maxsize=4096)
 def _drawn(block: Block, place: Placement) -> SheetBlock:
-    """A block at the origin: blocks that look alike are drawn once."""
+    """Draw a block at the origin; the result is cached, so that equal blocks are drawn once."""
     box = standing_box("", block, place)
     into, out = port_labels(block)
     return SheetBlock(
@@ -158,7 +157,7 @@ def _face(box: Box) -> str:
     try:
         marks = block_marks(box)
     except ArmblocksError:
-        # A face that cannot be drawn (a robot without links) must not stop the sheet.
+        # An error in the drawing of a face (a robot without links) must not prevent the display of the sheet.
         marks = block_marks(dataclasses.replace(box, block=BLOCKS["Ground"]()))
     return svg_marks(Picture(width=box.width, height=box.height, title="", marks=marks))
 

@@ -1,4 +1,4 @@
-"""Conversion of the typed configuration parameters into run options, and their errors."""
+"""Conversion of typed configuration parameters to run options, and error texts for invalid ones."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ SettingValue = float | str | None
 
 
 def with_settings(options: SimulationOptions, values: Mapping[str, SettingValue]) -> SimulationOptions:
-    """The options with some of them changed; numbers may be typed as texts such as ``1/1000``.
+    """Return the options with some of them changed; numbers may be typed as formulas such as ``1/1000``.
 
-    Raises ``UnknownNameError`` and ``InputError``: no model gets settings with which nothing could run.
+    Raises ``UnknownNameError`` or ``InputError`` for settings with which no run is possible.
     """
     known = [field.name for field in dataclasses.fields(SimulationOptions)]
     for name in values:
@@ -39,7 +39,7 @@ def with_settings(options: SimulationOptions, values: Mapping[str, SettingValue]
 
 
 def setting_faults(options: SimulationOptions, values: Mapping[str, SettingValue]) -> dict[str, str]:
-    """What is wrong with typed settings, by name: said while they are typed."""
+    """Return error texts for invalid settings by name, for display while they are typed."""
     faults: dict[str, str] = {}
     for name, value in values.items():
         try:
@@ -51,7 +51,7 @@ def setting_faults(options: SimulationOptions, values: Mapping[str, SettingValue
     try:
         with_settings(options, values)
     except ArmblocksError as error:
-        # What is refused says the name of the setting first.
+        # The error text begins with the name of the setting.
         name = next((name for name in values if error.what.startswith(name)), "solver")
         return {name: _words(error)}
     return {}

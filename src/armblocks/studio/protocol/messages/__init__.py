@@ -1,1 +1,1 @@
-"""Every message between front end and server: one file a subject, each found by its place in this folder."""
+"""All messages between front end and server, one file for each subject, found by their folder."""

@@ -1,7 +1,7 @@
-"""Documents: requests that open, change, save, close and recover them, and events that show them.
+"""Documents: requests that open, change, save, close and recover them, and events that describe them.
 
-A document is a diagram or a robot. The requests and events here are the same for both; only the edits, the
-content and its changes are of one kind: see :class:`Content`.
+A document is a diagram or a robot. These requests and events serve both; only edits, content and content
+changes depend on the kind: see :class:`Content`.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ from armblocks.studio.protocol.message import AnyOf, Edit, Event, Message, Reque
 DocumentKind = Literal["diagram", "robot"]
 Disk = Literal["same", "changed", "gone"]
 MOST_DROPPED = 5 * 2**20
-"""Bytes of a file that is dropped on the page."""
+"""Largest size of a file that is dropped on the studio, bytes."""
 
-# -- what is shown of documents ------------------------------------------------------------------------------
+# -- data of documents ---------------------------------------------------------------------------------------
 
 
 class DocumentState(Message):
-    """Where a document stands.
+    """File, version and save state of a document.
 
-    ``origin`` is the shipped example or robot that it began as. ``disk`` says how the file is now, compared
-    with what was opened or saved. ``journaled`` is false where the journal cannot be written: then only a
-    save keeps the edits.
+    ``origin`` is the shipped example or robot from which it was created. ``disk`` compares the file on disk
+    with the version that was opened or saved. ``journaled`` is false if the journal cannot be written; the
+    edits are then lost unless they are saved.
     """
 
     document: str
@@ -42,12 +42,12 @@ class DocumentState(Message):
 
 
 class Recovery(Message):
-    """A document that was not saved when the studio ended, as its journal gives it back.
+    """An unsaved document of an earlier server that can be recovered from its journal.
 
-    ``path`` is the file that it came from, ``None`` where it never had one. ``began`` and ``last`` are when
-    the first and the last edit since the save were made (s since 1970), ``edits`` how many there are,
-    ``parts`` how many blocks or links it has. ``disk`` says whether the file is still the one that was
-    edited. ``missing`` says what could not be read.
+    ``path`` is its file, or ``None`` if it was never saved. ``began`` and ``last`` are the times of the first
+    and the last edit since the save (s since 1970), ``edits`` is their number, ``parts`` the number of blocks
+    or links. ``disk`` says whether the file has changed since the edits. ``missing`` describes the edits that
+    could not be recovered.
     """
 
     document: str
@@ -63,11 +63,11 @@ class Recovery(Message):
 
 
 class Content(Message):
-    """What a front end shows of a document: one class for each kind of documents."""
+    """The displayed data of a document; one subclass for each kind of document."""
 
 
 class ContentChange(Message):
-    """How the content that a front end shows differs from that of an earlier version."""
+    """The difference between the displayed data of two versions."""
 
 
 # -- requests ------------------------------------------------------------------------------------------------
@@ -76,7 +76,7 @@ class ContentChange(Message):
 class Open(Request[list[str]]):
     """Open a file of the project: a diagram, a robot, or a script of robots.
 
-    The reply has the keys of the documents; the first comes to the front.
+    The reply contains the keys of the documents; the front end shows the first one.
     """
 
     kind: Literal["open"] = "open"
@@ -92,27 +92,27 @@ class OpenShipped(Request[str]):
 
 
 class Drop(Request[list[str]]):
-    """Open a file that was dropped on the page: a script, a robot or a diagram. Nothing of it is run."""
+    """Open a file that was dropped on the studio: a diagram, a robot or a script (it is not executed)."""
 
     kind: Literal["drop"] = "drop"
     name: str = Field(max_length=255)
     content: str = Field(max_length=4 * MOST_DROPPED // 3 + 4)
-    """The bytes of the file as base64."""
+    """Content of the file, base64."""
 
 
 class New(Request[str]):
-    """Begin a new document."""
+    """Create a new document."""
 
     kind: Literal["new"] = "new"
     document_kind: DocumentKind
 
 
 class Attach(Request[str]):
-    """Show a document again: after a reload, after the line was down, or in a second page.
+    """Show a document again: after a reload, after a lost connection, or in a second page.
 
-    Where the server was started anew and does not know it, it comes from its journal, or else from the file
-    or the shipped one of these names, under the same key: edits that wait to be sent again find it. Of a
-    diagram the sheet at the path ``inside`` is shown.
+    A server that was restarted and does not have the document open recovers it from its journal, or else
+    opens the file ``path`` or the shipped ``origin``, under the same key. Edits that the page sends again
+    then find their document. ``inside`` is the path of the displayed sheet of a diagram.
     """
 
     kind: Literal["attach"] = "attach"
@@ -122,15 +122,15 @@ class Attach(Request[str]):
     path: str | None = None
     origin: str = ""
     in_front: bool = True
-    """Whether it comes to the front of the page."""
+    """Whether the page brings the document to the front."""
 
 
 class Alteration(Request[int]):
-    """What changes a document.
+    """A request that changes a document.
 
-    ``key`` is new for each: sent again after a broken line, it is done once. ``base`` is the version that the
-    page ``author`` saw: where another page has changed the same things since, the request is refused. The
-    reply is the version that the request makes.
+    Each request has a unique ``key``: a request that is sent again after a lost connection is applied once.
+    ``base`` is the version that the page ``author`` showed; the request is refused if another page has
+    changed the same aspects since. The reply is the new version.
     """
 
     does: ClassVar[Literal["change", "undo", "redo"]] = "change"
@@ -141,10 +141,10 @@ class Alteration(Request[int]):
 
 
 class Change(Alteration):
-    """Carry out an edit.
+    """Apply an edit.
 
-    ``inside``: names of the subsystems on the way to the sheet of a diagram that is edited. Changes in a row
-    of one ``gesture`` (the letters typed into one cell) are one step of undo.
+    ``inside``: names of the subsystems that lead to the edited sheet of a diagram. Consecutive changes with
+    the same ``gesture`` (for example the letters typed into a cell) are one undo step.
     """
 
     kind: Literal["change"] = "change"
@@ -154,34 +154,34 @@ class Change(Alteration):
 
 
 class Undo(Alteration):
-    """Take the last edit back."""
+    """Revert the last edit."""
 
     does = "undo"
     kind: Literal["undo"] = "undo"
 
 
 class Redo(Alteration):
-    """Do again what was undone."""
+    """Repeat the edit that was undone last."""
 
     does = "redo"
     kind: Literal["redo"] = "redo"
 
 
 class Reload(Alteration):
-    """Take what the file holds now, as one step that can be undone."""
+    """Replace the document by the content of its file, as one undo step."""
 
     kind: Literal["reload"] = "reload"
 
 
 class KeepMine(Request[None]):
-    """Leave the file that has changed on the disk as it is until the next save, which overwrites it."""
+    """Keep the document although its file has changed on disk; the next save overwrites the file."""
 
     kind: Literal["keep_mine"] = "keep_mine"
     document: str
 
 
 class Save(Request[str]):
-    """Write the file; ``path`` gives it another. ``overwrite``: also where the disk has changed meanwhile.
+    """Write the file, under ``path`` if it is given. ``overwrite``: also if the file has changed on disk.
 
     The reply is the path.
     """
@@ -193,7 +193,7 @@ class Save(Request[str]):
 
 
 class Close(Request[None]):
-    """Put a document away; ``discard`` where it has edits that no file holds."""
+    """Close a document; ``discard`` is required if it has unsaved edits."""
 
     kind: Literal["close"] = "close"
     document: str
@@ -201,10 +201,10 @@ class Close(Request[None]):
 
 
 class Recover(Request[str | None]):
-    """Say what becomes of a document that a journal gives back.
+    """Recover or discard a document of an earlier server.
 
-    ``open`` opens it as it was, not yet saved; ``keep_both`` saves it as a new file beside the one it came
-    from and opens that; ``discard`` deletes the journal.
+    ``open`` opens it with its unsaved edits; ``keep_both`` saves it as a new file beside the original one and
+    opens the new file; ``discard`` deletes the journal.
     """
 
     kind: Literal["recover"] = "recover"
@@ -216,7 +216,7 @@ class Recover(Request[str | None]):
 
 
 class Documents(Event):
-    """The documents that are open and those that wait to be recovered, whenever either has changed."""
+    """The open and the recoverable documents, sent when either list has changed."""
 
     kind: Literal["documents"] = "documents"
     documents: list[DocumentState]
@@ -224,9 +224,9 @@ class Documents(Event):
 
 
 class Opened(Event):
-    """A whole document, for a page that shows it from now on.
+    """A complete document, for a page that shows it from now on.
 
-    ``notes``: what was said when its file was read. ``in_front``: whether it comes to the front of the page.
+    ``notes``: warnings issued while its file was read. ``in_front``: whether the page brings it to the front.
     """
 
     kind: Literal["opened"] = "opened"
@@ -237,7 +237,7 @@ class Opened(Event):
 
 
 class Changed(Event):
-    """A document went from version ``before`` to that of its state, which may be the same."""
+    """The change of a document from version ``before`` to the version in ``state``, which may be the same."""
 
     kind: Literal["changed"] = "changed"
     state: DocumentState

@@ -1,4 +1,4 @@
-"""The edits of robots; :mod:`armblocks.studio.robots.edits` carries them out."""
+"""The edits of robots; :mod:`armblocks.studio.robots.edits` applies them."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ class RobotEdit(Edit):
 
 
 class SetCell(RobotEdit):
-    """Type into one cell: of a link, or of the robot where ``link`` is empty."""
+    """Type into one cell of a link, or of the robot if ``link`` is empty."""
 
     kind: Literal["cell"] = "cell"
     link: str
     column: str
     text: str = Field(max_length=1000)
     angles: Literal["deg", "rad"]
-    """What a plain number means in a column of angles; a text that says pi, deg or rad says it itself."""
+    """Unit of a plain number in an angle column; a text that contains pi, deg or rad has its own unit."""
 
 
 class RenameLink(RobotEdit):
@@ -33,7 +33,7 @@ class RenameLink(RobotEdit):
 
 
 class AddJoint(RobotEdit):
-    """Put a new link behind another one, or at the base where ``after`` is empty."""
+    """Insert a new link after another one, or at the base if ``after`` is empty."""
 
     kind: Literal["add_joint"] = "add_joint"
     after: str
@@ -47,7 +47,7 @@ class RemoveJoint(RobotEdit):
 
 
 class MoveJoint(RobotEdit):
-    """Let a link of a chain change places with its neighbour."""
+    """Exchange a link of a chain with its neighbour."""
 
     kind: Literal["move_joint"] = "move_joint"
     link: str
@@ -55,7 +55,7 @@ class MoveJoint(RobotEdit):
 
 
 class SetConvention(RobotEdit):
-    """Read the rows by the other convention, or write the same arm in it (``keep_arm``)."""
+    """Interpret the D-H rows by the other convention, or convert them for the same arm (``keep_arm``)."""
 
     kind: Literal["convention"] = "convention"
     convention: Literal["standard", "modified"]

@@ -1,4 +1,4 @@
-"""Robots: what front ends show of them, and what they ask about their motion."""
+"""Robots: the data of their editor and views, and requests about their motion."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from armblocks.studio.protocol.robot_scene import RobotScene
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Joints = Annotated[list[Number], Field(max_length=1000)]
-"""One number a joint: rad or m, and per second."""
+"""One number for each joint: rad or m, and per second."""
 
-# -- what is shown of robots ---------------------------------------------------------------------------------
+# -- data of robots ------------------------------------------------------------------------------------------
 
 
 class CellColumn(Message):
@@ -31,7 +31,7 @@ class CellColumn(Message):
 
 
 class RobotTables(Message):
-    """Every column of the tables of robots."""
+    """All columns of the tables of robots."""
 
     kinematics: list[CellColumn]
     dynamics: list[CellColumn]
@@ -39,7 +39,7 @@ class RobotTables(Message):
 
 
 class LinkRow(Message):
-    """A link as the tables show it: values by column in SI units, ``None`` where there is none."""
+    """A link as a row of the tables: values by column in SI units, ``None`` for an empty cell."""
 
     name: str
     parent: str | None
@@ -47,14 +47,14 @@ class LinkRow(Message):
     """Whether its joint coordinate is an angle."""
     moves: bool
     variable: str
-    """The column in whose place the joint coordinate stands."""
+    """The D-H column that shows the joint coordinate instead of a number."""
     cells: dict[str, float | str | None]
     locked: dict[str, str]
-    """Columns in which nothing can be typed, with the reason."""
+    """Columns that cannot be edited, with the reason."""
 
 
 class RobotFinding(Message):
-    """What no real arm could have, at the columns of a link that say it."""
+    """A physically impossible value, and the columns of the link that contain it."""
 
     link: str
     columns: list[str]
@@ -68,7 +68,7 @@ class RobotContent(Content):
     kind: Literal["robot"] = "robot"
     name: str
     convention: Literal["standard", "modified", ""]
-    """Of the D-H rows; ``""`` where there are none, or both kinds."""
+    """Convention of the D-H rows; ``""`` if there are none or both conventions occur."""
     chain: bool
     links: list[LinkRow]
     fields: dict[str, float | str | None]
@@ -76,14 +76,14 @@ class RobotContent(Content):
 
 
 class RobotChange(ContentChange):
-    """A robot after a change: all of it, since one cell may change many."""
+    """A robot after a change: the complete content, because one cell may affect many others."""
 
     kind: Literal["robot"] = "robot"
     content: RobotContent
 
 
 class Readings(Message):
-    """What an arm does in one configuration; m, rad, N m, world axes."""
+    """Read-outs of an arm in one configuration, in m, rad and N m along world axes."""
 
     pose: list[list[float]]
     position: list[float]
@@ -101,7 +101,7 @@ class Readings(Message):
 
 
 class RobotOfBlock(Request[str]):
-    """Open the robot that a block uses: its file, or a copy of it."""
+    """Open the robot of a block: its file, or a copy of a shipped robot."""
 
     kind: Literal["robot_of_block"] = "robot_of_block"
     document: str
@@ -110,13 +110,13 @@ class RobotOfBlock(Request[str]):
 
 
 class AskRobotTables(Request[RobotTables]):
-    """Ask which tables robots have and what stands in their columns."""
+    """Return the columns of the robot tables."""
 
     kind: Literal["robot_tables"] = "robot_tables"
 
 
 class OfRobot(Request[ReplyT], Generic[ReplyT]):
-    """A question about the robot of a document or, of a diagram, about that of a ``block``."""
+    """A request about the robot of a document; ``block`` selects the robot of a block in a diagram."""
 
     document: str
     inside: list[str] = Field(default_factory=list[str])
@@ -124,20 +124,20 @@ class OfRobot(Request[ReplyT], Generic[ReplyT]):
 
 
 class AskScene(OfRobot[RobotScene]):
-    """Ask for the bodies of a robot."""
+    """Return the bodies of a robot."""
 
     kind: Literal["scene"] = "scene"
 
 
 class AskPose(OfRobot[list[list[list[float]]]]):
-    """Ask where the base, the links and the tool of a robot are at ``q``: poses (L+2, 4, 4)."""
+    """Return the poses of base, links and tool of a robot at ``q``: (L+2, 4, 4)."""
 
     kind: Literal["pose"] = "pose"
     q: Joints
 
 
 class AskPicture(OfRobot[str]):
-    """Ask for a drawing of a robot at ``q``, as SVG."""
+    """Return a drawing of a robot at ``q``, as SVG."""
 
     kind: Literal["picture"] = "picture"
     q: Joints
@@ -145,7 +145,7 @@ class AskPicture(OfRobot[str]):
 
 
 class AskReadings(Request[Readings]):
-    """Ask what the robot of a document does at ``q, qd, qdd``."""
+    """Compute the read-outs of the robot of a document at ``q, qd, qdd``."""
 
     kind: Literal["readings"] = "readings"
     document: str

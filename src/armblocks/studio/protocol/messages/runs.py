@@ -1,4 +1,4 @@
-"""What page, server and the process of a run say to each other about it."""
+"""Runs: requests and events between page, server and the process of a run."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from pydantic import Field
 
 from armblocks.studio.protocol.message import Event, Fault, Message, Request
 
-# -- what is shown of a run ----------------------------------------------------------------------------------
+# -- data of a run -------------------------------------------------------------------------------------------
 
 
 class ViewOf(Message):
-    """A picture that a sink asks for. ``robot`` is the key of its scene where the kind is ``robot``."""
+    """The plot or 3-D view of a sink. For the kind ``robot``, ``robot`` is the key of its scene."""
 
     block: str
     kind: str
@@ -22,9 +22,9 @@ class ViewOf(Message):
 
 
 class Channel(Message):
-    """One recorded signal of a run and where its numbers lie in the columns of a frame.
+    """One recorded signal of a run, in the order of the columns of a frame.
 
-    ``entries`` are names of the entries of a vector, such as joints; empty where they are numbered.
+    ``entries`` are the names of the entries of a vector, such as joints; empty if the entries are numbered.
     """
 
     name: str
@@ -34,9 +34,9 @@ class Channel(Message):
 
 
 class Tunable(Message):
-    """A parameter that can be changed while the run goes on; ``path`` is ``block.parameter``.
+    """A parameter that can be changed during a run; ``path`` is ``block.parameter``.
 
-    ``low`` and ``high`` bound its numbers as the block declares it; ``None`` where nothing does.
+    ``low`` and ``high`` are the bounds that the block declares, ``None`` if unbounded.
     """
 
     path: str
@@ -51,9 +51,9 @@ class Tunable(Message):
 
 
 class Run(Request[str]):
-    """Start the model. ``speed`` is simulated seconds per second, ``None`` as fast as possible.
+    """Start a run. ``speed`` is simulated seconds per second; ``None`` runs as fast as possible.
 
-    ``tuned``: values of tunable parameters, ``block.parameter``, that are tried without being in the model.
+    ``tuned``: trial values of tunable parameters, by ``block.parameter``; the model keeps its own values.
     """
 
     kind: Literal["run"] = "run"
@@ -63,34 +63,34 @@ class Run(Request[str]):
 
 
 class RunCommand(Request[None]):
-    """A request to a run that is under way."""
+    """A request about a run in progress."""
 
     run: str
 
 
 class Control(RunCommand):
-    """Say how a run goes on. ``step`` and ``back`` go to the next and to the last recorded instant."""
+    """Pause, resume, stop or step a run. ``step`` and ``back`` move by one recorded instant."""
 
     kind: Literal["control"] = "control"
     action: Literal["pause", "resume", "step", "back", "stop"]
 
 
 class Rewind(RunCommand):
-    """Pause a run and take it back to an instant (s): what came later is forgotten, tuned values stay."""
+    """Pause a run and return to an instant (s). Later samples are discarded; tuned values remain."""
 
     kind: Literal["rewind"] = "rewind"
     time: float
 
 
 class SetSpeed(RunCommand):
-    """Change the speed of a run; ``None``: as fast as possible."""
+    """Change the speed of a run; ``None`` runs as fast as possible."""
 
     kind: Literal["speed"] = "speed"
     speed: float | None = Field(default=None, gt=0, le=1000)
 
 
 class Tune(RunCommand):
-    """Change a tunable parameter of a run that is under way."""
+    """Change a tunable parameter during a run."""
 
     kind: Literal["tune"] = "tune"
     parameter: str
@@ -101,11 +101,11 @@ class Tune(RunCommand):
 
 
 class RunEvent(Event):
-    """What the process of a run has to say, besides its samples."""
+    """A message from the process of a run, other than samples."""
 
 
 class RunStarted(RunEvent):
-    """A run has begun: what it records and how it is to be shown."""
+    """The start of a run: its recorded signals, views and tunable parameters."""
 
     kind: Literal["run_started"] = "run_started"
     document: str
@@ -116,11 +116,11 @@ class RunStarted(RunEvent):
     aliases: dict[str, str]
     tunables: list[Tunable]
     stride: int
-    """Of so many recorded instants the page gets the extremes of each signal, as two; 1: it gets all."""
+    """Number of recorded instants that are reduced to two extreme values of each signal; 1: no reduction."""
 
 
 class RunTuned(RunEvent):
-    """From this instant (s) on a parameter of a run has this value."""
+    """A parameter of a run has this value from this instant (s) on."""
 
     kind: Literal["run_tuned"] = "run_tuned"
     run: str
@@ -130,7 +130,7 @@ class RunTuned(RunEvent):
 
 
 class RunRewound(RunEvent):
-    """A run stands at an earlier instant (s) again: only the first ``count`` samples are still true."""
+    """A run has returned to an earlier instant (s); only the first ``count`` samples remain valid."""
 
     kind: Literal["run_rewound"] = "run_rewound"
     run: str
@@ -139,7 +139,7 @@ class RunRewound(RunEvent):
 
 
 class RunProgress(RunEvent):
-    """Where a run stands. ``solver`` and ``reason`` say at its end what worked it out, and why that."""
+    """State and time of a run. At the end, ``solver`` and ``reason`` state which solver was used and why."""
 
     kind: Literal["run_progress"] = "run_progress"
     run: str

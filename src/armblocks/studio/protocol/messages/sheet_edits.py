@@ -1,4 +1,4 @@
-"""The edits of diagrams; :mod:`armblocks.studio.sheet.edits` carries them out."""
+"""The edits of diagrams; :mod:`armblocks.studio.sheet.edits` applies them."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from pydantic import Field
 from armblocks.studio.protocol.message import Edit, Message
 
 Px = Annotated[float, Field(ge=-1e7, le=1e7)]
-"""A place on the sheet; further out nothing could be drawn exactly."""
+"""A coordinate on the sheet, px; the bound keeps the drawing exact."""
 Size = Annotated[float, Field(gt=0, le=1e5)]
 
 
 class Place(Message):
-    """Where a block stands: top left corner and, if not its own, its size in px."""
+    """Position of a block: top left corner, and its size if it is not the default, px."""
 
     x: Px
     y: Px
@@ -26,7 +26,7 @@ class Place(Message):
 
 
 class SheetNote(Message):
-    """Words on the sheet: their top left corner in px."""
+    """A note on the sheet: its text, and its top left corner in px."""
 
     x: Px
     y: Px
@@ -34,7 +34,7 @@ class SheetNote(Message):
 
 
 class NewBlock(Message):
-    """A block to be put on the sheet. ``parameters`` states those that are not at their default."""
+    """A block to be added. ``parameters`` contains the values that differ from the defaults."""
 
     name: str
     type: str
@@ -45,7 +45,7 @@ class NewBlock(Message):
 class Wire(Message):
     """A wire between two ports, written ``block/port``.
 
-    ``bends``: the way that somebody has drawn, see :func:`armblocks.drawing.wire_routing.bent`.
+    ``bends``: the corners of a route drawn by the user, see :func:`armblocks.drawing.wire_routing.bent`.
     """
 
     source: str
@@ -54,13 +54,13 @@ class Wire(Message):
 
 
 class DiagramEdit(Edit):
-    """An edit of a diagram: of the sheet on the screen, unless it is a :class:`ModelEdit`."""
+    """An edit of the displayed sheet, or of the whole model if it is a :class:`ModelEdit`."""
 
 
 class AddBlocks(DiagramEdit):
-    """Put blocks on the sheet, with wires among them or to what is there: insert, paste and duplicate.
+    """Add blocks and connect them: insert, paste and duplicate.
 
-    ``instead``: wires that give way, as where a block is dropped on one.
+    ``instead``: wires that are removed, for example the wire on which a block is dropped.
     """
 
     kind: Literal["add"] = "add"
@@ -70,10 +70,10 @@ class AddBlocks(DiagramEdit):
 
 
 class PasteBlocks(DiagramEdit):
-    """Put what was copied on the sheet: ``text`` is a diagram as a file holds it.
+    """Paste blocks: ``text`` is a diagram in the file format.
 
-    ``names``: what its blocks and notes are to be called here, where that is not as there. ``shift``: px that
-    they stand further right and down than there.
+    ``names``: new names of its blocks and notes, where they differ. ``shift``: displacement to the right and
+    down, px.
     """
 
     kind: Literal["paste"] = "paste"
@@ -83,7 +83,7 @@ class PasteBlocks(DiagramEdit):
 
 
 class RemoveBlocks(DiagramEdit):
-    """Take blocks, wires and notes off the sheet; the wires of the blocks go with them."""
+    """Remove blocks, wires and notes; the wires of the removed blocks are removed with them."""
 
     kind: Literal["remove"] = "remove"
     blocks: list[str] = Field(default_factory=list[str])
@@ -92,7 +92,7 @@ class RemoveBlocks(DiagramEdit):
 
 
 class Connect(DiagramEdit):
-    """Draw a wire. With ``replace`` the input's present wire gives way."""
+    """Add a wire. With ``replace`` the present wire of the input is removed."""
 
     kind: Literal["connect"] = "connect"
     wire: Wire
@@ -100,10 +100,10 @@ class Connect(DiagramEdit):
 
 
 class MoveBlocks(DiagramEdit):
-    """Put blocks and notes elsewhere, or turn blocks: one drag is one edit, however much was in hand.
+    """Move blocks and notes, or rotate blocks; one drag is one edit.
 
-    Ways that are drawn between blocks that move alike move with them. ``wires`` are new, and those of
-    ``instead`` give way: a block is put into a wire, or taken out of its wires.
+    User-drawn routes between blocks that move by the same amount move with them. ``wires`` are added and
+    those of ``instead`` removed, when a block is inserted into a wire or disconnected from its wires.
     """
 
     kind: Literal["move"] = "move"
@@ -114,21 +114,21 @@ class MoveBlocks(DiagramEdit):
 
 
 class BendWires(DiagramEdit):
-    """Lead wires along the bends that they have here; without any the way is chosen again."""
+    """Set the bends of wires; a wire without bends is routed automatically."""
 
     kind: Literal["bend"] = "bend"
     wires: list[Wire]
 
 
 class SetNotes(DiagramEdit):
-    """Write notes, or change what they say."""
+    """Add notes or change their text."""
 
     kind: Literal["notes"] = "notes"
     notes: dict[Annotated[str, Field(pattern=r"^/\S+$", max_length=100)], SheetNote]
 
 
 class Rename(DiagramEdit):
-    """Give a block another name; its wires and its place go with it."""
+    """Rename a block; its wires and its position remain."""
 
     kind: Literal["rename"] = "rename"
     block: str
@@ -136,7 +136,7 @@ class Rename(DiagramEdit):
 
 
 class SetParameters(DiagramEdit):
-    """Change parameters of one block. Wires to ports that thereby vanish are removed."""
+    """Change parameters of one block. Wires to ports that no longer exist are removed."""
 
     kind: Literal["parameters"] = "parameters"
     block: str
@@ -144,9 +144,9 @@ class SetParameters(DiagramEdit):
 
 
 class MaskParameter(Message):
-    """A parameter that a diagram declares. ``default`` as it is typed; ``was``: the name that it had before.
+    """A parameter of a mask. ``default`` is the typed text; ``was`` the former name.
 
-    ``minimum``, ``above`` and ``maximum`` bound its numbers, ``choices`` are what a choice may be.
+    ``minimum``, ``above`` and ``maximum`` bound its numbers; ``choices`` are the allowed values of a choice.
     """
 
     name: Annotated[str, Field(max_length=100)]
@@ -162,9 +162,9 @@ class MaskParameter(Message):
 
 
 class SetMask(DiagramEdit):
-    """Declare the parameters of a subsystem, or of the sheet itself where no block is named, in this order.
+    """Declare the parameters of a subsystem, in this order, or of the sheet itself if ``block`` is empty.
 
-    ``name`` is what its face says; empty leaves that as it is.
+    ``name`` is the text on its face; empty leaves the text unchanged.
     """
 
     kind: Literal["mask"] = "mask"
@@ -174,13 +174,13 @@ class SetMask(DiagramEdit):
 
 
 class ArrangeBlocks(DiagramEdit):
-    """Lay the blocks of a sheet out anew, from left to right."""
+    """Lay out the blocks of a sheet again, from left to right."""
 
     kind: Literal["arrange"] = "arrange"
 
 
 class LogSignal(DiagramEdit):
-    """Log an output ``block/port``, so that it is seen without a Scope; or log it no longer."""
+    """Start or stop logging an output ``block/port``, whose signal is then recorded without a Scope."""
 
     kind: Literal["log"] = "log"
     port: str
@@ -188,18 +188,18 @@ class LogSignal(DiagramEdit):
 
 
 class ModelEdit(DiagramEdit):
-    """An edit of the whole model, whatever sheet of it is on the screen."""
+    """An edit of the whole model, independent of the displayed sheet."""
 
 
 class KeepTuned(ModelEdit):
-    """Take values that were tried in a run, ``block.parameter``, into the model: one step for all of them."""
+    """Write tuned values of a run, by ``block.parameter``, into the model, as one undo step."""
 
     kind: Literal["keep_tuned"] = "keep_tuned"
     values: dict[str, Any]
 
 
 class GroupBlocks(DiagramEdit):
-    """Put blocks into a subsystem of their own; its ports are the wires that are cut thereby."""
+    """Move blocks into a new subsystem; its ports are the wires that cross its boundary."""
 
     kind: Literal["group"] = "group"
     blocks: list[str]
@@ -207,14 +207,14 @@ class GroupBlocks(DiagramEdit):
 
 
 class BreakLink(DiagramEdit):
-    """Make a block that is linked to a library a copy of one's own, which may be changed inside."""
+    """Replace the link to a library by a copy of the library block, which can be edited."""
 
     kind: Literal["break_link"] = "break_link"
     block: str
 
 
 class SetSettings(ModelEdit):
-    """Change how the model is run, by the names of ``SimulationOptions``; ``None`` leaves it to armblocks."""
+    """Change run settings, by the names of ``SimulationOptions``; ``None`` restores the default."""
 
     kind: Literal["settings"] = "settings"
     values: dict[str, float | str | None]

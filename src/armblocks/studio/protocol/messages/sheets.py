@@ -1,4 +1,4 @@
-"""What a page shows of a model: sheets, blocks, wires, the library, what the background check found."""
+"""Diagrams: sheets, blocks, wires, the library, and the findings of the background check."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from armblocks.studio.protocol.messages.sheet_edits import Place, SetMask, Sheet
 
 
 class PortSpot(Message):
-    """A port on the edge of its block: px from the block's corner, and the direction of its wire."""
+    """A port on the edge of its block: position from the block's corner in px, and direction of its wire."""
 
     name: str
     doc: str
@@ -33,7 +33,7 @@ class Outline(Message):
 
 
 class Found(Message):
-    """A block that was sought; ``match`` is the value that fits, ``""`` where name or type does."""
+    """A block found by a search; ``match`` is the matching value, ``""`` if the name or type matches."""
 
     inside: list[str]
     name: str
@@ -42,7 +42,7 @@ class Found(Message):
 
 
 class ParameterRule(Message):
-    """One parameter of a type of block, as its dialog needs it."""
+    """The declaration of one parameter of a block type, for its dialog."""
 
     name: str
     kind: str
@@ -55,7 +55,7 @@ class ParameterRule(Message):
 
 
 class SheetBlock(Message):
-    """A block as it stands on the sheet. ``face`` is SVG in the block's own px; its colours are classes."""
+    """A block as drawn on the sheet. ``face`` is SVG in the block's px; its colours are CSS classes."""
 
     name: str
     type: str
@@ -67,19 +67,19 @@ class SheetBlock(Message):
     inputs: list[PortSpot]
     outputs: list[PortSpot]
     opens: bool
-    """Whether there is a sheet inside."""
+    """Whether the block contains a diagram."""
     parameters: dict[str, Any]
     """Values in the form of :func:`~armblocks.studio.sheet.parameter_values.parameter_json`."""
     formulas: dict[str, str]
-    """The texts of those that are formulas."""
+    """The texts of the parameters that are formulas."""
     mask: list[ParameterRule]
-    """The parameters that the diagram inside declares; ``default`` is what they are here."""
+    """The mask parameters of the diagram inside; ``default`` is their present value."""
     link: str
-    """The entry of a library that the block is, ``file#name``; ``""`` for one of its own."""
+    """The library entry to which the block is linked, ``file#name``; ``""`` without a link."""
 
 
 class Sheet(Message):
-    """The whole drawing."""
+    """The complete drawing of a sheet."""
 
     name: str
     description: str
@@ -87,18 +87,18 @@ class Sheet(Message):
     wires: list[Wire]
     notes: dict[str, SheetNote]
     logged: list[str]
-    """Outputs, ``block/port``, that are seen without a Scope."""
+    """Logged outputs, ``block/port``: their signals are recorded without a Scope."""
     linked: list[str]
-    """The way to the library block that the sheet belongs to, so that it cannot be changed."""
+    """Path of the library block that contains the sheet; such a sheet cannot be edited."""
     link: str
-    """The entry of the library that this block is."""
+    """The library entry of that block."""
 
 
 class SheetChange(Message):
-    """From one version of the drawing to the next."""
+    """The difference between two versions of a sheet."""
 
     blocks: dict[str, SheetBlock | None]
-    """Blocks that are new or other than before; ``None`` for those that are gone."""
+    """New or changed blocks; ``None`` for removed blocks."""
     wires_added: list[Wire]
     wires_removed: list[Wire]
     notes: dict[str, SheetNote] | None = None
@@ -107,7 +107,7 @@ class SheetChange(Message):
 
 
 class Finding(Message):
-    """What the background check says; ``block`` and ``port`` are ``""`` where it is of the whole drawing."""
+    """A finding of the background check; ``block`` and ``port`` are ``""`` for the whole diagram."""
 
     severity: Literal["error", "warning"]
     block: str
@@ -117,16 +117,16 @@ class Finding(Message):
 
 
 class WireKind(Message):
-    """What runs on the wires that leave a port."""
+    """Type and shape of the signal on the wires of an output port."""
 
     shape: list[int]
     unit: str
     bus: bool = False
-    """Whether it is a bundle of signals."""
+    """Whether it is a bus."""
 
 
 class BlockType(Message):
-    """A type of block in the library palette. ``face`` is the drawing of one with the default parameters."""
+    """A block type in the library palette. ``face`` is the drawing with default parameters."""
 
     type: str
     title: str
@@ -138,15 +138,15 @@ class BlockType(Message):
     face: str
     inputs: list[str]
     outputs: list[str]
-    """Ports that it has with the default parameters."""
+    """Ports with default parameters."""
     parameters: list[ParameterRule]
 
 
 class DiagramContent(Content):
-    """The sheet of a diagram that a page looks at, and how the diagram is run.
+    """The displayed sheet of a diagram, and the run settings.
 
-    ``inside``: names of the subsystems on the way to the sheet. ``settings`` go by the names of
-    ``SimulationOptions``. ``run``: the key of the run that the server has of the diagram.
+    ``inside``: names of the subsystems that lead to the sheet. ``settings`` use the names of
+    ``SimulationOptions``. ``run``: key of the current or last run of the diagram.
     """
 
     kind: Literal["diagram"] = "diagram"
@@ -157,7 +157,7 @@ class DiagramContent(Content):
 
 
 class DiagramChange(ContentChange):
-    """What changed on the sheet that a page looks at, and the settings of the diagram."""
+    """Changes of the displayed sheet and of the run settings."""
 
     kind: Literal["diagram"] = "diagram"
     sheet: SheetChange
@@ -165,7 +165,7 @@ class DiagramChange(ContentChange):
 
 
 class Look(Request[None]):
-    """Look at the sheet inside a subsystem; the empty path is the whole model."""
+    """Display the sheet inside a subsystem; the empty path is the top sheet."""
 
     kind: Literal["look"] = "look"
     document: str
@@ -173,14 +173,14 @@ class Look(Request[None]):
 
 
 class AskOutline(Request[Outline]):
-    """Ask for the tree of sheets, an :class:`Outline`."""
+    """Return the tree of sheets."""
 
     kind: Literal["outline"] = "outline"
     document: str
 
 
 class Copy(Request[str]):
-    """Ask for blocks and notes of a sheet as text, which :class:`PasteBlocks` puts on a sheet again."""
+    """Return blocks and notes of a sheet as text, for :class:`PasteBlocks`."""
 
     kind: Literal["copy"] = "copy"
     document: str
@@ -190,7 +190,7 @@ class Copy(Request[str]):
 
 
 class AskMask(Request[SetMask]):
-    """Ask for the mask of a subsystem, or of the sheet itself: the :class:`SetMask` that would make it."""
+    """Return the mask of a subsystem or of the sheet, as the :class:`SetMask` that declares it."""
 
     kind: Literal["ask_mask"] = "ask_mask"
     document: str
@@ -199,7 +199,7 @@ class AskMask(Request[SetMask]):
 
 
 class Find(Request[list[Found]]):
-    """Ask for blocks of all sheets by words of their names, types and values: a list of :class:`Found`."""
+    """Search all sheets for blocks by words in names, types and values."""
 
     kind: Literal["find"] = "find"
     document: str
@@ -207,20 +207,20 @@ class Find(Request[list[Found]]):
 
 
 class TypedValue(Request[Any]):
-    """Ask what a text typed into a parameter's field means: its value, or what is wrong with it."""
+    """Parse a text typed into a parameter field; the reply is its value, a refusal describes the error."""
 
     kind: Literal["typed"] = "typed"
     document: str = ""
     inside: list[str] = Field(default_factory=list[str])
     block: str = ""
-    """The block, where it is on a sheet: formulas may name parameters of the sheet's mask."""
+    """The block, if it is on a sheet: formulas may contain mask parameters of the sheet."""
     type: str
     parameter: str
     text: str
 
 
 class TypedSettings(Request[dict[str, str]]):
-    """Ask what is wrong with settings while they are typed: a text for each that is, by name."""
+    """Check settings while they are typed; the reply has an error text for each invalid one, by name."""
 
     kind: Literal["typed_settings"] = "typed_settings"
     document: str
@@ -228,7 +228,7 @@ class TypedSettings(Request[dict[str, str]]):
 
 
 class Checked(Event):
-    """What the background check found in one version of a document; ``wires`` by source port."""
+    """The findings of the background check for one version of a document; ``wires`` by source port."""
 
     kind: Literal["checked"] = "checked"
     document: str

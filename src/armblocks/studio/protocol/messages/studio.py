@@ -1,4 +1,4 @@
-"""What a front end is told when it comes, and requests that are about no document."""
+"""The first message to a front end, and requests that concern no document."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from armblocks.studio.protocol.messages.sheets import BlockType
 
 
 class SettingRule(Message):
-    """One setting of a run, as the dialog of configuration parameters needs it."""
+    """One setting of a run, for the dialog of configuration parameters."""
 
     name: str
     title: str
@@ -20,7 +20,7 @@ class SettingRule(Message):
 
 
 class SolverChoice(Message):
-    """A solver that a model may ask for."""
+    """A solver that a model may select."""
 
     name: str
     title: str
@@ -29,26 +29,26 @@ class SolverChoice(Message):
 
 
 class Ping(Request[None]):
-    """Ask for nothing but an answer: the page thereby knows that the line is up."""
+    """Test the connection; the reply has no content."""
 
     kind: Literal["ping"] = "ping"
 
 
 class FileList(Message):
-    """Files of the project folder; ``recent`` are those used last, the latest first."""
+    """Files of the project folder; ``recent`` are the recently used ones, the latest first."""
 
     files: list[str]
     recent: list[str]
 
 
 class Files(Request[FileList]):
-    """Ask for the files of the project folder as they are now."""
+    """Return the present files of the project folder."""
 
     kind: Literal["files"] = "files"
 
 
 class Welcome(Event):
-    """The first message: the library, the examples, the files and the documents that are open."""
+    """The first message: library, examples, files and open documents."""
 
     kind: Literal["welcome"] = "welcome"
     version: str
