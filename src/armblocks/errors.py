@@ -132,6 +132,24 @@ def check_arguments(kind: type, values: Sequence[object], named: Mapping[str, ob
     )
 
 
+def check_type(
+    value: object,
+    kinds: type | tuple[type, ...],
+    allowed: str,
+    *,
+    where: str,
+    error: type[ArmblocksError] = InputError,
+) -> None:
+    """Raise an error unless a value is of one of these types; ``allowed`` describes them."""
+    if not isinstance(value, kinds):
+        raise error(
+            f"a value of type {type(value).__name__} was given",
+            where=where,
+            allowed=allowed,
+            fix="pass such a value",
+        )
+
+
 class RobotError(ArmblocksError):
     """A robot description that is inconsistent, or lacks data that the call needs."""
 

@@ -37,17 +37,43 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
     ),
     "base": (lambda: robot(base=np.eye(3)), r"base of robot 'x': the pose is no Transform and no \(4, 4\)"),
     "tool": (lambda: robot(tool="up"), r"tool of robot 'x': the pose is a str"),
-    "links": (lambda: ab.Robot(name="x", links=[1]), r"robot 'x', link number 1: it is of type int.*a Link"),
+    "links": (
+        lambda: ab.Robot(name="x", links=[1]),
+        r"'x', link number 1: a value of type int.*: a Link",
+    ),
     "mass": (lambda: ab.Link(name="x", mass="much"), r"mass of link 'x': 'much' is not a number"),
-    "joint": (lambda: ab.Link(name="x", joint=3), r"joint of link 'x': it is of type int"),
+    "joint": (lambda: ab.Link(name="x", joint=3), r"joint of link 'x': a value of type int was given"),
     "friction": (lambda: ab.Motor(coulomb_friction="b"), r"coulomb_friction of a motor: 'b' is not an array"),
-    "arm": (lambda: ab.Arm(3), r"Arm: it is of type int. Allowed: a Robot"),
+    "arm": (lambda: ab.Arm(3), r"Arm: a value of type int was given. Allowed: a Robot"),
     "payload": (lambda: ab.Payload(mass="much"), r"not made of 1 \+ 3 \+ 6 finite numbers"),
     "trajectory": (lambda: ab.jtraj(["a"], [1], 3), r"jtraj: q0 = \['a'\]"),
     "robot of a block": (lambda: Fkine(robot=3), r"Fkine.robot: the value is 3. Allowed: a Robot, or an Arm"),
-    "a block": (lambda: added(3), r"a int is added instead of a block"),
+    "a block": (lambda: added(3), r"a value of type int is added instead of a block"),
+    "a matrix without a name": (lambda: ab.Transform(np.eye(4)), r"write Transform.from_matrix\(T\) for a"),
     "a source": (lambda: added(Gain(), 3), r"an output is a int.*add a Constant block"),
 }
+
+
+DIAGRAM = ab.load_diagram("van_der_pol_pid")
+WRONG_TYPES: dict[str, tuple[Callable[[], object], str]] = {
+    "a diagram": (lambda: ab.simulate(3), "a Diagram, the name of a shipped diagram, or the path of a file"),
+    "load_robot": (lambda: ab.load_robot(3), "the name of a shipped robot, or the path of a file"),
+    "load_table": (lambda: ab.load_table(3), "the path of a file"),
+    "save_robot": (lambda: ab.save_robot(3, "x.json"), "a Robot or an Arm"),
+    "save_diagram": (lambda: ab.save_diagram(3, "x.json"), "a Diagram"),
+    "to_python": (lambda: ab.to_python(3), "a Diagram"),
+    "draw_diagram": (lambda: ab.draw_diagram(3, "x.svg"), "a Diagram"),
+    "diagram_difference": (lambda: ab.diagram_difference(DIAGRAM, 3), "a Diagram"),
+    "block_example": (lambda: ab.block_example(3), "a block class or its name"),
+    "write_report": (lambda: ab.write_report("x", DIAGRAM, 3), "the result of simulate"),
+}
+
+
+@pytest.mark.parametrize("where", WRONG_TYPES)
+def test_a_value_of_a_wrong_type_is_rejected_with_the_allowed_types(where: str) -> None:
+    call, allowed = WRONG_TYPES[where]
+    with pytest.raises(ArmblocksError, match=f"{where}: a value of type int was given. Allowed: {allowed}"):
+        call()
 
 
 @pytest.mark.parametrize("case", WRONG)

@@ -299,7 +299,7 @@ class DiagramBuilder:
 def _check_block(block: object, where: str) -> None:
     if not isinstance(block, Block):
         raise InputError(
-            f"a {type(block).__name__} is added instead of a block",
+            f"a value of type {type(block).__name__} is added instead of a block",
             where=where,
             allowed="blocks, such as Gain(gain=2.0)",
             fix="create a block first, with its parameters",

@@ -12,6 +12,7 @@ from armblocks.diagram.diagram import Connection, Diagram
 from armblocks.diagram.parameter import Parameter, ParameterKind
 from armblocks.diagram.port import PortRef
 from armblocks.equations import SimulationOptions
+from armblocks.errors import check_type
 
 _SETTINGS = tuple(entry.name for entry in dataclasses.fields(SimulationOptions))
 
@@ -109,6 +110,8 @@ def diagram_difference(before: Diagram, after: Diagram) -> DiagramDifference:
     as one renamed block if type, parameters and all connections agree, even if blocks at the other ends are
     renamed too.
     """
+    for diagram in (before, after):
+        check_type(diagram, Diagram, "a Diagram", where="diagram_difference")
     found = _Findings()
     _compare_levels(before, after, "", found)
     for name in {**before.mask_values, **after.mask_values}:

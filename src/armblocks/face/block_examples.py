@@ -31,7 +31,7 @@ from armblocks.diagram import (
     made,
 )
 from armblocks.equations import Shape, SimulationOptions
-from armblocks.errors import InertiaWarning, InputError
+from armblocks.errors import InertiaWarning, InputError, check_type
 from armblocks.robot import Robot
 
 ROBOT = "twolink"
@@ -47,6 +47,7 @@ def block_example(kind: str | type[Block]) -> Diagram:
 
     Raises UnknownNameError for an unknown name.
     """
+    check_type(kind, (str, type), "a block class or its name", where="block_example")
     chosen = BLOCKS[kind] if isinstance(kind, str) else kind
     return _Assembly(chosen).diagram()
 

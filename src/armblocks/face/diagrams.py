@@ -9,6 +9,7 @@ from pathlib import Path
 from armblocks import formats
 from armblocks.blocks import BLOCKS
 from armblocks.diagram import Block, Diagram, DiagramBlock, Subsystem
+from armblocks.errors import check_type
 
 
 def load_diagram(
@@ -26,6 +27,7 @@ def load_diagram(
 
 def save_diagram(diagram: Diagram, path: str | PathLike[str]) -> Path:
     """Write a diagram as canonical JSON, atomically; returns the path."""
+    check_type(diagram, Diagram, "a Diagram", where="save_diagram")
     return formats.write_diagram(path, diagram)
 
 
@@ -35,6 +37,7 @@ def to_python(diagram: Diagram) -> str:
     Layout, notes and description are omitted. Raises ``FormatError`` where a block has a
     robot that is neither shipped nor from a file, or a Python function.
     """
+    check_type(diagram, Diagram, "a Diagram", where="to_python")
     return formats.diagram_to_python(diagram)
 
 

@@ -127,7 +127,7 @@ def compile_diagram(diagram: Diagram | str | PathLike[str]) -> CompiledDiagram:
     known = _compiled.get(id(diagram))
     if known is None:
         # Cached by identity, because comparing by content would cost more than a run. The entry is dropped
-        # with # the diagram, and therefore holds a copy of it.
+        # with the diagram, and therefore holds a copy of it.
         _compiled[id(diagram)] = known = CompiledDiagram(dataclasses.replace(diagram))
         weakref.finalize(diagram, _compiled.pop, id(diagram), None)
     return known

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from armblocks.diagram import Diagram
+from armblocks.errors import check_type
 from armblocks.simulation import SimulationResult
 
 if TYPE_CHECKING:
@@ -32,6 +33,8 @@ def write_report(
     """
     from armblocks import report
 
+    check_type(diagram, Diagram, "a Diagram", where="write_report")
+    check_type(result, SimulationResult, "the result of simulate", where="write_report")
     return report.write_report(folder, diagram, result, formats=formats, data=data)
 
 
@@ -65,4 +68,5 @@ def draw_diagram(
     """
     from armblocks import drawing
 
+    check_type(diagram, Diagram, "a Diagram", where="draw_diagram")
     return drawing.draw_diagram(path, diagram, result, sheet=sheet, theme=theme, rates=rates)

@@ -6,6 +6,7 @@ from os import PathLike
 from pathlib import Path
 
 from armblocks import formats
+from armblocks.errors import check_type
 from armblocks.face.arm import Arm
 from armblocks.files import write_atomically
 from armblocks.robot import FrictionModel, Robot
@@ -29,6 +30,7 @@ def load_robot(
 
 def save_robot(robot: Robot | Arm, path: str | PathLike[str]) -> Path:
     """Write a robot as canonical JSON, atomically; returns the path."""
+    check_type(robot, (Robot, Arm), "a Robot or an Arm", where="save_robot")
     target = Path(path)
     write_atomically(target, formats.write_robot(robot.robot if isinstance(robot, Arm) else robot))
     return target

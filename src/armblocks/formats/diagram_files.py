@@ -9,7 +9,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from armblocks.diagram import BlockLibrary, Diagram, check_block_name
-from armblocks.errors import UnknownNameError
+from armblocks.errors import UnknownNameError, check_type
 from armblocks.files import read_bounded, write_atomically
 from armblocks.formats.diagram_json import (
     DEEPEST,
@@ -54,6 +54,12 @@ def load_diagram(
     files of Python functions that the diagram names are run; without it, such a diagram is an error. With
     ``draft`` the diagram is not checked or traced, which is sufficient for drawing.
     """
+    check_type(
+        name_or_path,
+        (str, PathLike),
+        "a Diagram, the name of a shipped diagram, or the path of a file",
+        where="a diagram",
+    )
     text = fspath(name_or_path)
     if not isinstance(name_or_path, str) or "/" in text or "\\" in text or text.lower().endswith(SUFFIX):
         return read_diagram(text, library, resolve_robot, trust=trust, draft=draft)

@@ -8,7 +8,7 @@ from functools import cache
 from os import PathLike, fspath
 from pathlib import Path
 
-from armblocks.errors import FormatError, UnknownNameError
+from armblocks.errors import FormatError, UnknownNameError, check_type
 from armblocks.files import read_bounded
 from armblocks.formats.robot_format import RobotFormat
 from armblocks.formats.robot_formats import ROBOT_FORMATS, ROBOT_SUFFIXES
@@ -31,6 +31,12 @@ def load_robot(
     (``InertiaWarning``) of inertias in a user's file that no body can have, and of numbers that look like
     another unit or sign; those of the shipped robots are told by ``armblocks show``.
     """
+    check_type(
+        name_or_path,
+        (str, PathLike),
+        "the name of a shipped robot, or the path of a file",
+        where="load_robot",
+    )
     text = fspath(name_or_path)
     if not isinstance(name_or_path, str) or is_path(text):
         robot = _pick(_read_file(Path(text)), text, name)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.diagram import TimeTable
-from armblocks.errors import FormatError, MissingLibraryError, UnknownNameError
+from armblocks.errors import FormatError, MissingLibraryError, UnknownNameError, check_type
 from armblocks.extras import from_extra, installed
 from armblocks.files import read_bounded
 
@@ -30,6 +30,7 @@ def load_table(path: str | PathLike[str]) -> TimeTable:
     as long are values, matrices column by column. What ``result.save`` writes is read so. Raises
     ``FormatError`` for a file that cannot be read, and ``InputError`` where it holds no table.
     """
+    check_type(path, (str, PathLike), "the path of a file", where="load_table")
     place = Path(fspath(path))
     read = _READERS.get(place.suffix.lower())
     if read is None:

@@ -7,7 +7,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armblocks.errors import InputError, RobotError
+from armblocks.errors import InputError, RobotError, check_type
 from armblocks.spatial import Transform
 
 
@@ -51,10 +51,4 @@ def pose(value: object, *, where: str) -> Transform:
 
 def check_kind(value: object, kind: type, *, where: str) -> None:
     """Raise ``RobotError`` unless a value is of a class of the description."""
-    if not isinstance(value, kind):
-        raise RobotError(
-            f"it is of type {type(value).__name__}",
-            where=where,
-            allowed=f"a {kind.__name__}",
-            fix=f"give a {kind.__name__}",
-        )
+    check_type(value, kind, f"a {kind.__name__}", where=where, error=RobotError)

@@ -38,7 +38,19 @@ class Transform:
     rotation: Matrix3
     translation: Vector3
 
-    def __init__(self, *, rotation: ArrayLike = IDENTITY3, translation: ArrayLike = (0.0, 0.0, 0.0)) -> None:
+    def __init__(
+        self,
+        *unnamed: object,
+        rotation: ArrayLike = IDENTITY3,
+        translation: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> None:
+        if unnamed:
+            raise InputError(
+                f"{len(unnamed)} arguments are given without names",
+                where="Transform",
+                allowed="rotation and translation by name",
+                fix="write Transform.from_matrix(T) for a (4, 4) matrix, else Transform(rotation=…)",
+            )
         R = matrix3(rotation, where="rotation of a transform")
         p = vector3(translation, where="translation of a transform")
         _check_rotation(R)
