@@ -1,4 +1,4 @@
-"""What axe-core finds on a page."""
+"""Accessibility check of a page with axe-core."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ RUN = """async ([inside, tags]) => {
 
 
 def axe(page: Page, inside: str = "html", *, tags: list[str] | None = None) -> None:
-    """Fail where the page, as it is now, breaks a rule that keeps people out.
+    """Fail if the page violates an accessibility rule in its present state.
 
-    ``inside``: the part of the page that is checked. ``tags``: categories of rules; all by default.
+    ``inside``: selector of the checked part. ``tags``: categories of rules; all by default.
     """
     if not page.evaluate("'axe' in window"):
         page.evaluate(SCRIPT.read_text(encoding="utf-8"))

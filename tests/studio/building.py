@@ -1,4 +1,4 @@
-"""How people build a model in the page: with the mouse, or with the keyboard."""
+"""Actions that build a model in the page, with the mouse or the keyboard."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from playwright.sync_api import Locator, Page, expect
 from conftest import PATIENCE_MS
 
 DIALOG = "[role=dialog]"
-"""The dialog on the page: to look for a role inside it is quicker than in the whole page."""
+"""The open dialog: searching a role inside it is faster than in the whole page."""
 FRAMES_REQUESTED = """async () => {
-    // How many animation frames the page requests while ten frames pass.
+    // Number of animation frames that the page requests during ten frames.
     const request = window.requestAnimationFrame
     let count = 0
     window.requestAnimationFrame = (called) => (count++, request.call(window, called))
@@ -32,19 +32,19 @@ def block(page: Page, name: str) -> Locator:
 
 
 def keep_view(page: Page) -> None:
-    """Let the sheet stay where it is: until somebody touches it, it fits itself into its panel."""
+    """Fix the view of the sheet: without user input, the sheet fits itself into its panel."""
     page.locator(".canvas").dispatch_event("wheel")
 
 
 def new_diagram(page: Page) -> None:
-    """Begin with an empty sheet."""
+    """Start with an empty sheet."""
     page.get_by_role("button", name="Menu").click()
     page.get_by_role("menuitem", name="New diagram").click()
     expect(page.get_by_text("Type to add a block")).to_be_visible()
 
 
 def add(page: Page, typed: str, *, by_key: bool = True) -> None:
-    """Add a block by keyboard alone: letter by letter, or after the first letter all at once."""
+    """Add a block with the keyboard: key by key, or with the text filled in after the first letter."""
     page.keyboard.press(typed[0])
     box = page.locator(DIALOG).get_by_role("textbox", name="Add a block")
     expect(box).to_be_focused()
@@ -58,7 +58,7 @@ def add(page: Page, typed: str, *, by_key: bool = True) -> None:
 
 
 def drag_from_library(page: Page, kind: str, x: float, y: float) -> None:
-    """Drop a block with the mouse at a place of the canvas, px."""
+    """Drop a block with the mouse at a position of the canvas, px."""
     library = page.locator(".palette")
     library.get_by_role("textbox", name="Search the library").fill(kind)
     target = page.locator(".canvas")  # an empty one has examples on it
@@ -69,8 +69,8 @@ def drag_from_library(page: Page, kind: str, x: float, y: float) -> None:
 def wire(page: Page, source: str, target: str) -> None:
     """Draw a wire with the mouse, between two handles ``block/port``.
 
-    The sheet pans while the mouse is near its edge: the mouse follows the target until the sheet shows that
-    a wire would end there.
+    The sheet pans while the mouse is near its edge, so the mouse follows the target until the sheet shows
+    that the wire would end there.
     """
 
     keep_view(page)
@@ -85,7 +85,7 @@ def wire(page: Page, source: str, target: str) -> None:
         return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
     def is_free(port: str) -> bool:
-        """Whether the mouse would meet the handle: it lies on the sheet and nothing lies on it."""
+        """Whether the mouse can reach the handle: it is on the sheet and not covered."""
         return handle(port).evaluate(UPPERMOST)
 
     if not (is_free(source) and is_free(target)):  # the sheet has panned while earlier wires were drawn
@@ -107,19 +107,19 @@ def wire(page: Page, source: str, target: str) -> None:
 
 
 def wait_until(page: Page, true: Callable[[], bool]) -> None:
-    """Wait for what no locator says: a state on this side of the line, or a relation of two numbers."""
+    """Wait for a condition that no locator expresses: a state of the test, or a relation of two numbers."""
     step = 50
     for _ in range(PATIENCE_MS // step):
         if true():
             return
         page.wait_for_timeout(step)  # the events of the browser are handled meanwhile
-    raise AssertionError("it did not come")
+    raise AssertionError("the condition did not become true")
 
 
 def copied_text(page: Page, part: str) -> str:
-    """Wait until the clipboard holds a text with this part; the text.
+    """Wait until the clipboard contains a text with this part, and return the text.
 
-    Playwright's ``wait_for_function`` awaits no promise, and ``readText`` gives one.
+    Playwright's ``wait_for_function`` does not await promises, and ``readText`` returns one.
     """
     text = ""
 
@@ -133,17 +133,17 @@ def copied_text(page: Page, part: str) -> str:
 
 
 def expect_focus_inside(found: Locator) -> None:
-    """Wait until the keys go to a dialog: it takes the focus shortly after it is shown."""
+    """Wait until a dialog has the focus, which it takes shortly after it is displayed."""
     expect(found.locator(":focus")).to_have_count(1)
 
 
 def expect_no_frames(page: Page) -> None:
-    """Wait until the page requests no animation frames: a page that rests costs nothing."""
+    """Wait until the page requests no animation frames: an idle page uses no processor time."""
     wait_until(page, lambda: page.evaluate(FRAMES_REQUESTED) == 0)
 
 
 def expect_no_faults(page: Page) -> None:
-    """Wait until the check of the drawing finds nothing; the error says what it finds."""
+    """Wait until the check of the drawing has no findings; on failure the error lists them."""
     faults = page.locator(".block .fault")
     try:
         expect(faults).to_have_count(0)
@@ -153,7 +153,7 @@ def expect_no_faults(page: Page) -> None:
 
 
 def play_slowly(page: Page) -> None:
-    """Let a playback last ten times as long as the run: it must not end before a busy machine shows it."""
+    """Extend a playback to ten times the run time, so that it does not end before a busy machine shows it."""
     page.get_by_role("combobox", name="Playback rate").select_option("0.1 ×")
 
 

@@ -1,4 +1,4 @@
-"""A real server and a real browser. Any error on the page's console fails the test."""
+"""A real server and a real browser. Any error on the console of a page fails the test."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from interruptible import start_interruptible
 
 NOT_NEEDED = (
     # The browser's own address bar: Chromium loads two pages for its suggestions into every new window, which
-    # takes as much processor time as the studio's page.
+    # takes as much processor time as the page of the studio.
     "WebUIOmniboxPopup",
     "WebUIOmniboxAimPopup",
-    # What Playwright turns off: of two lists of features Chromium reads the last one only.
+    # The features that Playwright disables; Chromium reads only the last of two lists.
     "AvoidUnnecessaryBeforeUnloadCheckSync",
     "DestroyProfileOnBrowserClose",
     "HttpsUpgrades",
@@ -54,21 +54,21 @@ FLAGS = [
     f"--disable-features={','.join(NOT_NEEDED)}",
 ]
 TOUR_SEEN = "if (location.protocol === 'http:') localStorage.setItem('armblocks-tour-seen', 'yes')"
-"""Nobody is shown around; pages that are no page of the studio (about:blank) have nothing to keep that in."""
+"""Disables the tour; pages outside the studio (about:blank) have no local storage."""
 NOT_DRAWN = """
 for (const draw of ['drawArrays', 'drawElements', 'drawArraysInstanced', 'drawElementsInstanced'])
     WebGL2RenderingContext.prototype[draw] = () => {}
 """
-"""Three-dimensional scenes are set up and not drawn: to fill pixels in software takes longer than the rest.
-Shaders are compiled as always, and an error in one is reported on the console."""
+"""Three-dimensional scenes are set up but not drawn, because software rendering takes longer than all other
+work. Shaders are compiled, and a shader error is reported on the console."""
 PATIENCE_MS = 180_000
-"""A busy machine may take long; nothing here waits when it need not."""
+"""Long enough for a busy machine; nothing waits longer than needed."""
 expect.set_options(timeout=PATIENCE_MS)
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 
 
 class Studio:
-    """A studio that was started as a user starts it."""
+    """A studio process, started as a user starts it."""
 
     def __init__(self, folder: Path, *arguments: str) -> None:
         self.folder = folder
@@ -100,14 +100,14 @@ class Studio:
         raise AssertionError(f"the studio did not start: {said}")
 
     def kill(self) -> None:
-        """End it as a crash does: nothing of it is asked."""
+        """Kill the process, as in a crash."""
         self.process.kill()
         self.process.wait()
         assert self.process.stdout is not None
         self.process.stdout.close()
 
     def stop(self) -> None:
-        """End it with Ctrl-C, as a user does."""
+        """Stop the process with Ctrl-C, as a user does."""
         self.process.send_signal(signal.SIGINT)
         try:
             self.process.wait(timeout=PATIENCE_MS / 1000)
@@ -121,14 +121,14 @@ class Studio:
 
 
 class SharedBrowser:
-    """One browser for all journeys of a process: a start takes seconds."""
+    """One browser for all journeys of a process, because a start takes seconds."""
 
     def __init__(self) -> None:
         self._browser: Browser | None = None
         self._stack = ExitStack()
 
     def opened(self) -> Browser:
-        """The browser, started where it is not running."""
+        """Return the browser; start it if it is not running."""
         if self._browser is None:
             path = next((found for name in BROWSERS if (found := shutil.which(name))), None)
             assert path is not None, f"install one of {', '.join(BROWSERS)} (apt-get install chromium)"
@@ -138,7 +138,7 @@ class SharedBrowser:
         return self._browser
 
     def close(self) -> None:
-        """End it and its event loop."""
+        """Close the browser and its event loop."""
         self._browser = None
         self._stack.close()
 
@@ -147,20 +147,20 @@ SHARED_BROWSER = SharedBrowser()
 
 
 class SharedStudio:
-    """One studio for all journeys of a process that do not kill it: a start takes seconds."""
+    """One studio for all journeys of a process that do not kill it, because a start takes seconds."""
 
     def __init__(self) -> None:
         self._studio: Studio | None = None
         self._cookies: list[SetCookieParam] = []
 
     def opened(self, folder: Callable[[str], Path]) -> Studio:
-        """The studio, started in a new folder where it is not running."""
+        """Return the studio; start it in a new folder if it is not running."""
         if self._studio is None:
             self._studio = Studio(folder("project"), "van_der_pol_pid")
         return self._studio
 
     def log_in(self, context: BrowserContext) -> None:
-        """Let a context in: the link that the studio prints serves once, its cookie as often as wanted."""
+        """Log in a context: the printed link is valid once, its cookie can be reused."""
         assert self._studio is not None
         if not self._cookies:
             context.request.get(self._studio.link)
@@ -175,7 +175,7 @@ class SharedStudio:
         context.add_cookies(self._cookies)
 
     def close(self) -> None:
-        """End it as a user does."""
+        """Stop the studio with Ctrl-C."""
         if self._studio is not None:
             studio, self._studio, self._cookies = self._studio, None, []
             studio.stop()
@@ -186,13 +186,13 @@ SHARED_STUDIO = SharedStudio()
 
 @pytest.fixture(scope="module")
 def browser() -> Browser:
-    """Each test or file makes contexts of its own in it."""
+    """The shared browser; each test or file creates its own contexts."""
     return SHARED_BROWSER.opened()
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> Generator[None]:
-    """Close the browser before a file that needs none: where Playwright's event loop runs, no other can."""
+    """Close the browser before a file that does not use it: Playwright's event loop permits no other one."""
     try:
         return (yield)
     finally:
@@ -204,12 +204,12 @@ def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> 
 
 @pytest.fixture(scope="module")
 def studio(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Studio:
-    """The studio that the journeys of a process share. Each file or test makes pages of its own in it."""
+    """The studio shared by the journeys of a process. Each file or test creates its own pages in it."""
     return SHARED_STUDIO.opened(tmp_path_factory.mktemp)
 
 
 def new_context(browser: Browser) -> BrowserContext:
-    """Pages that share nothing with others."""
+    """A browser context that shares no cookies or storage with others."""
     context = browser.new_context(
         viewport={"width": 1280, "height": 720}, color_scheme="light", reduced_motion="reduce"
     )
@@ -221,7 +221,7 @@ def new_context(browser: Browser) -> BrowserContext:
 
 @contextmanager
 def watched(browser: Browser, address: str) -> Generator[Page]:
-    """A page of the shared studio that must say no error on its console."""
+    """A page of the shared studio whose console must not report errors."""
     context = new_context(browser)
     SHARED_STUDIO.log_in(context)
     context.grant_permissions(["clipboard-read", "clipboard-write"])
@@ -243,9 +243,9 @@ def watched(browser: Browser, address: str) -> Generator[Page]:
 
 @pytest.fixture(scope="module")
 def open_studio(browser: Browser, studio: Studio) -> Iterator[Callable[[str], Page]]:
-    """Show a page of the shared studio until the file ends; the argument is the example that it opens.
+    """Open pages of the shared studio until the file ends; the argument is the example to open.
 
-    Where the model has no arm, the page does not draw one, which takes a browser without graphics long.
+    A model without an arm draws none; software rendering of an arm takes long.
     """
     with ExitStack() as stack:
 
@@ -255,14 +255,14 @@ def open_studio(browser: Browser, studio: Studio) -> Iterator[Callable[[str], Pa
         yield opened
 
 
-@pytest.hookimpl(trylast=True)  # after the fixtures of a run that was broken off
+@pytest.hookimpl(trylast=True)  # after the fixtures of an interrupted run
 def pytest_sessionfinish() -> None:
-    """Leave no browser behind, wherever the tests ended."""
+    """Close the browser when the tests end for any reason."""
     SHARED_BROWSER.close()
     SHARED_STUDIO.close()
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Firefox is not asked for; but that nothing was tried in it is not passed over."""
+    """Firefox is optional, but the summary reports that its tests were skipped."""
     if firefox_path() is None:
-        terminalreporter.write_line("Firefox is not installed: the studio was not tried in it.", yellow=True)
+        terminalreporter.write_line("Firefox is not installed: its tests were skipped.", yellow=True)

@@ -1,4 +1,4 @@
-"""A project folder and the studio's own, as a studio finds them that starts after another was killed."""
+"""A project folder and a state folder as a studio finds them after another studio was killed."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from armblocks.studio.sheet.open_documents import OpenDocuments
 
 
 class Disk:
-    """A project folder and what the studio keeps for it, as a studio that starts finds them."""
+    """A project folder and its state folder, as a starting studio finds them."""
 
     def __init__(self, root: Path) -> None:
         self.project = ProjectFolder(root / "project")
@@ -31,7 +31,7 @@ class Disk:
         return OpenRobots(self.project, self.kept)
 
     def as_after_a_crash(self, root: Path) -> Disk:
-        """The same disk, seen by a studio that starts after the one that writes now was killed."""
+        """A copy of the disk, as seen by a studio that starts after the present one was killed."""
         for name in ("project", "state"):
             if (self.project.root.parent / name).exists():
                 shutil.copytree(self.project.root.parent / name, root / name)

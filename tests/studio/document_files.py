@@ -1,4 +1,4 @@
-"""How people save a document, and what is in its file."""
+"""Saving documents in the page, and reading the saved files."""
 
 from __future__ import annotations
 
@@ -20,6 +20,6 @@ def names(path: Path) -> list[str]:
 
 
 def edit_from_outside(path: Path) -> bytes:
-    """What another program writes to a model's file."""
+    """Write to the file of a model as another program does; return the written bytes."""
     path.write_text(json.dumps({**json.loads(path.read_text()), "description": "theirs"}))
     return path.read_bytes()

@@ -1,6 +1,6 @@
-"""Firefox, driven by WebDriver BiDi over its own websocket: no driver program stands between.
+"""Control of Firefox by WebDriver BiDi over its own websocket, without a driver program.
 
-Playwright's own Firefox is a patched one; stock Firefox lacks a command that Playwright sends to every page.
+Playwright needs a patched Firefox; stock Firefox lacks a command that Playwright sends to every page.
 The protocol: https://w3c.github.io/webdriver-bidi/.
 """
 
@@ -24,12 +24,12 @@ PATIENCE_SECONDS = 180.0
 
 
 def firefox_path() -> str | None:
-    """Where Firefox is, if it is installed."""
+    """The path of Firefox, or ``None`` if it is not installed."""
     return next((found for name in NAMES if (found := shutil.which(name))), None)
 
 
 class Firefox:
-    """One window of a Firefox without a screen, with a profile of its own."""
+    """One headless Firefox window with its own profile."""
 
     def __init__(self, path: str) -> None:
         self._profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
@@ -53,12 +53,12 @@ class Firefox:
             if found := re.search(r"WebDriver BiDi listening on (ws://\S+)", line):
                 break
         else:
-            raise AssertionError("Firefox ended without a word of where it listens")
+            raise AssertionError("Firefox ended without printing its address")
         self._stack = ExitStack()
         self._socket = self._stack.enter_context(connect(f"{found.group(1)}/session", max_size=None))
         self._numbers = count(1)
         self.errors: list[str] = []
-        """What pages said on their console as errors, or did not catch."""
+        """Errors and uncaught exceptions on the consoles of pages."""
         self._ask("session.new", capabilities={})
         self._ask("session.subscribe", events=["log.entryAdded"])
         self._page = self._ask("browsingContext.create", type="tab")["context"]
@@ -79,7 +79,7 @@ class Firefox:
         self._ask("browsingContext.navigate", context=self._page, url=url, wait="complete")
 
     def value(self, expression: str) -> Any:
-        """What a JavaScript expression gives: a text, a number, a truth value."""
+        """Return the value of a JavaScript expression: a text, a number or a boolean."""
         found = self._ask(
             "script.evaluate", expression=expression, target={"context": self._page}, awaitPromise=True
         )
@@ -87,14 +87,14 @@ class Firefox:
         return found["result"].get("value")
 
     def wait(self, expression: str) -> None:
-        """Until a JavaScript expression is true."""
+        """Wait until a JavaScript expression is true."""
         end = time.monotonic() + PATIENCE_SECONDS
         while not self.value(f"Boolean({expression})"):
-            assert time.monotonic() < end, f"it did not come: {expression}; errors: {self.errors}"
+            assert time.monotonic() < end, f"not true in time: {expression}; errors: {self.errors}"
             time.sleep(0.1)
 
     def press(self, *keys: str) -> None:
-        """Press keys together, as one hand does: the last first up."""
+        """Press keys together and release them in reverse order."""
         codes = [KEYS.get(key, key) for key in keys]
         strokes = [{"type": "keyDown", "value": code} for code in codes]
         strokes += [{"type": "keyUp", "value": code} for code in reversed(codes)]

@@ -1,4 +1,4 @@
-"""Frames of samples, read as the page reads them."""
+"""Decoding of sample frames as in the front end."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 
 def read_frame(data: bytes) -> tuple[dict[str, Any], Array, Array]:
-    """Header, times ``(m,)`` and columns ``(n, m)`` of a frame."""
+    """Return header, times ``(m,)`` and columns ``(n, m)`` of a frame."""
     length = struct.unpack("<I", data[:4])[0]
     header = json.loads(data[4 : 4 + length])
     assert (4 + length) % 8 == 0

@@ -87,7 +87,7 @@ def bend(s: Sheet) -> do.DiagramEdit:
 
 
 def numbers(s: Sheet) -> list[str]:
-    """Parameters of the blocks of a sheet that are numbers, as ``block.parameter``."""
+    """The numeric parameters of the blocks of a sheet, as ``block.parameter``."""
     return [
         f"{name}.{rule.name}"
         for name, block in s.diagram.blocks.items()
@@ -132,7 +132,7 @@ MAKERS: dict[type[do.DiagramEdit], Callable[[Sheet], do.DiagramEdit]] = {
 
 
 def random_edit(document: Document, chance: random.Random) -> tuple[list[str], do.DiagramEdit]:
-    """A sheet of the drawing, by its path, and an edit of it."""
+    """Return the path of a random sheet and a random edit of it."""
     path: list[str] = []
     diagram = document.diagram
     while True:

@@ -1,4 +1,4 @@
-"""What is copied and pasted is the same, whatever it is: the text on the clipboard is a diagram file."""
+"""Copy and paste preserve all properties; the text on the clipboard is a diagram file."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def copy(diagram: Diagram, *names: str, notes: tuple[str, ...] = ()) -> str:
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
-def test_all_that_is_copied_and_pasted_elsewhere_is_the_same(name: str) -> None:
+def test_pasting_all_blocks_into_an_empty_diagram_reproduces_the_diagram(name: str) -> None:
     there = placed(load_diagram(name, BLOCKS))
     document = Document(Diagram(name=there.name, blocks={}, mask=there.mask), load_robot)
     document.edit(PasteBlocks(text=copy(there, *there.blocks, notes=tuple(there.notes))))
@@ -46,7 +46,7 @@ def test_all_that_is_copied_and_pasted_elsewhere_is_the_same(name: str) -> None:
     assert document.diagram.blocks == {}
 
 
-def test_duplicates_keep_what_is_inside_links_and_led_wires() -> None:
+def test_duplicates_keep_library_links_and_bends() -> None:
     document = Document(placed(load_diagram("puma560_servos", BLOCKS)), load_robot)
     wire = next(wire for wire in document.diagram.connections if wire.target.block == "servo 2")
     source, target = wire.source.block, wire.target.block
@@ -61,7 +61,7 @@ def test_duplicates_keep_what_is_inside_links_and_led_wires() -> None:
     assert after.bends[copied] == (230.0, 80.0, 330.0)
 
 
-def test_a_formula_stays_one_only_where_its_names_are_known() -> None:
+def test_a_pasted_formula_becomes_a_value_where_its_names_are_undeclared() -> None:
     masked = Diagram(
         name="there",
         blocks={"gain": Gain(gain=formula("2*k"))},
@@ -78,7 +78,7 @@ def test_a_formula_stays_one_only_where_its_names_are_known() -> None:
     assert own.diagram.blocks["gain"].parameter_value("gain") == 3.0
 
 
-def test_names_that_are_taken_and_texts_that_are_no_diagram_are_refused() -> None:
+def test_pasting_used_names_or_invalid_text_is_refused() -> None:
     document = Document(placed(load_diagram("van_der_pol_pid", BLOCKS)), load_robot)
     noted = dataclasses.replace(document.diagram, notes={"/1": Note(x=0, y=0, text="a")})
     with pytest.raises(DiagramError, match="a block is already named 'PID'"):
@@ -92,7 +92,7 @@ def test_names_that_are_taken_and_texts_that_are_no_diagram_are_refused() -> Non
         document.edit(PasteBlocks(text="[1, 2]"))
 
 
-def test_the_text_is_a_diagram_file() -> None:
+def test_the_clipboard_text_is_a_diagram_file() -> None:
     diagram = placed(load_diagram("kr180model", BLOCKS))
     read = diagram_from_bytes(
         copy(diagram, "jtraj", "rne").encode(), "mail.json", BLOCKS, load_robot, draft=True
@@ -100,7 +100,7 @@ def test_the_text_is_a_diagram_file() -> None:
     assert set(read.blocks) == {"jtraj", "rne"}
 
 
-def test_nothing_outside_of_the_project_is_read_by_pasting(tmp_path: Path) -> None:
+def test_pasting_reads_no_file_outside_the_project(tmp_path: Path) -> None:
     (tmp_path / "project").mkdir()
     ab.save_library({"Servo": ab.load_library("joint_servos")["JointServo"]}, tmp_path / "outside.json")
     text = copy(placed(load_diagram("puma560_servos", BLOCKS)), "servo 1")
@@ -119,7 +119,7 @@ def test_nothing_outside_of_the_project_is_read_by_pasting(tmp_path: Path) -> No
     talk(tmp_path / "project", talking)
 
 
-def test_a_block_is_put_into_a_wire_and_taken_out_of_it_as_one_step() -> None:
+def test_inserting_a_block_into_a_wire_and_removing_it_is_one_step_each() -> None:
     document = Document(placed(load_diagram("van_der_pol_pid", BLOCKS)), load_robot)
     before = document.diagram
     document.edit(PasteBlocks(text=copy(before, "damping"), names={"damping": "free"}))

@@ -1,4 +1,4 @@
-"""Documents in a real browser, found again after the studio was killed."""
+"""Recovery of documents in a real browser after the studio was killed."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ class Crash:
     """A studio after a crash, and the pages that have seen it."""
 
     studio: Studio
-    """Started again, in the same folder."""
+    """The restarted studio, in the same folder."""
     before: Studio
     drawing: Page
-    """Its diagram has a sine wave from before the crash; a gain was added while nobody answered."""
+    """A page whose diagram has a sine wave from before the crash and a gain added during the outage."""
     robot: Page
-    """Its robot's link1 is 0.75 m long since before the crash, its link2 0.25 m since nobody answered."""
+    """A page whose robot has link1 of 0.75 m from before the crash and link2 of 0.25 m from the outage."""
     lost: bytes
-    """What another program wrote, after the crash, into a file whose diagram had an edit that was not saved.
-    The page that showed the diagram was left before the crash."""
+    """Content that another program wrote after the crash into a file with unsaved edits in the studio.
+    The page of that diagram was closed before the crash."""
 
 
 @pytest.fixture(scope="module")
 def crash(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Crash]:
-    """One crash for all tests here. An error that the lost line does not explain fails the last of them."""
-    # Not with the first example: its arm takes a browser without graphics long.
+    """One crash for all tests of the file. Errors other than the lost connection fail the last test."""
+    # Not the first example: software rendering of its arm takes long.
     old = Studio(tmp_path_factory.mktemp("project"), "van_der_pol_pid")
     context = new_context(browser)
     context.request.get(old.link)
@@ -59,8 +59,8 @@ def crash(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterato
     for page in (drawing, robot):
         expect(silence(page)).to_be_visible()
     axe(drawing)
-    add(drawing, "gain")  # waits in the page
-    lengthen(robot, "link2", "0.25")  # waits in the page, and outlives it
+    add(drawing, "gain")  # queued in the page
+    lengthen(robot, "link2", "0.25")  # queued in the page, and preserved across its reload
     studio = Studio(old.folder, "van_der_pol_pid")
     yield Crash(studio=studio, before=old, drawing=drawing, robot=robot, lost=lost)
     context.close()
@@ -79,7 +79,7 @@ def draw_and_leave(page: Page) -> None:
 
 
 def length(page: Page, link: str) -> Locator:
-    """The field of a link's length."""
+    """The field for the length of a link."""
     return page.locator(".robot-editor").get_by_role("textbox", name=f"a of {link}", exact=True)
 
 
@@ -89,11 +89,11 @@ def lengthen(page: Page, link: str, value: str) -> None:
 
 
 def silence(page: Page) -> Locator:
-    """What the page says while the studio is gone."""
+    """The message that the page shows while the studio is unreachable."""
     return page.get_by_text("The studio does not answer")
 
 
-def test_edits_survive_a_killed_server_and_go_on_in_the_same_page(crash: Crash) -> None:
+def test_edits_survive_a_killed_server_and_continue_in_the_same_page(crash: Crash) -> None:
     page = crash.drawing
     assert crash.studio.address == crash.before.address
     expect(block(page, "Gain")).to_be_visible()
@@ -114,7 +114,7 @@ def test_robot_edits_survive_a_killed_server_and_a_reload(crash: Crash) -> None:
     page.reload()
     expect(length(page, "link1")).to_have_value("0.75")
     expect(length(page, "link2")).to_have_value("0.25")
-    page.locator(".robot-editor .title").click()  # no cell has the keys
+    page.locator(".robot-editor .title").click()  # no cell has the focus
     page.keyboard.press("Escape")
     for value in ("0.5", "0.25"):
         page.get_by_role("button", name="Undo" if value == "0.5" else "Redo").click()
@@ -127,7 +127,7 @@ def test_robot_edits_survive_a_killed_server_and_a_reload(crash: Crash) -> None:
     assert [link["dh"]["a"] for link in links] == [0.75, 0.25]
 
 
-def test_a_page_that_comes_after_the_crash_is_offered_what_was_drawn(crash: Crash) -> None:
+def test_a_new_page_after_the_crash_offers_the_unsaved_diagram(crash: Crash) -> None:
     folder = crash.studio.folder
     fresh = crash.drawing.context.new_page()
     fresh.goto(crash.studio.address)

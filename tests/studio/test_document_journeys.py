@@ -1,4 +1,4 @@
-"""Documents in a real browser: saved, opened, changed from outside and in two pages, shown again."""
+"""Documents in a real browser: save, open, external changes, two pages, reload."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ def shared(open_studio: Callable[[str], Page]) -> Page:
 
 @pytest.fixture
 def page(shared: Page) -> Page:
-    """The page that all tests here share, with an empty document."""
+    """The page that all tests in this file share, with an empty document."""
     new_diagram(shared)
-    expect(shared.get_by_role("menu")).to_be_hidden()  # it takes keys as long as it closes
+    expect(shared.get_by_role("menu")).to_be_hidden()  # a closing menu still takes keys
     return shared
 
 
@@ -57,7 +57,9 @@ def test_save_as_asks_before_it_overwrites(page: Page, studio: Studio) -> None:
     expect(page.locator(".title")).to_have_text("one")
 
 
-def test_a_file_that_changed_on_the_disk_is_told_and_chosen(page: Page, studio: Studio) -> None:
+def test_a_file_changed_on_disk_is_reported_and_the_user_chooses_a_version(
+    page: Page, studio: Studio
+) -> None:
     file = studio.folder / "shared.json"
     add(page, "constant")
     save_as(page, "shared.json")
@@ -86,7 +88,7 @@ def test_a_file_that_changed_on_the_disk_is_told_and_chosen(page: Page, studio: 
 
 
 class Line:
-    """The websocket of a page, on which the server's words can be held back."""
+    """The websocket of a page, on which messages of the server can be delayed."""
 
     def __init__(self, page: Page) -> None:
         self.held = False
@@ -111,7 +113,7 @@ class Line:
             self._page.send(said)
 
 
-def test_an_edit_of_what_the_other_page_changed_is_told_and_both_agree(
+def test_a_conflicting_edit_is_reported_and_both_pages_show_the_same_diagram(
     page: Page,
 ) -> None:
     add(page, "gain")
@@ -126,7 +128,7 @@ def test_an_edit_of_what_the_other_page_changed_is_told_and_both_agree(
     block(page, "Gain").click()
     page.keyboard.press("ArrowDown")
     expect(page.get_by_role("button", name="Undo move Gain (Ctrl+Z)")).to_be_enabled()
-    other.keyboard.press("ArrowRight")  # of the place where Gain is not any more
+    other.keyboard.press("ArrowRight")  # moves Gain from its former position
     wait_until(page, lambda: any("change from another page" in str(said) for said in line.waiting))
     line.release()
     expect(other.get_by_text("your change conflicts with a change from another page")).to_be_visible()
@@ -147,7 +149,7 @@ def test_an_edit_of_what_the_other_page_changed_is_told_and_both_agree(
     expect(page).to_have_title("two – armblocks")
 
 
-def test_a_run_is_shown_again_after_a_reload(page: Page) -> None:
+def test_a_reloaded_page_shows_the_run_again(page: Page) -> None:
     add(page, "sine wave")
     page.keyboard.press("Control+Enter")
     state = page.locator(".run-state")
@@ -155,4 +157,4 @@ def test_a_run_is_shown_again_after_a_reload(page: Page) -> None:
     page.reload()
     expect(state).to_contain_text("done")
     expect(state).to_contain_text("10.00 s")
-    save_as(page, "run.json")  # nothing that the page after a crash would be offered
+    save_as(page, "run.json")  # no unsaved edits remain that a later test would be offered

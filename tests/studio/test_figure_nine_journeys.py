@@ -42,7 +42,7 @@ BLOCKS = [
     ("Scope", "scope", 800, 530),
     ("Scope", "scope", 1040, 400),
 ]
-"""Type, what is typed to find it, and where it is dropped, px."""
+"""Block type, search text, and drop position, px."""
 WIRES = [
     ("jtraj/q", "plot/q"),
     ("jtraj/q", "fkine/q"),
@@ -82,12 +82,14 @@ def folder(studio: Studio) -> Path:
 def page(open_studio: Callable[[str], Page]) -> Page:
     page = open_studio("van_der_pol_pid")
     page.set_viewport_size({"width": 1920, "height": 1080})
-    page.locator(".dock .tab").get_by_text("Tune", exact=True).click()  # an arm drawn in software takes long
+    page.locator(".dock .tab").get_by_text(
+        "Tune", exact=True
+    ).click()  # software rendering of the arm takes long
     return page
 
 
 def save_and_compare(page: Page, path: Path) -> None:
-    """What was built gives the torques and the way of the tool that the shipped model gives."""
+    """The built model has the same torques and tool path as the shipped model."""
     page.keyboard.press("Control+s")
     page.get_by_role("combobox", name="File").fill(path.name)
     page.get_by_role("button", name="Save", exact=True).press("Enter")
@@ -98,7 +100,7 @@ def save_and_compare(page: Page, path: Path) -> None:
         np.testing.assert_allclose(made[signal], shipped[signal], rtol=1e-12, atol=1e-12)
 
 
-def test_with_the_mouse(page: Page, folder: Path) -> None:
+def test_figure_9_is_built_with_the_mouse(page: Page, folder: Path) -> None:
     new_diagram(page)
     for kind, _, x, y in BLOCKS:
         drag_from_library(page, kind, x, y)
@@ -123,24 +125,24 @@ def test_with_the_mouse(page: Page, folder: Path) -> None:
 
 
 def tab_to(page: Page, field: Locator) -> None:
-    """Go to a field of the dialog with the Tab key, once around at most."""
+    """Move the focus to a field of the dialog with the Tab key, at most once around."""
     expect_focus_inside(page.locator(DIALOG))
     for _ in range(40):
         if field.evaluate("(element) => element === document.activeElement"):
             return
         page.keyboard.press("Tab")
-    raise AssertionError("Tab does not lead there")
+    raise AssertionError("Tab does not reach the field")
 
 
 def enter(page: Page, text: str, *, by_key: bool) -> None:
-    """Type into the field that has the keys: key by key, or all at once where an earlier text came by key."""
+    """Type into the focused field: key by key, or as one text if the key handling was tested before."""
     if by_key:
         page.keyboard.type(text)
     else:
         page.keyboard.insert_text(text)
 
 
-def test_with_the_keyboard_alone(page: Page, folder: Path) -> None:
+def test_figure_9_is_built_with_the_keyboard_alone(page: Page, folder: Path) -> None:
     page.keyboard.press("Control+k")
     page.get_by_role("textbox", name="Command").press_sequentially("new diagram")
     page.keyboard.press("Enter")
@@ -174,7 +176,7 @@ def test_with_the_keyboard_alone(page: Page, folder: Path) -> None:
         for label, port in (("From the output", source), ("To the input", target)):
             box = dialog.get_by_role("combobox", name=label)
             expect(box).to_be_visible()
-            if box.input_value() == port:  # suggested, as the port of the block that is selected
+            if box.input_value() == port:  # already suggested: a port of the selected block
                 continue
             tab_to(page, box)
             page.keyboard.press("Control+a")
@@ -186,6 +188,6 @@ def test_with_the_keyboard_alone(page: Page, folder: Path) -> None:
         page.keyboard.press("Enter")
         expect(page.locator(".react-flow__edge")).to_have_count(count)
     expect_no_faults(page)
-    expect_no_frames(page)  # the lists of ports were scrolled, and are gone
+    expect_no_frames(page)  # the lists of ports were scrolled and closed
     run(page)
     save_and_compare(page, folder / "by keyboard.json")

@@ -1,4 +1,4 @@
-"""The main way through the studio, in Firefox; where there is none, the summary of the tests says so."""
+"""The main workflow of the studio in Firefox; without Firefox the test summary reports the skipped test."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from conftest import Studio
 
 
 @pytest.mark.skipif(firefox_path() is None, reason="Firefox is not installed (apt-get install firefox-esr)")
-def test_the_paper_s_model_is_run_and_edited_in_firefox(tmp_path: Path) -> None:
+def test_the_model_of_the_paper_is_run_and_edited_in_firefox(tmp_path: Path) -> None:
     with ExitStack() as stack:
         studio = Studio(tmp_path)
         stack.callback(studio.stop)

@@ -1,4 +1,4 @@
-"""What a browser fetches before the page is there stays below what was promised."""
+"""The size of the first download of the page stays below its limit."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import armblocks as ab
 WEB = Path(ab.__file__).parent / "studio" / "web"
 MOST_KB = 400
 EVERY_PAGES_FONTS = re.compile(r"(inter-latin-wght|jetbrains-mono-latin-400)-normal-.*\.woff2")
-"""Browsers fetch of a font the parts whose letters are on the page: every page has these."""
+"""Font files that every page needs: browsers fetch only the files with characters on the page."""
 
 
 def test_the_first_download_is_below_400_kb() -> None:
@@ -26,7 +26,7 @@ def test_the_first_download_is_below_400_kb() -> None:
     assert whole < 1000 * MOST_KB, f"{whole / 1000:.0f} kB: {sizes}"
 
 
-def test_three_dimensions_and_dialogs_come_later() -> None:
+def test_3d_code_and_dialogs_are_loaded_on_demand() -> None:
     page = (WEB / "index.html").read_text(encoding="utf-8")
     for part in ("stage", "all_dialogs", "scopes", "robot_editor"):
         assert not re.search(rf"/{part}-[^/]*\.js", page), part

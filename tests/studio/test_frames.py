@@ -1,4 +1,4 @@
-"""The samples that a page receives: all, or the extremes of very many."""
+"""Samples sent to a page: all of them, or the extreme values of a long run."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from armblocks.studio.runs import worker as run_worker
 Array = Any
 
 
-def test_a_frame_says_what_went_in() -> None:
+def test_a_decoded_frame_equals_the_encoded_samples() -> None:
     rng = np.random.default_rng(1)
     time, signals = np.arange(5.0), rng.normal(size=(3, 5))
     header, found_time, found = read_frame(sample_frame("ä", 7, time, signals))
@@ -30,7 +30,7 @@ def test_a_frame_says_what_went_in() -> None:
 
 
 @given(st.integers(1, 60), st.integers(2, 9), st.integers(0, 2**32 - 1))
-def test_no_extreme_is_lost_and_time_goes_on(count: int, stride: int, seed: int) -> None:
+def test_thinning_keeps_all_extremes_and_time_increases(count: int, stride: int, seed: int) -> None:
     time: Array = np.arange(count) * 0.1
     signals = np.random.default_rng(seed).normal(size=(2, count))
     few_time, few = thinned(time, signals, stride)
@@ -45,7 +45,7 @@ def test_no_extreme_is_lost_and_time_goes_on(count: int, stride: int, seed: int)
 
 
 class Pipe:
-    """The worker's end of a pipe on which nobody says anything."""
+    """The worker's end of a pipe without commands."""
 
     def __init__(self) -> None:
         self.said: list[bytes] = []
@@ -58,7 +58,9 @@ class Pipe:
 
 
 @pytest.mark.parametrize("most", [10**9, 4000])
-def test_a_long_run_sends_its_extremes_a_short_one_all(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_long_run_sends_extremes_and_a_short_run_all_samples(
+    most: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(run_worker, "MOST_NUMBERS", most)
     diagram = load_diagram("van_der_pol_pid", BLOCKS)
     pipe = Pipe()

@@ -1,4 +1,4 @@
-"""Whatever comes over the websocket is answered, with a value or in words: every kind of message is tried."""
+"""Every message over the websocket gets a reply with a value or an error; every kind of message is tested."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from armblocks.studio.protocol.page import Page
 from armblocks.studio.server.hub import Hub
 
 NESTED = "…nested…"
-"""Stands in a request for a list in a list in a list …"""
+"""Placeholder in a request for a deeply nested list."""
 HOSTILE: tuple[Any, ...] = (
     None,
     True,
@@ -61,7 +61,7 @@ HOSTILE: tuple[Any, ...] = (
 
 
 def requests(document: str, robot: str) -> list[dict[str, Any]]:
-    """One request at least of every kind, each of which the studio can carry out or refuse."""
+    """At least one valid request of every kind."""
     place = {"x": 0.0, "y": 0.0, "width": None, "height": None, "flipped": False, "rotation": 0}
     block = {"name": "new", "type": "Gain", "parameters": {"gain": "2*pi"}, "place": place}
     wire = {"source": "PID/y", "target": "new/u", "bends": [1.0]}
@@ -137,7 +137,7 @@ def requests(document: str, robot: str) -> list[dict[str, Any]]:
         {"kind": "scene", **to_block},
         {"kind": "pose", **to_block, "q": [0.0]},
         {"kind": "pose", "document": robot, "q": [0.0] * 6},
-        {"kind": "picture", "document": robot, "q": [0.0], "theme": "light"},  # a picture takes long
+        {"kind": "picture", "document": robot, "q": [0.0], "theme": "light"},  # drawing takes long
         {"kind": "readings", "document": robot, **q},
         {"kind": "robot_of_block", **to_block},
         {"kind": "robot_tables"},
@@ -145,7 +145,7 @@ def requests(document: str, robot: str) -> list[dict[str, Any]]:
 
 
 def spoilt(request: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """The request with each value in it, at any depth, in turn replaced by something hostile or left out."""
+    """Yield variants of the request: one value, at any depth, is replaced by a hostile one or removed."""
 
     def places(value: Any, path: tuple[Any, ...]) -> Iterator[tuple[Any, ...]]:
         if path:
@@ -180,7 +180,7 @@ def folder(tmp_path: Path) -> Path:
     return project
 
 
-def test_every_kind_of_message_answers_hostile_values_in_words(folder: Path) -> None:
+def test_every_kind_of_message_answers_hostile_values_with_an_error(folder: Path) -> None:
     told: list[dict[str, Any]] = []
     defects: list[str] = []
 
@@ -191,7 +191,7 @@ def test_every_kind_of_message_answers_hostile_values_in_words(folder: Path) -> 
         assert "SECRET" not in text
 
     async def hear_bytes(data: bytes) -> None:
-        raise AssertionError("no run was asked for")
+        raise AssertionError("samples arrived without a run")
 
     async def going() -> None:
         hub = Hub(ProjectFolder(folder))

@@ -1,4 +1,4 @@
-"""A journal gives back every whole record, whatever happened to its end."""
+"""Reading a journal returns all complete records, whatever the damage at its end."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ def written(path: Path) -> bytes:
     return path.read_bytes()
 
 
-def test_what_is_written_is_read_again(tmp_path: Path) -> None:
+def test_written_records_are_read_again(tmp_path: Path) -> None:
     path = tmp_path / "folder" / "a.journal"
     written(path)
     assert read_journal(path) == ([{"document": "d"}, *RECORDS], path.stat().st_size)
     assert path.stat().st_mode & 0o077 == 0
 
 
-def test_every_torn_end_leaves_the_records_before_it(tmp_path: Path) -> None:
+def test_a_journal_cut_at_any_byte_keeps_the_complete_records(tmp_path: Path) -> None:
     path = tmp_path / "a.journal"
     data = written(path)
     known = [{"document": "d"}, *RECORDS]
@@ -46,7 +46,7 @@ def test_every_torn_end_leaves_the_records_before_it(tmp_path: Path) -> None:
     assert counts == set(range(1, len(known)))
 
 
-def test_a_changed_byte_ends_the_journal_there(tmp_path: Path) -> None:
+def test_a_changed_byte_ends_the_journal_at_its_record(tmp_path: Path) -> None:
     path = tmp_path / "a.journal"
     data = bytearray(written(path))
     data[-3] ^= 1
@@ -54,7 +54,7 @@ def test_a_changed_byte_ends_the_journal_there(tmp_path: Path) -> None:
     assert read_journal(path)[0] == [{"document": "d"}, *RECORDS[:-1]]
 
 
-def test_a_journal_without_a_whole_record_is_refused(tmp_path: Path) -> None:
+def test_a_journal_without_a_complete_record_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.journal"
     path.write_bytes(b"12 00000000 {")
     with pytest.raises(FormatError, match="the journal contains no complete record"):
@@ -63,13 +63,13 @@ def test_a_journal_without_a_whole_record_is_refused(tmp_path: Path) -> None:
         read_journal(tmp_path / "nowhere")
 
 
-def test_a_journal_that_is_not_kept_is_gone(tmp_path: Path) -> None:
+def test_closing_a_journal_without_keep_deletes_it(tmp_path: Path) -> None:
     path = tmp_path / "a.journal"
     Journal(path).close(keep=False)
     assert not path.exists()
 
 
-def test_a_journal_goes_on_behind_its_last_whole_record(tmp_path: Path) -> None:
+def test_a_reopened_journal_continues_after_its_last_complete_record(tmp_path: Path) -> None:
     path = tmp_path / "a.journal"
     data = written(path)
     path.write_bytes(data[:-5])
@@ -80,7 +80,7 @@ def test_a_journal_goes_on_behind_its_last_whole_record(tmp_path: Path) -> None:
     assert read_journal(path)[0] == [*records, {"more": 1}]
 
 
-def test_a_full_disk_leaves_the_records_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_leaves_the_earlier_records(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "a.journal"
     journal = Journal(path)
     journal.append({"first": 1})
@@ -101,7 +101,7 @@ def test_a_full_disk_leaves_the_records_before(tmp_path: Path, monkeypatch: pyte
     assert read_journal(path)[0] == [{"first": 1}, {"third": 3}]
 
 
-def test_a_journal_that_another_studio_writes_is_left_alone(tmp_path: Path) -> None:
+def test_a_journal_locked_by_another_studio_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.journal"
     journal = Journal(path)
     journal.append({"first": 1})
@@ -114,7 +114,7 @@ def test_a_journal_that_another_studio_writes_is_left_alone(tmp_path: Path) -> N
     assert read_journal(path)[0] == [{"first": 1}]
 
 
-def test_a_journal_without_end_is_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_journal_above_the_size_limit_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "a.journal"
     written(path)
     monkeypatch.setattr(journal_module, "MOST_BYTES", 10)

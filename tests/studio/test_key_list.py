@@ -1,4 +1,4 @@
-"""The list of keys names every key that the page listens to, at the place where it is heard."""
+"""The list of keys contains every key that the page handles, under the place where it is handled."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 
 SOURCE = Path(__file__).parents[2] / "frontend" / "src"
 COMMANDS = ("commands.ts", "command_palette.tsx")
-"""Here a key is what the list itself says: its text is compared with what is pressed."""
+"""Source files that contain the list itself: their key names are data."""
 WRITTEN = {"escape": "esc", "delete": "del", " ": "space"}
 LISTENING = re.compile(r"event\.key\b|moved\.key\b|onKeyDown|keydown")
 HEARD = re.compile(
@@ -21,7 +21,7 @@ HEARD = re.compile(
 
 
 def listed() -> list[tuple[list[str], list[str]]]:
-    """For each place of the list: its source files and its keys."""
+    """The source files and the keys of each place in the list."""
     text = (SOURCE / "key_list.ts").read_text(encoding="utf-8")
     places = re.findall(r"sources: \[(.*?)\],\s*keys: \[(.*?)\n    \],", text, re.DOTALL)
     assert len(places) == text.count("    place: '")
@@ -33,7 +33,7 @@ def listed() -> list[tuple[list[str], list[str]]]:
 
 
 def listeners() -> dict[str, set[str]]:
-    """The keys that each source file compares with what is pressed."""
+    """The keys that each source file compares with the pressed key."""
     found: dict[str, set[str]] = {}
     for path in sorted(SOURCE.rglob("*.ts*")):
         text = path.read_text(encoding="utf-8")
@@ -44,7 +44,7 @@ def listeners() -> dict[str, set[str]]:
 
 
 def names(key: str, ways: list[str]) -> bool:
-    """Whether one of the ways is this key: alone, or with Ctrl or Shift."""
+    """Whether one of the shortcuts consists of this key, alone or with Ctrl or Shift."""
     if key.startswith("Arrow"):
         arrow = {"Up": "↑", "Down": "↓", "Left": "←", "Right": "→"}[key.removeprefix("Arrow")]
         return "arrows" in ways or arrow in ways
@@ -63,14 +63,14 @@ def test_the_sources_are_read() -> None:
 
 @pytest.mark.parametrize("source", listeners())
 def test_every_key_is_in_the_list_of_keys(source: str) -> None:
-    assert source not in COMMANDS, "a command's key is stated once, in its entry of commands.ts"
+    assert source not in COMMANDS, "the key of a command is declared only in commands.ts"
     places = [keys for sources, keys in listed() if source in sources]
     assert places, f"key_list.ts names no place for the keys of {source}"
     missing = {key for key in listeners()[source] if not any(names(key, keys) for keys in places)}
     assert not missing, f"key_list.ts does not list {missing} of {source}"
 
 
-def test_the_list_names_sources_that_are_there() -> None:
+def test_the_list_names_existing_source_files() -> None:
     heard = listeners()
     for sources, _ in listed():
         assert set(sources) <= set(heard)

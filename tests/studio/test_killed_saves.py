@@ -1,4 +1,4 @@
-"""A save cut short at any moment leaves the old file or the new one, and what was acknowledged."""
+"""An interrupted save leaves the complete old or new file; no acknowledged save is lost."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from armblocks.errors import FormatError
 from armblocks.studio.documents.project_folder import ProjectFolder
 
 TRIALS = int(os.environ.get("ARMBLOCKS_KILLED_SAVES", "12"))
-"""500 for the long version."""
+"""Number of interrupted saves; 500 in the long version."""
 SIZE = 4 * 2**20
 SAVE_WITHOUT_END = """
 import sys
@@ -30,7 +30,7 @@ while True:
 """
 
 
-def test_a_killed_save_leaves_a_whole_file_no_older_than_acknowledged(tmp_path: Path) -> None:
+def test_a_killed_save_leaves_a_complete_file_no_older_than_acknowledged(tmp_path: Path) -> None:
     random_ = random.Random(1)
     path = tmp_path / "a.json"
     number = 0
@@ -53,7 +53,7 @@ def test_a_killed_save_leaves_a_whole_file_no_older_than_acknowledged(tmp_path: 
 
 
 @pytest.mark.parametrize("call", ["open", "write", "fsync", "replace", "fsync of the folder"])
-def test_a_disk_that_refuses_any_step_of_a_save_leaves_a_whole_file(
+def test_a_disk_error_in_any_step_of_a_save_leaves_a_complete_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: str
 ) -> None:
     folder = ProjectFolder(tmp_path)
@@ -71,7 +71,7 @@ def test_a_disk_that_refuses_any_step_of_a_save_leaves_a_whole_file(
         real_sync(descriptor)
 
     class Full:
-        """A stream on a disk that is full."""
+        """A stream on a full disk."""
 
         def __init__(self, descriptor: int) -> None:
             self.descriptor = descriptor
@@ -99,7 +99,7 @@ def test_a_disk_that_refuses_any_step_of_a_save_leaves_a_whole_file(
             folder.write("a.json", b"new")
     assert "a.json" in refused.value.where
     assert "free space" in refused.value.fix
-    # Where only the folder's entry may not have reached the disk, the name already means the new file.
+    # If only the sync of the folder fails, the name already refers to the new file.
     assert folder.read("a.json") == (b"new" if call == "fsync of the folder" else b"old")
     assert [entry.name for entry in tmp_path.iterdir()] == ["a.json"]
     folder.write("a.json", b"newer")

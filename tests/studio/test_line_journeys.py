@@ -15,18 +15,17 @@ from playwright.sync_api import Browser, Locator, Page, expect
 
 from conftest import Studio, new_context
 
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="SIGSTOP is of POSIX")
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="SIGSTOP needs POSIX")
 GONE_MS = 1000 * float(os.environ.get("ARMBLOCKS_LINE_GONE", "0"))
-"""How long the line is gone beyond the moment at which the page says so; 10 for the long version, in which
-the page makes the line anew."""
+"""Duration of the outage after the page reports it, s; in the long version 10, and the page reconnects."""
 
 
 class Session:
-    """A studio that is suspended, killed and started again, and the page that stays."""
+    """A studio that is suspended, killed and restarted, and the page that stays open."""
 
     def __init__(self, browser: Browser, folder: Path) -> None:
         self.folder = folder
-        self.studio = Studio(folder, "van_der_pol_pid")  # an arm drawn in software takes long
+        self.studio = Studio(folder, "van_der_pol_pid")  # software rendering of an arm takes long
         self.context = new_context(browser)
         self.page = self.context.new_page()
         self.faults: list[str] = []
@@ -35,7 +34,7 @@ class Session:
         self.page.locator(".react-flow__node").first.wait_for()
 
     def begin(self) -> Page:
-        """An empty drawing with a gain in it."""
+        """Open an empty drawing and add a gain."""
         page = self.page
         page.get_by_role("button", name="Menu").click()
         page.get_by_role("menuitem", name="New diagram").click()
@@ -46,7 +45,7 @@ class Session:
         return page
 
     def suspend(self) -> None:
-        """The server holds its breath: the line is there, and nobody answers."""
+        """Suspend the server: the connection stays open, but no message is answered."""
         self.studio.process.send_signal(signal.SIGSTOP)
 
     def go_on(self) -> None:
@@ -63,7 +62,7 @@ class Session:
         self.studio = Studio(self.folder, "van_der_pol_pid")
 
     def saved(self, name: str) -> dict[str, list[float]]:
-        """Where the blocks are in the file, once the page has saved it."""
+        """The positions of the blocks in the file that the page saves."""
         page = self.page
         page.locator(".react-flow__pane").click(position={"x": 5, "y": 5})
         page.keyboard.press("Control+Shift+S")
@@ -99,7 +98,7 @@ def place(page: Page, name: str) -> tuple[float, float]:
 
 
 def take(page: Page, name: str) -> tuple[float, float]:
-    """Press the mouse on a block and drag it a little way; where it is held."""
+    """Press the mouse on a block and drag it a short distance; return the pointer position."""
     keep_view(page)
     box = block(page, name).bounding_box()
     assert box is not None
@@ -119,7 +118,7 @@ def session(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Itera
     assert session.faults == []
 
 
-def test_edits_while_nobody_answers_are_carried_out_when_somebody_does(session: Session) -> None:
+def test_edits_during_an_outage_are_applied_after_it(session: Session) -> None:
     page = session.begin()
     session.suspend()
     add(page, "integrator")
@@ -131,7 +130,7 @@ def test_edits_while_nobody_answers_are_carried_out_when_somebody_does(session: 
     assert places.keys() == {"Gain", "Integrator"}
 
 
-def test_a_drag_during_which_the_server_is_killed_and_started_again_ends_where_it_was_let_go(
+def test_a_drag_across_a_server_restart_ends_where_the_block_is_released(
     session: Session,
 ) -> None:
     page = session.begin()
@@ -148,7 +147,7 @@ def test_a_drag_during_which_the_server_is_killed_and_started_again_ends_where_i
     assert after[0] - before[0] > 120
     assert after[1] - before[1] > 50
     shown = session.saved("dragged.json")["Gain"]
-    page.keyboard.press("Control+z")  # one step, whatever happened to the line
+    page.keyboard.press("Control+z")  # one step, in spite of the lost connection
     expect(page.locator(".title")).to_have_text("dragged •")
     back = session.saved("undone.json")["Gain"]
     zoom = page.locator(".react-flow__viewport").evaluate("it => new DOMMatrix(it.style.transform).a")
@@ -156,7 +155,7 @@ def test_a_drag_during_which_the_server_is_killed_and_started_again_ends_where_i
     assert moved == pytest.approx((after[0] - before[0], after[1] - before[1]), abs=0.5)
 
 
-def test_a_reload_in_the_middle_of_a_drag_leaves_the_block_where_it_was(session: Session) -> None:
+def test_a_reload_during_a_drag_leaves_the_block_at_its_position(session: Session) -> None:
     page = session.begin()
     start = session.saved("still.json")
     take(page, "Gain")
@@ -172,7 +171,7 @@ def test_a_reload_in_the_middle_of_a_drag_leaves_the_block_where_it_was(session:
     assert moved[0] > start["Gain"][0] + 50
 
 
-def test_edits_that_wait_outlive_a_reload_and_are_done_once(session: Session) -> None:
+def test_queued_edits_survive_a_reload_and_are_applied_once(session: Session) -> None:
     page = session.begin()
     session.kill()
     add(page, "integrator")

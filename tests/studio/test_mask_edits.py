@@ -1,4 +1,4 @@
-"""The mask editor's edits: what is declared, renamed, removed, and what that does to values and formulas."""
+"""Edits of a mask: declaring, renaming and removing parameters, and the effect on values and formulas."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from armblocks.studio.sheet.placing import placed
 
 
 def spring() -> Diagram:
-    """A subsystem ``spring`` with a gain of ``2*k``, ``k`` being 3, under a model that declares ``w`` = 5."""
+    """A subsystem ``spring`` with a gain ``2*k``, k = 3, in a model that declares ``w`` = 5."""
     builder = DiagramBuilder("model")
     w = builder.parameter("w", 5.0)
     with builder.subsystem("spring", builder.add("u", Constant(value=w))) as inner:
@@ -61,7 +61,7 @@ def gain(document: Document) -> tuple[object, str | None]:
 
 
 @pytest.mark.parametrize("name", ["puma560_servos", "kr180model"])
-def test_a_mask_that_is_said_again_changes_nothing(name: str) -> None:
+def test_setting_the_present_mask_changes_nothing(name: str) -> None:
     document = Document(placed(load_diagram(name, BLOCKS)), load_robot)
     document.edit(mask_of(document.diagram))
     assert document.diagram == document.saved
@@ -73,7 +73,7 @@ def test_a_mask_that_is_said_again_changes_nothing(name: str) -> None:
             assert document.diagram.blocks == before.blocks
 
 
-def test_a_parameter_is_added_and_formulas_read_it(document: Document) -> None:
+def test_an_added_parameter_can_be_used_in_formulas(document: Document) -> None:
     edited(
         document, [declared("k", was="k"), declared("damping", "[1 2; 3 4]/2", kind="array", unit="N s/m")]
     )
@@ -96,7 +96,7 @@ def test_a_renamed_parameter_keeps_its_value_and_its_formulas(document: Document
     assert diagram_from_bytes(data, "model.json", BLOCKS, load_robot) == document.diagram
 
 
-def test_two_names_are_exchanged_and_the_order_is_as_said(document: Document) -> None:
+def test_two_parameters_exchange_names_and_the_new_order_is_kept(document: Document) -> None:
     edited(document, [declared("k", was="k"), declared("j", 10.0)])
     document.edit(SetParameters(block="gain", values={"gain": "k/j"}), ["spring"])
     edited(document, [declared("k", 10.0, was="j"), declared("j", was="k")])
@@ -104,7 +104,7 @@ def test_two_names_are_exchanged_and_the_order_is_as_said(document: Document) ->
     assert gain(document) == (0.3, "j/k")
 
 
-def test_what_stands_at_its_default_follows_the_default() -> None:
+def test_a_value_at_its_default_follows_a_changed_default() -> None:
     document = Document(spring(), load_robot)
     edited(document, [declared("k", 4.0, was="k")])
     assert gain(document)[0] == 8.0
@@ -113,7 +113,7 @@ def test_what_stands_at_its_default_follows_the_default() -> None:
     assert gain(document)[0] == 14.0
 
 
-def test_bounds_hold_for_the_default_and_for_what_is_set(document: Document) -> None:
+def test_bounds_apply_to_the_default_and_to_set_values(document: Document) -> None:
     with pytest.raises(InputError, match=r"the value is 1.0.*>= 2"):
         edited(document, [declared("k", was="k", minimum=2.0)])
     with pytest.raises(InputError, match=r"'k'.*the value is 3.0.*<= 2"):
@@ -123,7 +123,7 @@ def test_bounds_hold_for_the_default_and_for_what_is_set(document: Document) -> 
         document.edit(SetParameters(block="spring", values={"k": "w - 1"}))
 
 
-def test_a_parameter_that_a_formula_reads_is_not_removed(document: Document) -> None:
+def test_removing_a_parameter_that_a_formula_reads_is_refused(document: Document) -> None:
     before = document.diagram
     with pytest.raises(
         DiagramError, match=r"the mask parameter 'k' is removed, and the formula '2\*k' reads it"
@@ -147,7 +147,7 @@ def test_a_parameter_that_a_formula_reads_is_not_removed(document: Document) -> 
         ([declared("k", was="k"), declared("mode", "c", kind="choice", choices=["a", "b"])], "one of a, b"),
     ],
 )
-def test_what_cannot_be_declared_is_refused(
+def test_invalid_declarations_are_refused(
     document: Document, parameters: list[MaskParameter], said: str
 ) -> None:
     before = document.diagram
@@ -156,7 +156,7 @@ def test_what_cannot_be_declared_is_refused(
     assert document.diagram is before
 
 
-def test_all_kinds_can_be_declared(document: Document) -> None:
+def test_parameters_of_all_types_can_be_declared(document: Document) -> None:
     kinds = [
         declared("k", was="k"),
         declared("n", "3", kind="integer"),
@@ -175,7 +175,7 @@ def test_all_kinds_can_be_declared(document: Document) -> None:
     assert [rule.kind for rule in again] == ["number", "integer", "boolean", "choice", "string", "robot"]
 
 
-def test_blocks_without_a_mask_of_their_own_are_refused(document: Document) -> None:
+def test_masks_of_primitive_and_linked_blocks_cannot_be_edited(document: Document) -> None:
     with pytest.raises(DiagramError, match="the block cannot have a mask"):
         document.edit(SetMask(block="scope", parameters=[]))
     with pytest.raises(UnknownNameError, match="block named 'sprin'"):
@@ -187,7 +187,7 @@ def test_blocks_without_a_mask_of_their_own_are_refused(document: Document) -> N
         linked.edit(SetMask(block="servo 1", parameters=[]))
 
 
-def test_a_model_declares_parameters_of_its_own(document: Document) -> None:
+def test_a_model_can_declare_a_mask(document: Document) -> None:
     document.edit(SetMask(parameters=[declared("speed", 7.0, was="w")]))
     assert document.undo_title == "mask the model"
     assert dict(document.diagram.blocks["spring"].formulas) == {"k": "speed - 2"}
@@ -208,7 +208,7 @@ terms = st.recursive(
 
 @settings(deadline=None, max_examples=80, derandomize=True)
 @given(terms, st.permutations(["a", "b", "k", "x1"]))
-def test_renaming_renames_the_names_and_nothing_else(text: str, order: list[str]) -> None:
+def test_renaming_changes_only_whole_names(text: str, order: list[str]) -> None:
     there = dict(zip(["a", "b", "k", "x1"], order, strict=True))
     back = {new: old for old, new in there.items()}
     renamed = renamed_in(text, there)
@@ -216,7 +216,7 @@ def test_renaming_renames_the_names_and_nothing_else(text: str, order: list[str]
     assert Formula(renamed, "").names == {there.get(name, name) for name in Formula(text, "").names}
 
 
-def test_pages_ask_for_a_mask_and_declare_it(tmp_path: Path) -> None:
+def test_a_page_can_read_and_set_a_mask(tmp_path: Path) -> None:
     async def talking(hub: Any, ask: Any, told: Told) -> None:
         key = await ask("open_shipped", document_kind="diagram", name="puma560_servos")
         found = await ask("ask_mask", document=key, block="servo 1")

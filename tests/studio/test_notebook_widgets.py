@@ -1,4 +1,4 @@
-"""Widgets of a notebook, shown by the protocol of anywidget in a real browser, without a network."""
+"""Notebook widgets, displayed through the protocol of anywidget in a real browser without a network."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ SYNCED = ("title", "height", "time", "_page", "_shown", "_frame")
 
 @pytest.fixture
 def notebook(browser: Browser) -> Iterator[Page]:
-    """An empty page whose every request but the first fails, and that must say no error."""
+    """An empty page that may send no request after the first and report no error."""
     page = browser.new_page(viewport={"width": 1280, "height": 1100}, color_scheme="light")
     page.set_default_timeout(PATIENCE_MS)
     faults: list[str] = []
@@ -54,7 +54,7 @@ def notebook(browser: Browser) -> Iterator[Page]:
         if route.request.url == ORIGIN:
             route.fulfill(body="<!doctype html><body></body>", content_type="text/html")
         else:
-            faults.append(f"asked for {route.request.url}")
+            faults.append(f"requested {route.request.url}")
             route.abort()
 
     def hear(message: ConsoleMessage) -> None:
@@ -70,7 +70,7 @@ def notebook(browser: Browser) -> Iterator[Page]:
 
 
 def show(page: Page, *widgets: object) -> list[FrameLocator]:
-    """Render widgets as a notebook does, each in its place under the one before."""
+    """Render widgets one below the other, as a notebook does."""
     states = []
     for widget in widgets:
         state = widget.get_state(SYNCED)  # type: ignore[attr-defined]
@@ -82,7 +82,7 @@ def show(page: Page, *widgets: object) -> list[FrameLocator]:
 
 
 def colours(picture: bytes) -> int:
-    """How many colours a PNG file shows."""
+    """Number of colours in a PNG file."""
     return len(Image.open(io.BytesIO(picture)).convert("RGB").getcolors(1 << 24) or ())
 
 
@@ -108,8 +108,8 @@ def test_the_widgets_of_a_result_share_their_time_cursor(notebook: Page) -> None
     expect(arm.get_by_label("Position of the tool")).to_have_text(said(tool[0]))
     slider.press("ArrowRight")
     expect(arm.get_by_label("Position of the tool")).to_have_text(said(tool[1]))
-    notebook.wait_for_function("models[0].saved === 0.01")  # Python reads it, when the cursor rests
-    notebook.evaluate("models[1].set('time', 5)")  # as when Python sets it
+    notebook.wait_for_function("models[0].saved === 0.01")  # sent to Python when the cursor stops
+    notebook.evaluate("models[1].set('time', 5)")  # as if set in Python
     expect(arm.get_by_label("Position of the tool")).to_have_text(said(tool[500]))
     inked = """(canvas) => {
         const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height)
@@ -120,13 +120,13 @@ def test_the_widgets_of_a_result_share_their_time_cursor(notebook: Page) -> None
     notebook.emulate_media(color_scheme="dark")
     for page in pages:
         expect(page).to_have_attribute("data-mantine-color-scheme", "dark")
-    notebook.evaluate("document.body.dataset.jpThemeLight = 'true'")  # as JupyterLab says its theme
+    notebook.evaluate("document.body.dataset.jpThemeLight = 'true'")  # as JupyterLab sets its theme
     for page in pages:
         expect(page).to_have_attribute("data-mantine-color-scheme", "light")
 
 
-def test_a_robot_stands_where_it_was_put(notebook: Page) -> None:
-    notebook.set_viewport_size({"width": 240, "height": 240})  # the arm is drawn in software
+def test_a_robot_widget_shows_the_given_configuration(notebook: Page) -> None:
+    notebook.set_viewport_size({"width": 240, "height": 240})  # software rendering
     puma = ab.load_robot("puma560")
     q = [0.1, 0.4, -2.0, 0.3, 0.5, 0.0]
     (arm,) = show(notebook, ab.robot_widget(puma, q))
@@ -134,11 +134,11 @@ def test_a_robot_stands_where_it_was_put(notebook: Page) -> None:
     expect(arm.get_by_role("slider", name="Time")).to_have_count(0)
     canvas = arm.locator(".robot canvas")
     expect(canvas).to_be_visible()
-    # Journeys through the studio do not draw the arm (NOT_DRAWN); here it is drawn, in many shades.
+    # Journeys of the studio do not draw the arm (NOT_DRAWN); this test does, with many shades.
     wait_until(notebook, lambda: colours(canvas.screenshot()) > 500)
 
 
-def test_what_cannot_be_shown_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_widgets_that_cannot_be_shown_raise_errors_with_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     builder = ab.DiagramBuilder("bare")
     builder.add("sink", ab.blocks.Terminator(), builder.add("one", ab.blocks.Constant()))
     bare = builder.build()

@@ -1,4 +1,4 @@
-"""The page brings the licences of all that it contains."""
+"""The page contains the licences of all its packages."""
 
 import json
 import re
@@ -18,14 +18,14 @@ import notices  # noqa: E402
 ENTRY = re.compile(r"^-{80}\n(?P<name>\S+) [^ \n]+ \([^\n]+\)\n-{80}\n\n", re.MULTILINE)
 
 
-def test_every_package_of_the_page_is_noted_with_its_licence() -> None:
+def test_every_package_of_the_page_is_listed_with_its_licence() -> None:
     text = (WEB / notices.FILE).read_text(encoding="utf-8")
     entries = list(ENTRY.finditer(text))
     ends = [entry.start() for entry in entries[1:]] + [len(text)]
     noted = {entry["name"]: text[entry.end() : end] for entry, end in zip(entries, ends, strict=True)}
     wanted = json.loads((ROOT / "frontend" / "package.json").read_text(encoding="utf-8"))["dependencies"]
     assert noted.keys() >= wanted.keys()
-    # What comes along with these, and is not imported by the page's own sources.
+    # Dependencies of the imported packages.
     assert noted.keys() >= {
         "@xyflow/system",
         "d3-zoom",

@@ -1,4 +1,4 @@
-"""The page names the style sheets of the components it uses one by one: none may be forgotten."""
+"""The page imports the style sheet of each component that it uses."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ FRONTEND = Path(__file__).parents[2] / "frontend"
 STYLES = FRONTEND / "node_modules" / "@mantine" / "core" / "styles"
 
 
-def test_every_component_that_is_used_has_its_style_sheet() -> None:
+def test_every_used_component_has_its_style_sheet() -> None:
     used: set[str] = set()
     for source in (FRONTEND / "src").rglob("*.tsx"):
         for names in re.findall(

@@ -1,4 +1,4 @@
-"""The studio reads and writes below its folder only."""
+"""The studio reads and writes only below its folder."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_files_inside_are_listed_read_and_written(folder: ProjectFolder) -> None
     assert folder.exists("new/model.json")
 
 
-def test_a_file_that_somebody_else_has_written_is_noticed(folder: ProjectFolder) -> None:
+def test_a_file_written_by_another_program_is_detected(folder: ProjectFolder) -> None:
     known = folder.write("a.json", b"one")
     assert folder.compared("a.json", known) == ("same", known)
     path = folder.root / "a.json"
@@ -66,17 +66,19 @@ def test_a_file_that_somebody_else_has_written_is_noticed(folder: ProjectFolder)
         ("x" * 130 + ".json", "has 135 characters"),
     ],
 )
-def test_names_that_no_system_stores_are_refused(folder: ProjectFolder, name: str, words: str) -> None:
+def test_file_names_that_some_systems_cannot_store_are_refused(
+    folder: ProjectFolder, name: str, words: str
+) -> None:
     with pytest.raises(ArmblocksError, match=f"cannot be a file name: it .*{words}"):
         folder.write(name, b"{}")
 
 
-def test_a_folder_that_cannot_be_made_is_said(folder: ProjectFolder) -> None:
+def test_a_folder_that_cannot_be_created_raises_an_error(folder: ProjectFolder) -> None:
     with pytest.raises(ArmblocksError, match=r"the folder '.*inside.json' cannot be made"):
         folder.write("inside.json/a.json", b"{}")
 
 
-def test_what_a_killed_save_left_is_swept_away(folder: ProjectFolder) -> None:
+def test_partly_written_files_of_a_killed_save_are_removed(folder: ProjectFolder) -> None:
     old, fresh = folder.root / "arms" / ".a.json.0123456789ab.tmp", folder.root / ".b.json.0123456789ab.tmp"
     mine = folder.root / ".notes.tmp"
     for path in (old, fresh, mine):
@@ -103,19 +105,19 @@ def test_what_a_killed_save_left_is_swept_away(folder: ProjectFolder) -> None:
         ("inside.json/..", "lies outside of the project folder"),
     ],
 )
-def test_paths_that_lead_elsewhere_are_refused(folder: ProjectFolder, path: str, words: str) -> None:
+def test_paths_outside_the_project_are_refused(folder: ProjectFolder, path: str, words: str) -> None:
     with pytest.raises(ArmblocksError, match=words):
         folder.read(path)
     with pytest.raises(ArmblocksError):
         folder.write(path, b"{}")
 
 
-def test_scripts_are_read_and_never_written(folder: ProjectFolder) -> None:
+def test_scripts_can_be_read_but_not_written(folder: ProjectFolder) -> None:
     with pytest.raises(ArmblocksError, match=r"the studio does not open 'arms/arm\.m'"):
         folder.write("arms/arm.m", b"")
 
 
-def test_robots_are_shipped_ones_or_files_of_the_folder(folder: ProjectFolder) -> None:
+def test_robot_names_refer_to_shipped_robots_or_project_files(folder: ProjectFolder) -> None:
     assert folder.robot_path("puma560", ("puma560",)) == "puma560"
     assert folder.robot_path("arms/arm.m", ()) == str(folder.root / "arms" / "arm.m")
     with pytest.raises(ArmblocksError, match="there is no robot named 'pumma'"):
@@ -124,6 +126,6 @@ def test_robots_are_shipped_ones_or_files_of_the_folder(folder: ProjectFolder) -
         folder.robot_path("../outside.json", ())
 
 
-def test_a_folder_that_is_not_there_is_said(tmp_path: Path) -> None:
+def test_a_missing_project_folder_raises_an_error(tmp_path: Path) -> None:
     with pytest.raises(ArmblocksError, match="there is no such folder"):
         ProjectFolder(tmp_path / "nowhere")

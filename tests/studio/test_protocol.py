@@ -1,4 +1,4 @@
-"""Requests, their replies and what answers them: nothing of it is listed by hand."""
+"""Requests, reply types and handlers are found without hand-written lists."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from armblocks.studio.server.hub import Hub
 from armblocks.studio.sheet.edits import EDITS
 
 
-def test_every_request_is_answered_with_the_reply_that_it_declares(tmp_path: Path) -> None:
+def test_every_request_has_a_handler_of_its_reply_type(tmp_path: Path) -> None:
     handlers = Hub(ProjectFolder(tmp_path)).answers.handlers
     assert set(handlers) == set(messages_of(Request).values())
     replies = {request: get_type_hints(handler)["return"] for request, handler in handlers.items()}
@@ -29,14 +29,14 @@ def expected(request: type[Request[Any]]) -> Any:
     return type(None) if declared is None else declared
 
 
-def test_every_edit_is_carried_out_and_has_a_title() -> None:
+def test_every_edit_has_a_function_and_a_title() -> None:
     for table, edits in ((EDITS, DiagramEdit), (ROBOT_EDITS, RobotEdit)):
         assert set(table.entries) == set(messages_of(edits).values())
 
 
 def test_a_request_without_a_reply_type_is_refused() -> None:
     class Silent(Request):  # pyright: ignore[reportMissingTypeArgument]
-        """A request that does not say which value its reply has."""
+        """A request without a declared reply type."""
 
     with pytest.raises(TypeError, match="Silent does not declare the type of its reply"):
         reply_type(Silent)

@@ -46,7 +46,7 @@ def content(found: OpenDocument) -> bytes:
 
 
 def random_requests(seed: int, count: int) -> list[Any]:
-    """Edits of all kinds with undo and redo between them; some cannot be carried out, and are refused."""
+    """Edits of all kinds with undo and redo between them; invalid ones are refused."""
     random_ = random.Random(seed)
     requests: list[Any] = []
     for k in range(count):
@@ -78,7 +78,7 @@ def carry_out(documents: OpenDocuments, found: OpenDocument, requests: list[Any]
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_any_edits_come_back_with_their_past_and_future(disk: Disk, tmp_path: Path, seed: int) -> None:
+def test_recovered_edits_have_their_undo_and_redo_history(disk: Disk, tmp_path: Path, seed: int) -> None:
     async def talking() -> None:
         documents = disk.documents()
         found = documents.new()
@@ -92,7 +92,7 @@ def test_any_edits_come_back_with_their_past_and_future(disk: Disk, tmp_path: Pa
         assert back.document.version == found.document.version
         assert back.document.dirty == found.document.dirty
         assert back.path == found.path
-        while back.document.undo_title:  # as far back as the journal reaches
+        while back.document.undo_title:  # up to the start of the journal
             assert back.document.undo_title == found.document.undo_title
             back.document.undo()
             found.document.undo()
@@ -105,7 +105,7 @@ def test_any_edits_come_back_with_their_past_and_future(disk: Disk, tmp_path: Pa
     going(talking)
 
 
-def test_a_long_journal_is_read_from_its_last_snapshot(disk: Disk, tmp_path: Path) -> None:
+def test_a_long_journal_is_replayed_from_its_last_snapshot(disk: Disk, tmp_path: Path) -> None:
     async def talking() -> None:
         documents = disk.documents()
         found = documents.new()
@@ -126,7 +126,9 @@ def test_a_long_journal_is_read_from_its_last_snapshot(disk: Disk, tmp_path: Pat
     going(talking)
 
 
-def test_a_journal_torn_anywhere_gives_back_what_was_before(disk: Disk, tmp_path: Path) -> None:
+def test_a_journal_cut_anywhere_recovers_the_complete_edits_before_the_cut(
+    disk: Disk, tmp_path: Path
+) -> None:
     async def talking() -> None:
         documents = disk.documents()
         found = documents.new()
@@ -139,9 +141,9 @@ def test_a_journal_torn_anywhere_gives_back_what_was_before(disk: Disk, tmp_path
         ends = [0, *(k + 1 for k, byte in enumerate(whole) if byte == 10)]
         other = disk.as_after_a_crash(tmp_path / "second")
         copy = other.kept.journals / journal.name
-        for record in range(2, len(ends)):  # a head and a drawing are needed for anything
+        for record in range(2, len(ends)):  # recovery needs at least a head and a snapshot
             for cut in (ends[record] - 1, ends[record], ends[record] + 7):
-                copy.unlink()  # and with it the lock of the recovery before
+                copy.unlink()  # also removes the lock of the previous recovery
                 copy.write_bytes(whole[: min(cut, len(whole))])
                 waiting = other.documents()
                 done = record - 2 if cut >= ends[record] else record - 3
@@ -157,7 +159,7 @@ def test_a_journal_torn_anywhere_gives_back_what_was_before(disk: Disk, tmp_path
     going(talking)
 
 
-def test_an_edit_sent_again_after_the_crash_is_done_once(disk: Disk, tmp_path: Path) -> None:
+def test_an_edit_repeated_after_a_crash_is_applied_once(disk: Disk, tmp_path: Path) -> None:
     async def talking() -> None:
         documents = disk.documents()
         found = documents.new()
@@ -171,7 +173,7 @@ def test_an_edit_sent_again_after_the_crash_is_done_once(disk: Disk, tmp_path: P
     going(talking)
 
 
-def test_a_page_finds_its_document_again_after_the_server_was_started_anew(disk: Disk) -> None:
+def test_a_page_finds_its_document_after_a_server_restart(disk: Disk) -> None:
     async def talking() -> None:
         first = disk.documents()
         new = first.new()
@@ -193,7 +195,7 @@ def test_a_page_finds_its_document_again_after_the_server_was_started_anew(disk:
     going(talking)
 
 
-def test_a_file_newer_than_the_journal_is_kept_beside_what_was_drawn(disk: Disk, tmp_path: Path) -> None:
+def test_a_file_newer_than_the_journal_is_kept_beside_the_recovered_file(disk: Disk, tmp_path: Path) -> None:
     async def talking() -> None:
         documents = disk.documents()
         found = documents.new()
@@ -219,7 +221,7 @@ def test_a_file_newer_than_the_journal_is_kept_beside_what_was_drawn(disk: Disk,
     going(talking)
 
 
-def test_what_was_recovered_is_not_saved_over_a_newer_file(disk: Disk, tmp_path: Path) -> None:
+def test_a_recovered_diagram_does_not_overwrite_a_newer_file(disk: Disk, tmp_path: Path) -> None:
     async def talking() -> None:
         documents = disk.documents()
         found = documents.new()
@@ -237,7 +239,7 @@ def test_what_was_recovered_is_not_saved_over_a_newer_file(disk: Disk, tmp_path:
     going(talking)
 
 
-def test_a_recovery_is_discarded_only_when_told_so(disk: Disk, tmp_path: Path) -> None:
+def test_a_recovery_is_discarded_only_on_request(disk: Disk, tmp_path: Path) -> None:
     async def talking() -> None:
         documents = disk.documents()
         found = documents.new()
@@ -254,7 +256,7 @@ def test_a_recovery_is_discarded_only_when_told_so(disk: Disk, tmp_path: Path) -
     going(talking)
 
 
-def test_saved_drawings_leave_no_journal_behind(disk: Disk) -> None:
+def test_saved_diagrams_leave_no_journal(disk: Disk) -> None:
     async def talking() -> None:
         documents = disk.documents()
         found = documents.new()
@@ -270,7 +272,7 @@ def test_saved_drawings_leave_no_journal_behind(disk: Disk) -> None:
 
 
 @pytest.mark.filterwarnings("ignore::armblocks.errors.InertiaWarning")
-def test_a_robot_that_is_gone_is_said_and_the_journal_kept(disk: Disk, tmp_path: Path) -> None:
+def test_a_missing_robot_file_is_reported_and_the_journal_remains(disk: Disk, tmp_path: Path) -> None:
     async def talking() -> None:
         from armblocks.formats import write_robot
 
@@ -297,7 +299,7 @@ def test_a_robot_that_is_gone_is_said_and_the_journal_kept(disk: Disk, tmp_path:
     going(talking)
 
 
-def test_a_disk_that_refuses_the_journal_keeps_nobody_from_drawing(
+def test_a_disk_error_in_the_journal_does_not_prevent_edits(
     disk: Disk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def talking() -> None:
@@ -322,7 +324,7 @@ def test_a_disk_that_refuses_the_journal_keeps_nobody_from_drawing(
     going(talking)
 
 
-def test_pages_are_told_when_the_disk_does_not_take_the_journal(
+def test_pages_are_notified_of_a_disk_error_in_the_journal(
     disk: Disk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(open_files, "SYNC_SECONDS", 0.0)
@@ -354,7 +356,7 @@ def test_pages_are_told_when_the_disk_does_not_take_the_journal(
     going(talking)
 
 
-def test_a_disk_that_refuses_a_save_leaves_the_drawing_and_the_journal(
+def test_a_disk_error_in_a_save_leaves_the_diagram_and_the_journal(
     disk: Disk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def talking() -> None:
@@ -381,7 +383,7 @@ def test_a_disk_that_refuses_a_save_leaves_the_drawing_and_the_journal(
     going(talking)
 
 
-def test_a_journal_that_cannot_be_read_is_not_written_over(disk: Disk) -> None:
+def test_an_unreadable_journal_is_not_overwritten(disk: Disk) -> None:
     async def talking() -> None:
         key = "0123456789abcdef"
         disk.kept.journals.mkdir(parents=True)
@@ -396,7 +398,7 @@ def test_a_journal_that_cannot_be_read_is_not_written_over(disk: Disk) -> None:
     going(talking)
 
 
-def test_a_defect_in_the_middle_of_a_journal_leaves_what_was_before_it(
+def test_a_defect_during_replay_keeps_the_edits_before_it(
     disk: Disk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def talking() -> None:
@@ -421,7 +423,7 @@ def test_a_defect_in_the_middle_of_a_journal_leaves_what_was_before_it(
     going(talking)
 
 
-def test_a_file_that_is_deleted_or_renamed_is_told_and_what_it_held_is_kept(
+def test_a_deleted_or_renamed_file_is_reported_and_its_content_remains(
     disk: Disk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(open_files, "LOOK_SECONDS", 0.01)

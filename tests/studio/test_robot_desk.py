@@ -1,4 +1,4 @@
-"""Robots as documents: opened, dropped, changed, saved, read; and what every page is told."""
+"""Robots as documents: open, drop, edit, save, read-outs, and the notifications of all pages."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ PRINTED = Path(__file__).parents[1] / "formats" / "kr180_as_printed.m"
 
 
 class Talk:
-    """A hub and a page that talks to it."""
+    """A hub and a connected page."""
 
     def __init__(self, folder: Path) -> None:
         self.told: list[dict[str, Any]] = []
@@ -39,7 +39,7 @@ class Talk:
             told.append(json.loads(text))
 
         async def hear_bytes(data: bytes) -> None:
-            raise AssertionError("no run was asked for")
+            raise AssertionError("samples arrived without a run")
 
         return Page(hear, hear_bytes)
 
@@ -60,7 +60,7 @@ class Talk:
         return f"{fault['where']}: {fault['what']}"
 
     def shown(self) -> dict[str, Any]:
-        """What the page shows of a robot: where it stands, and its latest content."""
+        """The content and state that the page shows of a robot."""
         events = [event for event in self.told if event.get("state", {}).get("kind") == "robot"]
         contents = [event.get("content") or (event.get("change") or {}).get("content") for event in events]
         return {**next(content for content in reversed(contents) if content), **events[-1]["state"]}
@@ -84,7 +84,7 @@ def cell(link: str, column: str, text: str) -> dict[str, str]:
     return {"kind": "cell", "link": link, "column": column, "text": text, "angles": "deg"}
 
 
-def test_the_paper_s_script_is_dropped_edited_undone_saved_and_opened_again(tmp_path: Path) -> None:
+def test_the_script_of_the_paper_is_dropped_edited_undone_saved_and_reopened(tmp_path: Path) -> None:
     async def talking(talk: Talk) -> None:
         (key,) = await talk.ask("drop", name="kr180.m", content=packed(PRINTED.read_bytes()))
         opened = next(event for event in talk.told if event["kind"] == "opened")
@@ -99,19 +99,19 @@ def test_the_paper_s_script_is_dropped_edited_undone_saved_and_opened_again(tmp_
                 "change", document=key, key=str(number), gesture="g", edit=cell("link2", "d", text)
             )
         await talk.ask("change", document=key, key="2", gesture="g", edit=cell("link2", "d", "9"))
-        assert talk.shown()["links"][1]["cells"]["d"] == 1.5  # what has the key of another is not done again
+        assert talk.shown()["links"][1]["cells"]["d"] == 1.5  # a request with a repeated key is not applied
         assert "the cell is empty" in await talk.refused(
             "change", document=key, key="x", edit=cell("link2", "d", "")
         )
         await talk.ask("undo", document=key)
-        assert talk.shown()["links"][1]["cells"]["d"] == 1.25  # the letters were one step
+        assert talk.shown()["links"][1]["cells"]["d"] == 1.25  # the typed letters are one step
         await talk.ask("redo", document=key)
         assert "no file yet" in await talk.refused("save", document=key)
         assert "studio does not open" in await talk.refused("save", document=key, path="x.txt")
         await talk.ask("save", document=key, path="arms/mine.json")
         assert not talk.shown()["dirty"]
         again = await talk.ask("open", path="arms/mine.json")
-        assert again == [key]  # open already
+        assert again == [key]  # already open
         (tmp_path / "arms" / "mine.json").write_bytes(write_robot(load_robot("puma560")))
         assert "changed on the disk" in await talk.refused("save", document=key)
         await talk.ask("save", document=key, overwrite=True)
@@ -127,7 +127,7 @@ def test_the_paper_s_script_is_dropped_edited_undone_saved_and_opened_again(tmp_
     assert saved.links[2:] == printed.links[2:]
 
 
-def test_what_is_dropped_is_bounded_and_named_where_it_is_not_understood(tmp_path: Path) -> None:
+def test_dropped_files_are_bounded_and_errors_name_the_file(tmp_path: Path) -> None:
     async def talking(talk: Talk) -> None:
         for name in ("arm.exe", "noname", "run.py"):
             assert "is not a file type" in await talk.refused("drop", name=name, content="")
@@ -152,7 +152,7 @@ def test_what_is_dropped_is_bounded_and_named_where_it_is_not_understood(tmp_pat
     talk(tmp_path, talking)
 
 
-def test_diagrams_take_the_new_form_of_a_robot_file_when_it_is_saved(tmp_path: Path) -> None:
+def test_saving_a_robot_file_updates_the_diagrams_that_use_it(tmp_path: Path) -> None:
     (tmp_path / "arms").mkdir()
     ab.save_robot(load_robot("puma560"), tmp_path / "arms" / "mine.json")
 
@@ -180,7 +180,7 @@ def test_diagrams_take_the_new_form_of_a_robot_file_when_it_is_saved(tmp_path: P
     talk(tmp_path, talking)
 
 
-def test_two_pages_see_each_other_s_edits(tmp_path: Path) -> None:
+def test_two_pages_show_each_other_s_edits(tmp_path: Path) -> None:
     async def talking(talk: Talk) -> None:
         key = await talk.ask("open_shipped", document_kind="robot", name="puma560")
         assert talk.shown()["origin"] == "puma560"
@@ -218,7 +218,7 @@ def test_two_pages_see_each_other_s_edits(tmp_path: Path) -> None:
     talk(tmp_path, talking)
 
 
-def test_readings_are_those_of_the_arm(tmp_path: Path) -> None:
+def test_read_outs_equal_the_values_of_the_arm(tmp_path: Path) -> None:
     arm = ab.load_robot("puma560")
     q, qd, qdd = [0.1, 0.4, -0.3, 0.5, 0.7, 0.2], [0.5] * 6, [1.0] * 6
 
@@ -243,7 +243,7 @@ def test_readings_are_those_of_the_arm(tmp_path: Path) -> None:
     talk(tmp_path, talking)
 
 
-def test_singularities_are_told_in_words() -> None:
+def test_singularities_are_described_in_words() -> None:
     puma = ab.load_robot("puma560")
     names = puma.robot.joint_names
     wrist = readings(puma, [0.1, 0.4, -0.3, 0.5, 0.0, 0.2], [0.0] * 6, [0.0] * 6)
@@ -261,7 +261,7 @@ def test_singularities_are_told_in_words() -> None:
     assert "link1 exceeds its speed limit" in readings(kuka, [0.0] * 4, [9.0] * 4, [0.0] * 4).limits
 
 
-def test_files_of_robots_are_told_from_diagrams_and_bounded() -> None:
+def test_file_kinds_are_recognised_and_file_sizes_are_bounded() -> None:
     assert kind_of_data(write_robot(load_robot("kr180")), "arm.json") is DocumentKind.ROBOT
     assert kind_of_data(b"% a script", "arm.m") is DocumentKind.ROBOT
     assert kind_of_data(b'{"blocks": {}, "links": []}', "model.json") is DocumentKind.DIAGRAM

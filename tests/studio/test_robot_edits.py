@@ -56,11 +56,11 @@ def typed(robot: Robot, link: str, column: str, text: str, angles: str = "deg") 
         ("90*deg - 1 rad", "deg", 90 * (math.pi / 180) - 1),
     ],
 )
-def test_angles_are_read_in_degrees_or_in_the_unit_given(text: str, unit: Any, rad: float) -> None:
+def test_angles_are_read_in_the_column_unit_or_in_their_own_unit(text: str, unit: Any, rad: float) -> None:
     assert angle_value(text, "here", unit) == rad
 
 
-def test_the_paper_s_tables_can_be_typed_in() -> None:
+def test_the_tables_of_the_paper_can_be_typed_in() -> None:
     """From a new robot to the arm of the paper, cell by cell, with the texts of its script."""
     wanted = load_robot("kr180")
     robot = KIND.new()
@@ -90,7 +90,7 @@ def test_the_paper_s_tables_can_be_typed_in() -> None:
 
 
 @pytest.mark.parametrize("name", list_robots())
-def test_every_cell_takes_its_own_value_back(name: str) -> None:
+def test_typing_the_value_of_a_cell_changes_nothing(name: str) -> None:
     robot = load_robot(name)
     for link in robot.links:
         for column in LINK_COLUMNS.values():
@@ -151,7 +151,7 @@ def test_invalid_values_are_refused_with_their_cell(link: str, column: str, text
         typed(robot, link, column, text)
 
 
-def test_joints_are_added_taken_out_moved_and_renamed() -> None:
+def test_joints_are_added_removed_moved_and_renamed() -> None:
     robot = load_robot("puma560")
     names = [link.name for link in robot.links]
     more = edited(robot, "add_joint", after=names[2])
@@ -177,7 +177,7 @@ def test_joints_are_added_taken_out_moved_and_renamed() -> None:
     assert edited(tree, "add_joint", after="").links[1].parent is None
 
 
-def test_a_joint_made_prismatic_loses_its_angles() -> None:
+def test_a_joint_changed_to_prismatic_loses_its_angular_limits() -> None:
     robot = load_robot("puma560")
     name = robot.links[1].name
     slid = typed(robot, name, "joint", "prismatic").link(name)
@@ -186,7 +186,7 @@ def test_a_joint_made_prismatic_loses_its_angles() -> None:
     assert typed(robot, name, "joint", "revolute") == robot
 
 
-def test_cells_show_that_a_link_is_placed_by_a_transform() -> None:
+def test_dh_cells_are_locked_for_a_link_placed_by_a_transform() -> None:
     robot = replace(KIND.new(), links=(Link(name="plain"), Link(name="next", parent="plain")))
     shown = robot_content(robot)
     assert "not by a D-H row" in shown.links[0].locked["alpha"]
@@ -211,7 +211,7 @@ def test_non_physical_values_are_marked_at_their_cells() -> None:
     assert "Nothing resists" in robot_content(bare).findings[0].what
 
 
-def test_every_column_is_declared_for_the_page() -> None:
+def test_every_column_is_sent_to_the_page() -> None:
     tables = robot_tables()
     names = [column.name for column in (*tables.kinematics, *tables.dynamics)]
     assert names == list(LINK_COLUMNS)
@@ -253,7 +253,7 @@ EDITS = st.one_of(
 @settings(max_examples=60, deadline=None)
 @given(st.lists(EDITS, max_size=12))
 @pytest.mark.filterwarnings("ignore:.*friction accelerates")
-def test_any_sequence_of_edits_undone_gives_the_same_file(edits: list[dict[str, Any]]) -> None:
+def test_undoing_any_sequence_of_edits_restores_the_file(edits: list[dict[str, Any]]) -> None:
     history = History(load_robot("kr180"))
     before, forms = write_robot(history.value), [write_robot(history.value)]
     for one in edits:
@@ -277,7 +277,7 @@ def test_any_sequence_of_edits_undone_gives_the_same_file(edits: list[dict[str, 
         assert write_robot(history.value) == form
 
 
-def test_letters_of_one_gesture_are_one_step() -> None:
+def test_changes_of_one_gesture_are_one_undo_step() -> None:
     history = History(1)
     for value, gesture in ((2, "a"), (3, "a"), (4, "b"), (5, ""), (6, "")):
         history.replace("typing", value, gesture)
@@ -288,12 +288,12 @@ def test_letters_of_one_gesture_are_one_step() -> None:
         history.undo()
     history.redo()
     assert (history.value, history.version) == (3, 10)
-    history.replace("typing", 7, "a")  # after a redo a new gesture begins, even with the same name
+    history.replace("typing", 7, "a")  # after a redo a new step begins, even for the same gesture
     history.undo()
     assert history.value == 3
 
 
-def test_the_tables_ask_about_units() -> None:
+def test_the_tables_show_plausibility_warnings() -> None:
     upward = replace(load_robot("planar3r"), gravity=(0.0, 0.0, 9.81))
     (found,) = robot_content(upward).findings
     assert found.link == upward.name

@@ -1,4 +1,4 @@
-"""What people do with robots in the studio, in a real browser against a real server."""
+"""Robot workflows of the studio in a real browser against a real server."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ def folder(studio: Studio) -> Path:
 
 @pytest.fixture(scope="module")
 def page(open_studio: Callable[[str], Page]) -> Page:
-    """One page for all: each test leaves it with a diagram on the screen. It begins without an arm."""
+    """One page for all tests; each test leaves it with a diagram without an arm."""
     return open_studio("van_der_pol_pid")
 
 
 def drop(page: Page, name: str, content: bytes) -> None:
-    """Drop a file on the page, as a desktop does."""
+    """Drop a file on the page, as from the desktop."""
     page.evaluate(DROP, [name, base64.b64encode(content).decode()])
 
 
@@ -55,7 +55,7 @@ def open_shipped(page: Page, name: str) -> Locator:
     return editor
 
 
-def test_a_robot_is_typed_marked_undone_saved_and_opened_again(page: Page, folder: Path) -> None:
+def test_a_robot_is_edited_marked_undone_saved_and_reopened(page: Page, folder: Path) -> None:
     editor = open_shipped(page, "puma560")
     expect(tool_x(editor)).to_have_text("0.4521 m")
     cell = editor.get_by_role("textbox", name="a of link2", exact=True)
@@ -64,14 +64,14 @@ def test_a_robot_is_typed_marked_undone_saved_and_opened_again(page: Page, folde
     cell.fill("half a metre")
     expect(cell).to_have_attribute("aria-invalid", "true")
     expect(page.get_by_role("tooltip")).to_contain_text("is not a formula")
-    expect(tool_x(editor)).to_have_text("0.5521 m")  # what is wrong changes nothing
+    expect(tool_x(editor)).to_have_text("0.5521 m")  # an invalid text changes nothing
     cell.fill("1/2")
     expect(cell).to_have_attribute("aria-invalid", "false")
     cell.press("Enter")
     expect(editor.get_by_role("textbox", name="a of link3", exact=True)).to_be_focused()
     expect(cell).to_have_value("0.5")
     page.keyboard.press("Control+z")
-    expect(cell).to_have_value("0.4318")  # all that was typed into the cell is one step
+    expect(cell).to_have_value("0.4318")  # the typed text is one step
     page.keyboard.press("Control+y")
     expect(cell).to_have_value("0.5")
 
@@ -108,7 +108,7 @@ def test_a_robot_is_typed_marked_undone_saved_and_opened_again(page: Page, folde
     expect(page.locator(".react-flow__node").first).to_be_visible()
 
 
-def test_the_paper_s_script_is_dropped_looked_at_and_pictured(page: Page) -> None:
+def test_the_script_of_the_paper_is_dropped_viewed_and_exported(page: Page) -> None:
     drop(page, "kr180.m", PRINTED.read_bytes())
     editor = page.locator(".robot-editor")
     expect(editor.get_by_role("textbox", name="d of link4", exact=True)).to_have_value("2.6")
@@ -146,7 +146,7 @@ def test_the_paper_s_script_is_dropped_looked_at_and_pictured(page: Page) -> Non
     expect(page.locator(".react-flow__node").first).to_be_visible()
 
 
-def test_the_robot_of_a_block_is_edited_and_axe_finds_nothing_serious(page: Page) -> None:
+def test_the_robot_of_a_block_is_edited_and_axe_finds_no_violations(page: Page) -> None:
     page.get_by_role("button", name="Menu").click()
     page.get_by_role("menuitem", name=re.compile("^kr180model (?!not saved)[a-z]")).click()
     panel = page.get_by_role("toolbar", name="Robot view")

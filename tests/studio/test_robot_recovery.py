@@ -1,4 +1,4 @@
-"""What was typed into a robot comes back after a crash, as what was drawn does: one journal serves both."""
+"""Recovery of robot edits after a crash, with the same journal as for diagrams."""
 
 from __future__ import annotations
 
@@ -53,12 +53,14 @@ JOURNAL_OF_0_2: list[tuple[dict[str, Any], say.Alteration]] = [
 
 
 @pytest.mark.parametrize(("written", "meant"), JOURNAL_OF_0_2)
-def test_journals_of_version_0_2_0_are_understood(written: dict[str, Any], meant: say.Alteration) -> None:
+def test_journaled_requests_of_version_0_2_0_are_converted(
+    written: dict[str, Any], meant: say.Alteration
+) -> None:
     assert type(meant).model_validate({**as_of_today(written), "document": ""}) == meant
 
 
 def requests(seed: int, count: int) -> list[Any]:
-    """Letters typed into cells, a few to a cell, with undo and redo between them."""
+    """Letters typed into cells, several to a cell, with undo and redo between them."""
     random_ = random.Random(seed)
     made: list[Any] = []
     while len(made) < count:
@@ -81,10 +83,12 @@ def carry_out(robots: OpenRobots, found: OpenRobot, asked: list[Any]) -> None:
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_any_robot_edits_come_back_with_their_past_and_future(
+def test_recovered_robot_edits_have_their_undo_and_redo_history(
     disk: Disk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seed: int
 ) -> None:
-    monkeypatch.setattr(open_files, "SNAPSHOT_EVERY", 25)  # some fall among the letters of one cell
+    monkeypatch.setattr(
+        open_files, "SNAPSHOT_EVERY", 25
+    )  # some snapshots fall between the letters of one cell
 
     async def talking() -> None:
         robots = disk.robots()
@@ -100,7 +104,7 @@ def test_any_robot_edits_come_back_with_their_past_and_future(
         assert back.document.version == found.document.version
         assert back.document.dirty == found.document.dirty
         assert (back.path, back.origin) == (found.path, found.origin)
-        while back.document.undo_title:  # as far back as the journal reaches
+        while back.document.undo_title:  # up to the start of the journal
             assert back.document.undo_title == found.document.undo_title
             back.document.undo()
             found.document.undo()
@@ -113,7 +117,7 @@ def test_any_robot_edits_come_back_with_their_past_and_future(
     going(talking)
 
 
-def test_a_snapshot_among_the_letters_of_a_cell_does_not_part_the_step(
+def test_a_snapshot_within_a_gesture_does_not_split_its_undo_step(
     disk: Disk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(open_files, "SNAPSHOT_EVERY", 2)
@@ -134,7 +138,7 @@ def test_a_snapshot_among_the_letters_of_a_cell_does_not_part_the_step(
     going(talking)
 
 
-def test_unsaved_robots_are_offered_and_never_put_over_a_newer_file(disk: Disk, tmp_path: Path) -> None:
+def test_unsaved_robots_are_offered_and_do_not_overwrite_a_newer_file(disk: Disk, tmp_path: Path) -> None:
     async def talking() -> None:
         robots = disk.robots()
         found = robots.open_shipped("puma560")
@@ -167,7 +171,7 @@ def test_unsaved_robots_are_offered_and_never_put_over_a_newer_file(disk: Disk, 
     going(talking)
 
 
-def test_a_robot_sent_again_after_the_crash_is_changed_once(disk: Disk, tmp_path: Path) -> None:
+def test_a_robot_edit_repeated_after_a_crash_is_applied_once(disk: Disk, tmp_path: Path) -> None:
     async def talking() -> None:
         robots = disk.robots()
         found = robots.new()
@@ -184,7 +188,7 @@ def test_a_robot_sent_again_after_the_crash_is_changed_once(disk: Disk, tmp_path
     going(talking)
 
 
-def test_a_page_finds_its_robot_again_after_the_server_was_started_anew(disk: Disk) -> None:
+def test_a_page_finds_its_robot_after_a_server_restart(disk: Disk) -> None:
     async def talking() -> None:
         first = disk.robots()
         made = first.new()
@@ -201,7 +205,7 @@ def test_a_page_finds_its_robot_again_after_the_server_was_started_anew(disk: Di
     going(talking)
 
 
-def test_what_was_dropped_is_in_the_journal_before_it_is_edited(disk: Disk, tmp_path: Path) -> None:
+def test_a_dropped_robot_is_journaled_before_its_first_edit(disk: Disk, tmp_path: Path) -> None:
     async def talking() -> None:
         robots = disk.robots()
         found = robots.bring(load_robot("kr180"))
@@ -214,7 +218,7 @@ def test_what_was_dropped_is_in_the_journal_before_it_is_edited(disk: Disk, tmp_
     going(talking)
 
 
-def test_a_robot_file_that_changed_on_the_disk_is_reloaded_as_a_step(disk: Disk, tmp_path: Path) -> None:
+def test_reloading_a_changed_robot_file_is_one_undo_step(disk: Disk, tmp_path: Path) -> None:
     async def talking() -> None:
         robots = disk.robots()
         found = robots.new()
@@ -227,7 +231,7 @@ def test_a_robot_file_that_changed_on_the_disk_is_reloaded_as_a_step(disk: Disk,
         with pytest.raises(FormatError, match="the file has changed on the disk since it was opened"):
             await robots.save(found, "", overwrite=False)
         assert found.state().disk == "changed"
-        for _ in range(2):  # asked again after a broken line, it is done once
+        for _ in range(2):  # a repeated request is applied once
             robots.reload(found, "reload")
         assert found.robot == load_robot("kr180")
         assert not found.document.dirty
@@ -238,7 +242,7 @@ def test_a_robot_file_that_changed_on_the_disk_is_reloaded_as_a_step(disk: Disk,
     going(talking)
 
 
-def test_two_pages_do_not_overwrite_each_other_s_cells(disk: Disk) -> None:
+def test_a_page_does_not_overwrite_a_cell_changed_by_another_page(disk: Disk) -> None:
     async def talking() -> None:
         robots = disk.robots()
         found = robots.open_shipped("puma560")
@@ -252,6 +256,6 @@ def test_two_pages_do_not_overwrite_each_other_s_cells(disk: Disk) -> None:
                 robots.perform(found, late)
         assert found.robot.links[0].dh is not None
         assert (found.robot.links[0].dh.a, found.robot.links[0].dh.d) == (2, 3)
-        robots.perform(found, cell("5", "link1", "a", "4", author="me", base=2))  # having seen it
+        robots.perform(found, cell("5", "link1", "a", "4", author="me", base=2))  # after seeing the change
 
     going(talking)

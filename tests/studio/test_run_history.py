@@ -25,7 +25,7 @@ from armblocks.studio.runs.workers import Worker
     "name",
     ["bouncing_ball", "dc_motor_sampled_pid", "falling_pendulum", "kr180model", "puma560_payload_drop"],
 )
-def test_going_back_changes_nothing_of_what_follows(name: str) -> None:
+def test_a_run_continued_after_going_back_equals_the_original_run(name: str) -> None:
     model = CompiledDiagram(load_diagram(name, BLOCKS))
     whole = model.simulate()
     history = RunHistory(model)
@@ -35,7 +35,7 @@ def test_going_back_changes_nothing_of_what_follows(name: str) -> None:
         history.step()
     before = history.recorded
     history.back_to(before - 1)
-    assert before - 20 < history.recorded < before, "one step back is one step of the solver at most"
+    assert before - 20 < history.recorded < before, "one step back is at most one step of the solver"
     history.back_to(before // 2)
     kept = history.recorded
     assert 0.8 * before // 2 < kept <= before // 2
@@ -46,7 +46,9 @@ def test_going_back_changes_nothing_of_what_follows(name: str) -> None:
     np.testing.assert_array_equal(rest.signals, whole.signals[:, kept:])
 
 
-def test_marks_stay_few_and_every_instant_can_still_be_reached(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_instant_is_reachable_with_a_bounded_number_of_checkpoints(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr("armblocks.studio.runs.history.MOST_BYTES", 20_000)
     history = RunHistory(CompiledDiagram(load_diagram("falling_pendulum", BLOCKS)))
     for _ in range(200):
@@ -58,7 +60,7 @@ def test_marks_stay_few_and_every_instant_can_still_be_reached(monkeypatch: pyte
         assert wanted - 5 < history.recorded <= wanted
 
 
-def test_tuned_values_hold_from_where_the_run_returns_to() -> None:
+def test_tuned_values_apply_from_the_instant_of_return() -> None:
     model = CompiledDiagram(load_diagram("van_der_pol_pid", BLOCKS))
     history = RunHistory(model)
     history.run.advance(2.0)
@@ -76,7 +78,7 @@ def test_tuned_values_hold_from_where_the_run_returns_to() -> None:
     np.testing.assert_allclose(history.samples(count).signals, other.signals[:, 1:], rtol=1e-9, atol=1e-12)
 
 
-def test_what_can_be_tuned_is_listed_with_its_bounds() -> None:
+def test_tunable_parameters_are_listed_with_their_bounds() -> None:
     found = {tunable.path: tunable for tunable in tunables(load_diagram("van_der_pol_pid", BLOCKS))}
     assert "PID.P" in found
     block = load_diagram("van_der_pol_pid", BLOCKS).block("PID")
@@ -85,7 +87,7 @@ def test_what_can_be_tuned_is_listed_with_its_bounds() -> None:
 
 
 class Listener:
-    """Everything that a run tells, with the samples of its frames put where they belong."""
+    """Collects the messages of a run, and the samples of its frames by their index."""
 
     def __init__(self) -> None:
         self.events: list[Any] = []
@@ -95,7 +97,7 @@ class Listener:
     async def tell(self, event: say.Message | bytes) -> None:
         if isinstance(event, bytes):
             header, time, _ = read_frame(event)
-            assert header["first"] == len(self.times), "no sample is lost and none comes twice"
+            assert header["first"] == len(self.times), "no sample is lost or repeated"
             self.times += time.tolist()
         else:
             self.events.append(event)
@@ -118,16 +120,14 @@ class Listener:
             raise AssertionError(f"no such {kind} among {self.events}") from None
 
 
-def test_a_run_is_tuned_taken_back_and_finished_in_its_own_process() -> None:
+def test_a_run_in_a_process_is_tuned_rewound_and_finished() -> None:
     async def going() -> None:
         heard = Listener()
         run = RunProcess("r", "d", Worker(), heard.tell)
         source = diagram_to_bytes(load_diagram("van_der_pol_pid", BLOCKS), load_robot).decode()
         run.start({"diagram": source, "folder": ".", "speed": 5.0, "tuned": {"PID.I": "1/2"}})
         begun = await heard.until(say.RunStarted)
-        assert {t.path: t.value for t in begun.tunables}["PID.I"] == 0.5, (
-            "what is tried counts from the start"
-        )
+        assert {t.path: t.value for t in begun.tunables}["PID.I"] == 0.5, "trial values apply from the start"
         while len(heard.times) < 100:
             await asyncio.sleep(0.02)
         run.obey(say.Control(run="r", action="pause"))

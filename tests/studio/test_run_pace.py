@@ -1,4 +1,4 @@
-"""A run that is shown as fast as the clock says: never ahead of it, and never short of a sample."""
+"""A run with a real-time factor is never ahead of the clock and sends all samples."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from armblocks.studio.runs.pace import Pace
 
 
 class Clock:
-    """A clock that goes on when somebody waits."""
+    """A clock that advances only while the worker waits."""
 
     def __init__(self) -> None:
         self.now = 100.0
@@ -28,7 +28,7 @@ class Clock:
         return self.now
 
 
-def test_what_is_due_follows_the_clock_from_where_it_was_counted() -> None:
+def test_due_time_follows_the_clock_from_its_reference() -> None:
     clock = Clock()
     pace = Pace(0.5, clock)
     assert pace.due == 0.0
@@ -43,7 +43,7 @@ def test_what_is_due_follows_the_clock_from_where_it_was_counted() -> None:
 
 
 class Pipe:
-    """A page that says something at certain simulated times, as the clock shows them; waiting takes time."""
+    """A page that sends commands at given displayed times; waiting advances the clock."""
 
     def __init__(self, clock: Clock, speed: float, commands: list[tuple[float, say.Message]]) -> None:
         self.clock = clock
@@ -56,7 +56,7 @@ class Pipe:
     def send_bytes(self, data: bytes) -> None:
         if data[:1] == b"S":
             header, time, signals = read_frame(data[1:])
-            assert header["first"] == len(self.times), "none is lost and none comes twice"
+            assert header["first"] == len(self.times), "no sample is lost or repeated"
             assert self.speed == math.inf or time[-1] <= self.speed * (self.clock.now - 100.0) + 1e-12
             self.times += time.tolist()
             self.values += signals[-1].tolist()
@@ -77,7 +77,7 @@ class Pipe:
 
 
 def lag() -> ab.Diagram:
-    """A unit step through a lag of 1 s: the solver steps much further than what is due in a frame."""
+    """A unit step through a lag of 1 s: a solver step is much longer than a frame."""
     builder = ab.DiagramBuilder(
         "lag", settings=ab.SimulationOptions(stop_time=20.0, rtol=1e-9, atol=1e-12, sample_time=0.01)
     )
@@ -112,7 +112,7 @@ def test_a_slow_run_is_never_ahead_of_the_clock(
     np.testing.assert_array_equal(pipe.values, whole["lag/y"])
 
 
-def test_what_is_tuned_counts_from_the_instant_that_is_shown(
+def test_a_tuned_value_applies_from_the_displayed_instant(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     tune = say.Tune(run="r", parameter="gain.gain", value=2.0)

@@ -1,4 +1,4 @@
-"""A model that cannot run is refused by its worker in the words in which its file would be."""
+"""A worker refuses an invalid model with the same error as opening its file."""
 
 from __future__ import annotations
 
@@ -30,7 +30,9 @@ def widths() -> Diagram:
 
 
 @pytest.mark.parametrize("made", [open_input, widths])
-def test_what_cannot_run_is_refused_as_its_file_is(made: Callable[[], Diagram], tmp_path: Path) -> None:
+def test_a_worker_and_a_file_give_the_same_error_for_an_invalid_model(
+    made: Callable[[], Diagram], tmp_path: Path
+) -> None:
     source = diagram_to_bytes(made(), load_robot)
     with pytest.raises(ArmblocksError) as of_file:
         diagram_from_bytes(source, "model", BLOCKS, load_robot)

@@ -1,4 +1,4 @@
-"""What the studio says where the process that writes a report has failed."""
+"""Errors of the studio when the process that writes a report fails."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ WAY_OUT = "shorten the run, or use 'armblocks run'"
     ("sent", "what"),
     [(b"", "the report exceeded its time or memory limit"), (b"Eno room", "no room")],
 )
-def test_a_report_that_failed_says_why_and_what_to_do(sent: bytes, what: str) -> None:
+def test_a_failed_report_raises_an_error_with_reason_and_remedy(sent: bytes, what: str) -> None:
     ours, theirs = Pipe(duplex=False)
     if sent:
         theirs.send_bytes(sent)

@@ -1,4 +1,4 @@
-"""Configuration parameters: what may be typed, and what is said of the rest."""
+"""Configuration parameters: accepted texts, and errors of invalid ones."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from armblocks.studio.runs.settings import setting_rules, solver_choices
 from armblocks.studio.sheet.typed_settings import setting_faults, with_settings
 
 
-def test_every_option_of_a_run_has_its_field() -> None:
+def test_every_run_option_has_a_field() -> None:
     names = {field.name for field in dataclasses.fields(SimulationOptions)}
     assert {rule.name for rule in setting_rules()} == names
     assert all(rule.doc for rule in setting_rules())
@@ -20,7 +20,7 @@ def test_every_option_of_a_run_has_its_field() -> None:
     assert {choice.name for choice in solver_choices() if choice.stiff} >= {"rodas5p", "ros5"}
 
 
-def test_formulas_of_numbers_are_read_and_empty_leaves_the_choice() -> None:
+def test_numeric_formulas_are_evaluated_and_empty_fields_select_the_default() -> None:
     options = with_settings(
         SimulationOptions(step=0.5), {"stop_time": "2*pi", "rtol": "1/1000", "step": None}
     )
@@ -40,7 +40,9 @@ def test_formulas_of_numbers_are_read_and_empty_leaves_the_choice() -> None:
         ({"max_step": "0"}, "max_step", "a time in s above 0"),
     ],
 )
-def test_what_is_wrong_is_said_at_its_field(values: dict[str, str], name: str, words: str) -> None:
+def test_an_invalid_setting_gives_an_error_at_its_field(
+    values: dict[str, str], name: str, words: str
+) -> None:
     faults = setting_faults(SimulationOptions(), values)
     assert list(faults) == [name]
     assert words in faults[name]

@@ -1,4 +1,4 @@
-"""What people do with the sheet itself: lead wires, turn blocks, write notes, find, command, export."""
+"""Editing a sheet in the browser: routing wires, rotating blocks, notes, search, commands, export."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def shared(open_studio: Callable[[str], Page]) -> Page:
 
 @pytest.fixture
 def sheet(shared: Page) -> Iterator[Page]:
-    """The page of the studio that this file shares, showing a fresh copy of an example."""
+    """The page shared by this file, with a fresh copy of an example."""
     page = shared
     page.keyboard.press("Escape")
     menu(page, re.compile("^van_der_pol_pid a van der Pol"))
@@ -54,7 +54,7 @@ def edge(page: Page, wire: str) -> Locator:
 
 
 def middle(found: Locator) -> tuple[float, float]:
-    """Where an element is, once it is drawn: the sheet draws lines anew after its blocks."""
+    """The centre of an element after it is drawn; wires are drawn after their blocks."""
     box = None
 
     def drawn() -> bool:
@@ -78,7 +78,7 @@ def way(page: Page, wire: str) -> str | None:
     return edge(page, wire).locator("path.line").first.get_attribute("d")
 
 
-def test_a_wire_is_led_by_hand_follows_its_block_and_finds_its_own_way_again(sheet: Page) -> None:
+def test_a_user_drawn_route_follows_its_block_and_can_be_reset(sheet: Page) -> None:
     wire = "PID/y -> u/u1"
     before = way(sheet, wire)
     x, y = middle(edge(sheet, wire).locator(".piece").first)
@@ -102,7 +102,7 @@ def test_a_wire_is_led_by_hand_follows_its_block_and_finds_its_own_way_again(she
     expect(line).to_have_attribute("d", before or "")
 
 
-def test_a_block_that_is_dropped_on_a_wire_goes_into_it(sheet: Page) -> None:
+def test_a_block_dropped_on_a_wire_is_inserted_into_it(sheet: Page) -> None:
     wires = sheet.locator(".react-flow__edge")
     count = wires.count()
     sheet.get_by_role("textbox", name="Search the library").fill("Saturation")
@@ -122,7 +122,7 @@ def test_a_block_that_is_dropped_on_a_wire_goes_into_it(sheet: Page) -> None:
 
 
 def drag(page: Page, name: str, x: float, y: float, key: str = "") -> None:
-    """Drag a block by the mouse until its middle lies at a point, with a key held if one is named."""
+    """Drag a block until its centre is at a point, with a key held if one is given."""
     left, top = middle(block(page, name).locator(".block"))
     page.mouse.move(left, top)
     if key:
@@ -135,7 +135,7 @@ def drag(page: Page, name: str, x: float, y: float, key: str = "") -> None:
         page.keyboard.up(key)
 
 
-def test_a_block_is_taken_out_of_its_wire_and_put_into_another(sheet: Page) -> None:
+def test_a_block_is_disconnected_from_a_wire_and_inserted_into_another(sheet: Page) -> None:
     wires = sheet.locator(".react-flow__edge")
     count = wires.count()
     x, y = middle(block(sheet, "damping").locator(".block"))
@@ -151,7 +151,7 @@ def test_a_block_is_taken_out_of_its_wire_and_put_into_another(sheet: Page) -> N
     left, right = (block(sheet, "damping").locator(f'[data-handleid="{port}"]') for port in "uy")
     expect(edge(sheet, "damping/y -> x1/u").locator("path.line").first).to_have_attribute(
         "d", re.compile(r"^M[\d.]+ [\d.]+L[\d.]+ [\d.]+$")
-    )  # turned round, it lets the wire run straight through
+    )  # the block is mirrored, so that the wire is straight
     assert middle(left) < middle(right)
     sheet.keyboard.press("Control+z")
     sheet.keyboard.press("Control+z")
@@ -159,7 +159,7 @@ def test_a_block_is_taken_out_of_its_wire_and_put_into_another(sheet: Page) -> N
     expect(wires).to_have_count(count)
 
 
-def test_copies_keep_led_wires_and_what_is_inside(sheet: Page) -> None:
+def test_copies_keep_routes_and_the_contents_of_subsystems(sheet: Page) -> None:
     x, y = middle(edge(sheet, "PID/y -> u/u1").locator(".piece").first)
     sheet.mouse.move(x, y)
     sheet.mouse.down()
@@ -186,7 +186,7 @@ def test_copies_keep_led_wires_and_what_is_inside(sheet: Page) -> None:
     sheet.keyboard.press("Escape")
 
 
-def test_a_mask_is_made_used_renamed_and_undone(sheet: Page) -> None:
+def test_a_mask_is_created_used_renamed_and_undone(sheet: Page) -> None:
     block(sheet, "damping").click()
     sheet.keyboard.press("Control+g")
     subsystem = block(sheet, "Subsystem")
@@ -232,7 +232,7 @@ def test_a_mask_is_made_used_renamed_and_undone(sheet: Page) -> None:
     expect(gain).to_contain_text("2*d")
 
 
-def test_blocks_are_turned_and_aligned(sheet: Page) -> None:
+def test_blocks_are_rotated_and_aligned(sheet: Page) -> None:
     block(sheet, "damping").click()
     sheet.keyboard.press("Control+r")
     expect(sheet.get_by_role("button", name="Undo move damping (Ctrl+Z)")).to_be_enabled()
@@ -282,7 +282,7 @@ EXPORTED = """async () => {
 }"""
 
 
-def test_find_goes_to_a_block_in_a_subsystem_and_the_explorer_shows_where(sheet: Page) -> None:
+def test_search_opens_the_sheet_of_a_block_and_the_explorer_marks_it(sheet: Page) -> None:
     block(sheet, "PID").click()
     sheet.keyboard.press("Control+g")
     expect(block(sheet, "Subsystem")).to_be_visible()
@@ -302,12 +302,12 @@ def test_find_goes_to_a_block_in_a_subsystem_and_the_explorer_shows_where(sheet:
     sheet.get_by_text("Library", exact=True).click()
 
 
-def test_an_empty_sheet_offers_examples_and_the_tour_goes_round(sheet: Page) -> None:
+def test_an_empty_sheet_offers_examples_and_the_tour_completes(sheet: Page) -> None:
     menu(sheet, "New diagram")
     cards = sheet.locator(".gallery button")
     expect(cards).not_to_have_count(0)
     picture = cards.first.locator("img")
-    picture.evaluate("(image) => image.decode()")  # an error where there is no picture
+    picture.evaluate("(image) => image.decode()")  # raises an error if the picture is missing
     axe(sheet)
     sheet.get_by_role("button", name="Take the tour").click()
     axe(sheet)
@@ -319,7 +319,7 @@ def test_an_empty_sheet_offers_examples_and_the_tour_goes_round(sheet: Page) -> 
     expect(sheet.locator(".title")).to_have_text("bouncing_ball")
 
 
-def test_the_sheet_is_exported_and_the_run_reported(sheet: Page) -> None:
+def test_the_sheet_and_the_report_of_a_run_are_exported(sheet: Page) -> None:
     for kind, begins in (("SVG", b"<?xml"), ("PNG", b"\x89PNG"), ("PDF", b"%PDF")):
         with sheet.expect_download() as waiting:
             command(sheet, f"as {kind}")
@@ -337,7 +337,7 @@ def test_the_sheet_is_exported_and_the_run_reported(sheet: Page) -> None:
 
 
 def picture(page: Page, title: str) -> str:
-    """What the picture of a scope shows, as SVG."""
+    """The exported SVG picture of a scope."""
     page.get_by_role("button", name=f"Export {title}").click()
     with page.expect_download() as waiting:
         page.get_by_role("menuitem", name="Picture as SVG").click()
@@ -345,7 +345,7 @@ def picture(page: Page, title: str) -> str:
     return Path(waiting.value.path()).read_text()
 
 
-def test_the_values_of_one_scope_are_zoomed_moved_and_shown_whole_again(sheet: Page) -> None:
+def test_the_value_axis_of_a_scope_is_zoomed_panned_and_reset(sheet: Page) -> None:
     sheet.keyboard.press("Control+Enter")
     expect(sheet.locator(".run-state")).to_contain_text("done", ignore_case=True)
     axis = sheet.locator(".chart .values-axis").first
@@ -364,7 +364,9 @@ def test_the_values_of_one_scope_are_zoomed_moved_and_shown_whole_again(sheet: P
     sheet.mouse.up()
     moved = picture(sheet, title)
     assert len({whole, zoomed, moved}) == 3
-    expect(sheet.get_by_role("button", name="Show the whole run")).to_be_disabled()  # the time is as it was
+    expect(
+        sheet.get_by_role("button", name="Show the whole run")
+    ).to_be_disabled()  # the time axis is unchanged
     shown_whole.click()
     expect(shown_whole).to_have_count(0)
     assert picture(sheet, title) == whole
@@ -376,7 +378,7 @@ def test_the_values_of_one_scope_are_zoomed_moved_and_shown_whole_again(sheet: P
 
 
 DROPS = """async () => {
-    // Each kind is taken from its own entry in the library and let go on the sheet.
+    // Each block type is dragged from its library entry and dropped on the sheet.
     const entries = [...document.querySelectorAll('.palette .kind')]
     const sheet = document.querySelector('.canvas')
     const box = document.querySelector('.react-flow__pane').getBoundingClientRect()
@@ -395,9 +397,9 @@ DROPS = """async () => {
     return entries.map((entry) => entry.dataset.type)
 }"""
 OPENINGS = """async () => {
-    // Each block is opened by a double click; what its dialog asks for is read, and the dialog closed again.
-    // Nothing waits for a picture: to draw each dialog in software takes longer than to make it.
-    // What opens over the page stands beside its root, where there is little to search after each change.
+    // Each block is opened by a double click; the labels of its dialog are read, and the dialog is closed.
+    // Nothing waits for a painted frame: painting each dialog in software takes longer than creating it.
+    // Overlays are siblings of the page's root element, so that few elements are searched after each change.
     const over = (selector) => {
         for (const part of document.body.children) {
             const found = part.id === 'root' ? null : part.querySelector(selector)
@@ -449,13 +451,13 @@ def test_every_block_of_the_library_is_dropped_opened_and_saved(sheet: Page, sha
         family.click()
     entries = sheet.locator(".palette .kind")
     expect(entries).to_have_count(len(BLOCKS))
-    # The first with the mouse itself, all others by the same events.
+    # The first block with mouse input, all others with synthetic events.
     entries.first.drag_to(sheet.locator(".canvas"), target_position={"x": 300, "y": 200})
     nodes = sheet.locator(".react-flow__node")
     expect(nodes).to_have_count(1)
     sheet.keyboard.press("Control+z")
     expect(nodes).to_have_count(0)
-    sheet.get_by_text("Tune", exact=True).click()  # an arm that is drawn in software would take all the time
+    sheet.get_by_text("Tune", exact=True).click()  # software rendering of an arm takes long
     assert sorted(sheet.evaluate(DROPS)) == sorted(BLOCKS)
     expect(nodes).to_have_count(len(BLOCKS))
     asked = sheet.evaluate(OPENINGS)

@@ -20,7 +20,7 @@ PATIENCE_SECONDS = 180.0
 
 
 class Listener:
-    """A page at the other end of an outbox, which listens only while it is let."""
+    """A page at the other end of an outbox, which receives only when permitted."""
 
     def __init__(self) -> None:
         self.listens = asyncio.Event()
@@ -72,7 +72,7 @@ def of_runs(listener: Listener) -> list[str | bytes]:
     return [said for said in listener.heard if isinstance(said, bytes) or '"kind":"run_' in said]
 
 
-def test_a_page_that_sleeps_during_a_run_keeps_nobody_waiting_and_hears_it_all_later(
+def test_a_page_suspended_during_a_run_delays_nobody_and_gets_all_messages_later(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(outbox_module, "BEHIND_BYTES", 20_000)
@@ -85,11 +85,11 @@ def test_a_page_that_sleeps_during_a_run_keeps_nobody_waiting_and_hears_it_all_l
         before = frozen.outbox._size  # pyright: ignore[reportPrivateUsage]
         run = await lively.ask(hub, 2, "run", document=document)
         await lively.until("run_progress", run=run, state="done")
-        # And it can be edited:
+        # The document can be edited as well.
         await lively.ask(hub, 3, "change", document=document, key="1", edit={"kind": "arrange"})
         more = frozen.outbox._size - before  # pyright: ignore[reportPrivateUsage]
         assert sum(map(len, of_runs(lively))) > 200_000
-        assert more < 50_000, "what is told of the run waits on the disk"
+        assert more < 50_000, "messages of the run are stored on disk, not in memory"
         frozen.listens.set()
         await frozen.until("run_progress", run=run, state="done")
         assert of_runs(frozen) == of_runs(lively)
@@ -97,7 +97,9 @@ def test_a_page_that_sleeps_during_a_run_keeps_nobody_waiting_and_hears_it_all_l
     with_pages(tmp_path, going)
 
 
-def test_a_page_that_never_listens_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_connection_of_an_unresponsive_page_is_closed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(outbox_module, "MOST_BYTES", 1_000_000)
 
     async def going(hub: Hub, lively: Listener, frozen: Listener) -> None:

@@ -1,4 +1,4 @@
-"""What the studio keeps for its user: readable by nobody else, and never a reason not to start."""
+"""State files of the studio: readable only by their user; damaged files do not prevent a start."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> StateFolder:
     return StateFolder(tmp_path / "project")
 
 
-def test_a_session_is_taken_up_again_at_its_port_and_not_for_ever(kept: StateFolder) -> None:
+def test_a_session_is_resumed_at_its_port_until_it_expires(kept: StateFolder) -> None:
     assert kept.session() is None
     first = kept.begin_session(8642)
     assert kept.begin_session(8642) == first
@@ -34,7 +34,7 @@ def test_a_session_is_taken_up_again_at_its_port_and_not_for_ever(kept: StateFol
 
 
 @pytest.mark.parametrize("content", ["", "[]", '{"port": 1}', '{"port": "x", "secret": "y"}'])
-def test_a_broken_file_is_as_none(kept: StateFolder, content: str) -> None:
+def test_a_damaged_file_is_ignored(kept: StateFolder, content: str) -> None:
     kept.begin_session(1)
     (kept.root / "session.json").write_text(content)
     (kept.root / "recent.json").write_text(content)
@@ -42,14 +42,16 @@ def test_a_broken_file_is_as_none(kept: StateFolder, content: str) -> None:
     assert kept.recent() == []
 
 
-def test_files_used_last_come_first_and_once(kept: StateFolder) -> None:
+def test_recent_files_are_unique_and_latest_first(kept: StateFolder) -> None:
     for name in ("a.json", "b.json", "a.json", *(f"{k}.json" for k in range(20))):
         kept.use(name)
     assert kept.recent()[:2] == ["19.json", "18.json"]
     assert len(kept.recent()) == state_folder.MOST_RECENT
 
 
-def test_a_user_without_a_home_is_told_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_home_folder_raises_an_error_with_a_remedy(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(user_folders, "state_folder", lambda: None)
     with pytest.raises(FormatError, match=r"this user has no home folder.*set XDG_STATE_HOME to a folder"):
         StateFolder(tmp_path)

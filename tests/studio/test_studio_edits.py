@@ -102,7 +102,7 @@ def empty() -> Document:
 
 @settings(max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(edits, max_size=25))
-def test_all_edits_undone_give_the_same_file_and_redone_the_same_again(todo: list[DiagramEdit]) -> None:
+def test_undo_and_redo_of_all_edits_restore_the_files(todo: list[DiagramEdit]) -> None:
     document = empty()
     history = [content(document)]
     for edit in todo:
@@ -135,17 +135,17 @@ def test_every_block_of_the_library_can_be_dropped_and_saved() -> None:
             assert set(sheet(inside(document.diagram, [name])).blocks) == set(block.diagram.blocks)
 
 
-def test_wires_to_ports_that_vanish_go_with_the_edit_and_return_with_undo() -> None:
+def test_wires_to_removed_ports_are_removed_and_restored_by_undo() -> None:
     document = Document(placed(load_diagram("van_der_pol_pid", BLOCKS)), load_robot)
     before = document.diagram
     document.edit(SetParameters(block="error", values={"signs": "+"}))
-    assert len(document.diagram.connections) == len(before.connections) - 2  # one input alone is named u
+    assert len(document.diagram.connections) == len(before.connections) - 2  # a single input is named u
     document.undo()
     assert document.diagram is before
     assert not document.dirty
 
 
-def test_bends_go_with_what_they_hang_on() -> None:
+def test_bends_follow_their_wire_and_its_blocks() -> None:
     document = chain()
     wire = Wire(source="sine/y", target="gain/u", bends=(100, 200, 150))
     document.edit(BendWires(wires=[wire]))
@@ -168,7 +168,7 @@ def test_bends_go_with_what_they_hang_on() -> None:
     assert document.diagram.bends == {}
 
 
-def test_a_block_is_put_into_a_wire_in_one_step() -> None:
+def test_inserting_a_block_into_a_wire_is_one_step() -> None:
     document = chain()
     before = content(document)
     document.edit(
@@ -186,7 +186,7 @@ def test_a_block_is_put_into_a_wire_in_one_step() -> None:
     assert content(document) == before
 
 
-def test_notes_are_written_moved_and_kept_in_the_file() -> None:
+def test_notes_are_written_moved_and_saved() -> None:
     document = chain()
     before = content(document)
     document.edit(SetNotes(notes={"/1": SheetNote(x=5, y=6, text="first\nsecond")}))
@@ -202,7 +202,7 @@ def test_notes_are_written_moved_and_kept_in_the_file() -> None:
 
 
 def chain() -> Document:
-    """A sine into a gain, side by side."""
+    """A sine wave connected to a gain beside it."""
     document = empty()
     document.edit(
         AddBlocks(
@@ -224,7 +224,7 @@ def refused(*todo: DiagramEdit) -> str:
     return str(caught.value)
 
 
-def test_refusals_say_what_is_in_the_way() -> None:
+def test_refused_edits_give_the_reason() -> None:
     place = Place(x=0, y=0)
     second = AddBlocks(blocks=[NewBlock(name="GAIN", type="Gain", place=place)])
     assert "a block is already named 'gain'" in refused(second)
@@ -243,7 +243,7 @@ def test_refusals_say_what_is_in_the_way() -> None:
     assert "the value must be a robot, and int was given" in refused(plot)
 
 
-def test_there_is_an_end_to_undo_and_redo() -> None:
+def test_undo_and_redo_without_a_step_are_refused() -> None:
     with pytest.raises(ArmblocksError, match="there is nothing to undo"):
         empty().undo()
     with pytest.raises(ArmblocksError, match="there is nothing to redo"):
@@ -260,7 +260,7 @@ def test_there_is_an_end_to_undo_and_redo() -> None:
         ("[1 2; 3 4]", ((1.0, 2.0), (3.0, 4.0))),
     ],
 )
-def test_where_only_a_matrix_may_stand_rows_and_columns_are_what_is_typed(
+def test_rows_and_columns_are_distinguished_for_matrix_parameters(
     typed: str, matrix: tuple[tuple[float, ...], ...]
 ) -> None:
     rule = next(rule for rule in BLOCKS["StateSpace"].parameters() if rule.name == "A")
@@ -288,14 +288,14 @@ def test_numbers_may_be_typed_as_formulas(typed: str, value: float) -> None:
     new = NewBlock(name="gain", type="Gain", parameters={"gain": typed}, place=Place(x=0, y=0))
     document.edit(AddBlocks(blocks=[new]))
     assert document.diagram.blocks["gain"].parameter_value("gain") == value
-    # In the place of a value a formula means the same, with a mask's names or without.
+    # A formula has the same value with and without a mask.
     assert Gain(gain=formula(typed)).parameter_value("gain") == value
     masked = replace(document.diagram, mask=(mask_parameter("k", 1.0),))
     in_mask = applied(SetParameters(block="gain", values={"gain": f"k*({typed})"}), masked, load_robot)
     assert in_mask.blocks["gain"].parameter_value("gain") == value
 
 
-def test_tuned_values_of_several_blocks_are_kept_in_one_step() -> None:
+def test_tuned_values_of_several_blocks_are_kept_as_one_step() -> None:
     document = Document(placed(load_diagram("van_der_pol_pid", BLOCKS)), load_robot)
     before = content(document)
     document.edit(KeepTuned(values={"PID.P": "2*3", "PID.I": 0.25}))
@@ -306,7 +306,7 @@ def test_tuned_values_of_several_blocks_are_kept_in_one_step() -> None:
     assert content(document) == before
 
 
-def test_a_logged_signal_follows_its_block_and_goes_with_it() -> None:
+def test_a_logged_signal_follows_renaming_and_is_removed_with_its_block() -> None:
     document = Document(placed(load_diagram("van_der_pol_pid", BLOCKS)), load_robot)
     before = content(document)
     document.edit(LogSignal(port="PID/y", logged=True))
@@ -353,7 +353,7 @@ def diagram_inside(diagram: Diagram) -> list[str]:
     return list(inside(diagram, ["inner"]).blocks)
 
 
-def test_settings_and_kept_values_are_the_model_s_whatever_sheet_is_shown() -> None:
+def test_settings_and_tuned_values_apply_to_the_model_on_every_sheet() -> None:
     document = Document(placed(load_diagram("puma560_servos", BLOCKS)), load_robot)
     name, block = next(
         (name, block) for name, block in document.diagram.blocks.items() if isinstance(block, DiagramBlock)

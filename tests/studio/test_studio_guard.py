@@ -1,4 +1,4 @@
-"""Nobody but the person who started the studio gets an answer from it: every route, HTTP and websocket."""
+"""Only the person who started the studio gets replies from it, on every HTTP route and websocket."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def app(web: Path, keys: Keys, tmp_path: Path) -> Guard:
 
 
 def call(app: Guard, path: str, headers: dict[str, str], *, method: str = "GET", kind: str = "http") -> Any:
-    """Status and headers of a request, or the close code of a websocket (0: accepted)."""
+    """Return status and headers of a request, or the close code of a websocket (0: accepted)."""
     sent: list[MutableMapping[str, Any]] = []
     route, _, query = path.partition("?")
     scope: dict[str, Any] = {
@@ -90,7 +90,7 @@ def cookie(keys: Keys) -> dict[str, str]:
 
 
 def routes(app: Guard) -> list[tuple[str, str]]:
-    """Every route of the application itself, so that a new one cannot be forgotten here."""
+    """All routes of the application, so that the tests include new routes."""
     found: list[tuple[str, str]] = []
     for route in app._app.routes:  # pyright: ignore
         if isinstance(route, WebSocketRoute):
@@ -102,7 +102,7 @@ def routes(app: Guard) -> list[tuple[str, str]]:
     return found
 
 
-def test_every_route_refuses_a_stranger_but_login_and_health(app: Guard) -> None:
+def test_every_route_except_login_and_health_needs_a_session(app: Guard) -> None:
     paths = routes(app)
     assert ("websocket", "/ws") in paths
     assert len(paths) >= 5
@@ -137,7 +137,7 @@ QUERIES = ("", "sheet=../..", "theme=dark&theme=x", "theme=%00", "sheet=" + "a/"
 
 
 def hostile_paths(app: Guard, document: str) -> Iterator[str]:
-    """Every route with something hostile in the place of each thing that it asks for, and hostile queries."""
+    """Every route with hostile values for each of its parameters, and hostile queries."""
     for route in app._app.routes:  # pyright: ignore
         if isinstance(route, WebSocketRoute):
             continue
@@ -151,7 +151,7 @@ def hostile_paths(app: Guard, document: str) -> Iterator[str]:
             yield f"{path.replace('{document}', document).replace('{kind}', 'svg')}?{query}"
 
 
-def test_no_route_breaks_or_gives_away_a_file_whatever_it_is_asked(
+def test_hostile_parameters_cause_no_server_error_and_reveal_no_file(
     web: Path, keys: Keys, tmp_path: Path
 ) -> None:
     (tmp_path / "project").mkdir()
@@ -186,7 +186,7 @@ def test_no_route_breaks_or_gives_away_a_file_whatever_it_is_asked(
             assert call(app, path, headers, method=method)[0] in (404, 405), (method, path)
 
 
-def test_the_login_link_opens_the_door_once(app: Guard, keys: Keys) -> None:
+def test_the_login_link_is_valid_once(app: Guard, keys: Keys) -> None:
     link = f"/login?key={keys.new_login()}"
     status, headers, _ = call(app, link, {"host": HOST})
     assert status == 303
@@ -216,7 +216,7 @@ def test_other_origins_are_refused_on_http_and_websocket(app: Guard, keys: Keys,
     assert call(app, "/ws", {**cookie(keys), "origin": origin}, kind="websocket") == 4403
 
 
-def test_a_websocket_needs_the_cookie_with_the_origin_or_the_token(app: Guard, keys: Keys) -> None:
+def test_a_websocket_needs_cookie_and_origin_or_the_token(app: Guard, keys: Keys) -> None:
     assert call(app, "/ws", {**cookie(keys), "origin": ORIGIN}, kind="websocket") == 0
     assert call(app, "/ws", cookie(keys), kind="websocket") == 4403
     bearer = {"host": HOST, "authorization": f"Bearer {keys.token}"}
@@ -226,13 +226,11 @@ def test_a_websocket_needs_the_cookie_with_the_origin_or_the_token(app: Guard, k
     assert call(app, "/ws", crossed, kind="websocket") == 4403
 
 
-def test_a_request_that_changes_something_needs_the_header_that_no_form_can_send(
-    app: Guard, keys: Keys
-) -> None:
+def test_requests_that_change_something_need_the_custom_header(app: Guard, keys: Keys) -> None:
     assert call(app, "/", {**cookie(keys), "origin": ORIGIN}, method="POST")[0] == 403
     crossed = {**cookie(keys), "origin": ORIGIN, "x-armblocks": "1", "sec-fetch-site": "same-site"}
     assert call(app, "/", crossed, method="POST")[0] == 403
-    # Let through by the guard, and refused by the route, which knows no POST.
+    # Accepted by the guard, rejected by the route, which has no POST method.
     passed = {**cookie(keys), "origin": ORIGIN, "x-armblocks": "1", "sec-fetch-site": "same-origin"}
     assert call(app, "/", passed, method="POST")[0] == 405
 
@@ -265,7 +263,7 @@ def test_no_path_leads_out_of_the_page_folder(app: Guard, keys: Keys, path: str)
     assert b"HIDDEN" not in body
 
 
-def test_answers_carry_the_policy_that_keeps_other_code_out(app: Guard, keys: Keys) -> None:
+def test_responses_have_a_content_security_policy(app: Guard, keys: Keys) -> None:
     for headers in (cookie(keys), {"host": HOST}):
         _, answer, _ = call(app, "/", headers)
         policy = answer["content-security-policy"]

@@ -24,7 +24,7 @@ PATIENCE_SECONDS = 180
 
 
 async def until(true: Callable[[], bool]) -> None:
-    """Let the hub work until what it is expected to do is done."""
+    """Let the hub run until a condition is true."""
     async with asyncio.timeout(PATIENCE_SECONDS):
         while not true():
             await asyncio.sleep(0.005)
@@ -33,7 +33,7 @@ async def until(true: Callable[[], bool]) -> None:
 def talk(
     folder: Path, talking: Callable[[Hub, Callable[..., Awaitable[Any]], Told], Awaitable[None]]
 ) -> Told:
-    """Let a page talk to a hub; what it was told."""
+    """Let a page send requests to a hub; return the events that it received."""
     told: Told = []
 
     async def going() -> None:
@@ -43,7 +43,7 @@ def talk(
             told.append(json.loads(text))
 
         async def hear_bytes(data: bytes) -> None:
-            raise AssertionError("no run was asked for")
+            raise AssertionError("samples arrived without a run")
 
         page = Page(hear, hear_bytes)
         await hub.welcome(page)
@@ -68,13 +68,13 @@ def talk(
 GAIN = {"name": "gain", "type": "Gain", "place": {"x": 0, "y": 0}}
 
 
-def test_a_drawing_is_opened_changed_checked_and_saved(tmp_path: Path) -> None:
+def test_a_diagram_is_opened_changed_checked_and_saved(tmp_path: Path) -> None:
     async def talking(hub: Hub, ask: Callable[..., Awaitable[Any]], told: Told) -> None:
         key = await ask("open_shipped", document_kind="diagram", name="van_der_pol_pid")
         await ask("change", document=key, key="1", edit={"kind": "add", "blocks": [GAIN]})
         await ask(
             "change", document=key, key="1", edit={"kind": "add", "blocks": [GAIN]}
-        )  # sent twice, done once
+        )  # sent twice, applied once
 
         def last_check() -> list[Any] | None:
             return next((event["findings"] for event in reversed(told) if event["kind"] == "checked"), None)
@@ -96,7 +96,7 @@ def test_a_drawing_is_opened_changed_checked_and_saved(tmp_path: Path) -> None:
     assert not last["state"]["dirty"]
 
 
-def test_a_file_that_changed_on_the_disk_is_not_overwritten_without_a_word(tmp_path: Path) -> None:
+def test_a_file_changed_on_disk_is_not_overwritten_without_confirmation(tmp_path: Path) -> None:
     async def talking(hub: Hub, ask: Callable[..., Awaitable[Any]], told: Told) -> None:
         key = await ask("new", document_kind="diagram")
         with pytest.raises(ArmblocksError, match="the drawing has no file yet"):
@@ -116,7 +116,7 @@ def test_a_file_that_changed_on_the_disk_is_not_overwritten_without_a_word(tmp_p
     assert load_diagram(tmp_path / "b.json", BLOCKS).name == "b"
 
 
-def test_a_drawing_that_cannot_run_yet_is_saved_and_opened_again(tmp_path: Path) -> None:
+def test_an_incomplete_diagram_is_saved_and_reopened(tmp_path: Path) -> None:
     async def talking(hub: Hub, ask: Callable[..., Awaitable[Any]], told: Told) -> None:
         key = await ask("new", document_kind="diagram")
         await ask("change", document=key, key="1", edit={"kind": "add", "blocks": [GAIN]})
@@ -144,7 +144,7 @@ def test_a_group_needs_blocks_and_a_free_name(tmp_path: Path) -> None:
         with pytest.raises(ArmblocksError, match="there is no subsystem named 'error'"):
             await ask("look", document=key, inside=["error"])
         await ask("undo", document=key)
-        await ask("undo", document=key)  # the subsystem itself is gone: the page is shown the whole
+        await ask("undo", document=key)  # the subsystem is removed, so the page shows the top sheet
 
     told = talk(tmp_path, talking)
     opened = [event for event in told if event["kind"] == "opened"]
@@ -154,7 +154,7 @@ def test_a_group_needs_blocks_and_a_free_name(tmp_path: Path) -> None:
     assert blocks.keys() == at_first.keys()
 
 
-def test_robots_are_shown_and_posed_by_the_server(tmp_path: Path) -> None:
+def test_the_server_sends_scenes_and_poses_of_robots(tmp_path: Path) -> None:
     async def talking(hub: Hub, ask: Callable[..., Awaitable[Any]], told: Told) -> None:
         key = await ask("open_shipped", document_kind="diagram", name="kr180model")
         scene = await ask("scene", document=key, block="plot")
@@ -170,7 +170,7 @@ def test_robots_are_shown_and_posed_by_the_server(tmp_path: Path) -> None:
     talk(tmp_path, talking)
 
 
-def test_starting_says_in_words_why_it_cannot(tmp_path: Path) -> None:
+def test_a_failed_start_raises_an_error_with_the_reason(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match="this installation has no studio page"):
         built_page(tmp_path)
     import socket
@@ -182,7 +182,7 @@ def test_starting_says_in_words_why_it_cannot(tmp_path: Path) -> None:
             serve(tmp_path, "", port=taken.getsockname()[1], open_browser=False, announce=print)
 
 
-def test_a_run_without_memory_fails_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_without_memory_fails_with_an_error_message(monkeypatch: pytest.MonkeyPatch) -> None:
     said: list[bytes] = []
 
     class Pipe:

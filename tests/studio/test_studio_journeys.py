@@ -1,4 +1,4 @@
-"""What people do with the studio, done in a real browser against a real server."""
+"""Main workflows of the studio in a real browser against a real server."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ def shared(open_studio: Callable[[str], Page]) -> Page:
 
 @pytest.fixture
 def page(shared: Page) -> Page:
-    """The page that all tests here share, with a model without an arm: that is drawn slowly in software."""
+    """The shared page with a model without an arm, because software rendering of an arm is slow."""
     return open_example(shared, "van_der_pol_pid")
 
 
 def open_example(page: Page, name: str) -> Page:
-    for _ in range(2):  # what a test that failed left open: a list, and the dialog around it
+    for _ in range(2):  # closes the list and the dialog that a failed test may have left open
         page.keyboard.press("Escape")
     page.get_by_role("button", name="Menu").click()
     page.get_by_role("menuitem", name=re.compile(f"^{name} (?!not saved)[a-z]")).click()
@@ -60,10 +60,10 @@ def show_theme(page: Page, theme: Literal["light", "dark"]) -> None:
 
 
 COLOURS = ["cat.color"]
-"""The rules whose answer depends on the theme: all others are asked in one of the two."""
+"""The rules whose result depends on the theme; all others are checked in one theme."""
 
 
-def test_the_first_example_is_shown_run_and_scrubbed(shared: Page) -> None:
+def test_the_first_example_is_shown_run_and_played_back(shared: Page) -> None:
     page = shared
     expect(page.locator(".robot canvas")).to_be_visible()
     run(page)
@@ -114,7 +114,7 @@ def test_a_diagram_is_built_with_the_mouse_run_and_saved(page: Page, folder: Pat
     assert [str(wire) for wire in made.connections][1] == "Sine Wave/y -> Gain/u"
 
 
-def test_the_same_with_the_keyboard_alone_and_undone_to_nothing(page: Page) -> None:
+def test_a_diagram_is_built_with_the_keyboard_alone_and_undone_completely(page: Page) -> None:
     new_diagram(page)
     for typed in ("sine wave", "integrator", "scope"):
         add(page, typed)
@@ -140,7 +140,7 @@ def test_the_same_with_the_keyboard_alone_and_undone_to_nothing(page: Page) -> N
     expect(page.locator(".react-flow__edge")).to_have_count(2)
 
 
-def test_blocks_are_grouped_entered_and_left(page: Page) -> None:
+def test_blocks_are_grouped_and_the_subsystem_is_opened_and_left(page: Page) -> None:
     block(page, "damping").click()
     page.keyboard.press("Control+g")
     expect(block(page, "Subsystem")).to_have_class(re.compile("selected"))
@@ -174,7 +174,7 @@ def test_a_run_is_paused_stepped_resumed_and_stopped(page: Page) -> None:
     speed.select_option("as fast as possible")
 
 
-def test_copied_blocks_travel_as_text(page: Page) -> None:
+def test_blocks_are_copied_as_text(page: Page) -> None:
     block(page, "PID").click()
     page.keyboard.press("Control+c")
     assert list(json.loads(copied_text(page, '"blocks"'))["blocks"]) == ["PID"]
@@ -182,7 +182,7 @@ def test_copied_blocks_travel_as_text(page: Page) -> None:
     expect(block(page, "PID 2")).to_be_visible()
 
 
-def test_axe_finds_nothing_serious_in_the_light_and_in_the_dark(page: Page) -> None:
+def test_axe_finds_no_violations_in_light_and_dark_themes(page: Page) -> None:
     dialog = page.locator("[role=dialog]")
     for opens in ("", "Control+k", "?", "Enter"):
         if opens:
@@ -196,4 +196,4 @@ def test_axe_finds_nothing_serious_in_the_light_and_in_the_dark(page: Page) -> N
         if opens:
             page.keyboard.press("Escape")
             expect(dialog).to_be_hidden()
-            expect(block(page, "PID")).to_be_focused()  # who worked with the keys goes on where they were
+            expect(block(page, "PID")).to_be_focused()  # the focus returns to the block

@@ -1,4 +1,4 @@
-"""Running a model in the page: tuned, stepped, measured, compared, logged; in a real browser."""
+"""Running a model in the browser: tuning, stepping, measurements, comparison, logging."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def lag_model(name: str) -> ab.Diagram:
 
 @pytest.fixture(scope="module")
 def opened(open_studio: Callable[[str], Page], studio: Studio) -> Opened:
-    """One page for all: each test opens a model of its own."""
+    """One page for all tests; each test opens its own model."""
     page = open_studio("van_der_pol_pid")
 
     def opening(diagram: ab.Diagram) -> Page:
@@ -80,7 +80,7 @@ def number(text: str) -> float:
     return float(text.replace("−", "-").split()[0])
 
 
-def test_a_run_is_tuned_stepped_back_and_the_value_kept(opened: Opened) -> None:
+def test_a_run_is_tuned_and_rewound_and_the_tuned_value_kept(opened: Opened) -> None:
     page = opened(lag_model("tuned"))
     tab(page, "Tune")
     select(page, "gain")
@@ -105,7 +105,7 @@ def test_a_run_is_tuned_stepped_back_and_the_value_kept(opened: Opened) -> None:
     page.get_by_role("combobox", name="Speed").select_option("as fast as possible")
     page.get_by_role("button", name="Resume").click()
     expect(page.locator(".run-state")).to_contain_text("done", ignore_case=True)
-    # What was tuned holds from where the run returned to.
+    # The tuned value applies from the instant of return.
     expect(page.locator(".display-value")).to_have_text(re.compile(r"^(3\.000|2\.999)$"))
     page.get_by_role("button", name="Keep in the model").click()
     expect(page.get_by_text("not in the model")).to_be_hidden()
@@ -151,7 +151,7 @@ def test_two_runs_are_compared(opened: Opened) -> None:
 
 
 def saved(page: Page, scope: str, entry: str) -> bytes:
-    """What a scope is exported as."""
+    """The exported file of a scope."""
     page.get_by_role("button", name=f"Export {scope}", exact=True).click()
     with page.expect_download() as download:
         page.get_by_role("menuitem", name=entry).click()
@@ -165,7 +165,7 @@ def measured(table: Locator, signal: str) -> dict[str, str]:
     return dict(zip(heads[1:], row.locator("td").all_inner_texts()))
 
 
-def test_scopes_measure_what_the_closed_form_says(opened: Opened) -> None:
+def test_scope_measurements_equal_the_closed_form(opened: Opened) -> None:
     page = opened(lag_model("measured"))
     run(page)
     page.get_by_role("button", name="Measures of the visible range").click()
@@ -191,7 +191,7 @@ def test_scopes_measure_what_the_closed_form_says(opened: Opened) -> None:
     expect(table.locator("tbody tr")).to_have_count(1)
 
 
-def test_a_scope_is_exported_whole(opened: Opened) -> None:
+def test_scope_exports_contain_all_samples(opened: Opened) -> None:
     page = opened(lag_model("exported"))
     run(page)
     rows = list(csv.reader(io.StringIO(saved(page, "scope", "Samples as CSV").decode())))
@@ -204,7 +204,7 @@ def test_a_scope_is_exported_whole(opened: Opened) -> None:
     assert saved(page, "scope", "Picture as PNG").startswith(b"\x89PNG")
 
 
-def test_a_wire_is_logged_by_a_click_and_its_value_pinned(opened: Opened) -> None:
+def test_a_click_logs_a_wire_and_pins_its_value(opened: Opened) -> None:
     page = opened(lag_model("logged"))
     ends = [page.locator(f'.react-flow__handle[data-nodeid="{node}"]') for node in ("gain", "lag")]
     expect(ends[1].first).to_be_in_viewport()
@@ -228,7 +228,7 @@ def test_a_wire_is_logged_by_a_click_and_its_value_pinned(opened: Opened) -> Non
     expect(page.locator(".title")).to_have_text("logged")
 
 
-def test_configuration_parameters_are_checked_while_typed_and_kept(opened: Opened) -> None:
+def test_configuration_parameters_are_checked_while_typed_and_saved(opened: Opened) -> None:
     page = opened(lag_model("configured"))
     page.keyboard.press("Control+e")
     step = page.get_by_role("textbox", name="Fixed step")
@@ -247,7 +247,7 @@ def test_configuration_parameters_are_checked_while_typed_and_kept(opened: Opene
     page.keyboard.press("Escape")
 
 
-def test_sixteen_channels_at_ten_kilohertz_arrive_whole(opened: Opened) -> None:
+def test_all_samples_of_16_channels_at_10_khz_arrive(opened: Opened) -> None:
     builder = ab.DiagramBuilder("channels", settings=ab.SimulationOptions(stop_time=1.0, sample_time=1e-4))
     for k in range(16):
         wave = builder.add(f"wave {k}", ab.blocks.SineWave(frequency=5.0 + k, amplitude=1.0 + k))

@@ -1,4 +1,4 @@
-"""The terminal of the studio says no key but the login link, and nothing of what files hold."""
+"""The terminal output of the studio contains no key except the login link, and no file contents."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ CONTENT = "what-nobody-else-should-read"
 
 class NoRedirect(urllib.request.HTTPRedirectHandler):
     def redirect_request(self, *_: Any) -> None:
-        """What the login answers is looked at, not followed."""
+        """Return the login response itself; redirects are not followed."""
 
 
 def status(address: str, headers: dict[str, str]) -> tuple[int, str]:
-    """Status and cookie of an answer."""
+    """Return status and cookie of a response."""
     asked = urllib.request.Request(address, headers=headers)
     try:
         with urllib.request.build_opener(NoRedirect).open(asked, timeout=PATIENCE_MS / 1000) as answer:
@@ -38,7 +38,7 @@ def status(address: str, headers: dict[str, str]) -> tuple[int, str]:
             return refused.code, refused.headers.get("set-cookie", "")
 
 
-def test_the_terminal_shows_no_key_after_the_login_and_no_content(tmp_path: Path) -> None:
+def test_the_terminal_shows_no_key_after_the_login_and_no_file_content(tmp_path: Path) -> None:
     (tmp_path / "bad.json").write_text('{"blocks": {"' + CONTENT)
     (tmp_path / "script.m").write_text(f"{CONTENT} = (1")
     studio = Studio(tmp_path)
@@ -49,7 +49,7 @@ def test_the_terminal_shows_no_key_after_the_login_and_no_content(tmp_path: Path
 
 
 def _said_after_the_login(studio: Studio) -> tuple[str, tuple[str, ...]]:
-    """What the terminal shows after everything was tried that could make it say too much; the secrets."""
+    """Provoke errors that could reveal secrets; return the terminal output and the secrets."""
     key = studio.link.partition("key=")[2]
     code, cookie = status(studio.link, {})
     assert code == 303
@@ -80,7 +80,7 @@ def _said_after_the_login(studio: Studio) -> tuple[str, tuple[str, ...]]:
     return rest, (key, session, CONTENT)
 
 
-def test_what_breaks_is_said_with_its_place_and_without_words(capsys: pytest.CaptureFixture[str]) -> None:
+def test_logged_exceptions_have_a_traceback_and_no_message(capsys: pytest.CaptureFixture[str]) -> None:
     keys = Keys(1)
     login = keys.new_login()
     keys.new_login()

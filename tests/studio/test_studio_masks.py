@@ -1,4 +1,4 @@
-"""Masks and libraries in the studio: what a page is shown, what it may change, what stays a formula."""
+"""Masks and libraries in the studio: displayed values, permitted edits, formulas."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def document() -> Document:
     return Document(placed(load_diagram("puma560_servos", BLOCKS)), load_robot)
 
 
-def test_a_page_sees_mask_formulas_and_link(document: Document) -> None:
+def test_a_sheet_contains_mask_values_formulas_and_links(document: Document) -> None:
     block = sheet(document.diagram).blocks["servo 2"]
     assert block.link == "joint_servos#JointServo"
     assert block.formulas == {"w": "w"}
@@ -36,7 +36,7 @@ def test_a_page_sees_mask_formulas_and_link(document: Document) -> None:
     assert not sheet(document.diagram).linked
 
 
-def test_values_that_name_the_mask_stay_formulas(document: Document) -> None:
+def test_values_with_mask_names_remain_formulas(document: Document) -> None:
     document.edit(SetParameters(block="servo 1", values={"w": "2 * w", "G": "-60"}))
     block = document.diagram.blocks["servo 1"]
     assert dict(block.formulas) == {"w": "2 * w"}
@@ -70,7 +70,7 @@ def test_a_library_is_read_only_until_the_link_is_broken(document: Document) -> 
         document.edit(BreakLink(block="motion"))
 
 
-def test_pages_look_inside_and_try_formulas(tmp_path: Path) -> None:
+def test_a_page_opens_a_masked_subsystem_and_evaluates_formulas(tmp_path: Path) -> None:
     async def talking(hub: Any, ask: Any, told: Told) -> None:
         key = await ask("open_shipped", document_kind="diagram", name="puma560_servos")
         where = {"document": key, "inside": [], "block": "servo 1", "type": "Subsystem"}
@@ -89,7 +89,7 @@ def test_pages_look_inside_and_try_formulas(tmp_path: Path) -> None:
     talk(tmp_path, talking)
 
 
-def test_libraries_outside_of_the_project_are_not_read(tmp_path: Path) -> None:
+def test_libraries_outside_the_project_are_not_read(tmp_path: Path) -> None:
     (tmp_path / "project").mkdir()
     servo = ab.load_library("joint_servos")["JointServo"]
     ab.save_library({"Servo": servo}, tmp_path / "outside.json")

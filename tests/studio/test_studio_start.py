@@ -1,4 +1,4 @@
-"""The page is served before what stands behind it; where that cannot be made, the server says why."""
+"""The page is served before the hub exists; a hub that cannot be created ends the server with an error."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def web(tmp_path: Path) -> Path:
 
 
 def answered(web: Path, hub: HubToCome, path: str) -> tuple[int, dict[str, str]]:
-    """Status and headers that a page with the session gets."""
+    """Status and headers of the response to an authenticated page."""
     keys, sent = Keys(8642), list[MutableMapping[str, Any]]()
     app = studio_app(hub, keys, frozenset({HOST}), web)
     scope: dict[str, Any] = {
@@ -57,7 +57,7 @@ def answered(web: Path, hub: HubToCome, path: str) -> tuple[int, dict[str, str]]
     return sent[0]["status"], {name.decode(): value.decode() for name, value in sent[0]["headers"]}
 
 
-def test_the_page_is_there_while_the_hub_is_made(
+def test_the_page_is_served_while_the_hub_is_created(
     web: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     go_on = threading.Event()
@@ -79,15 +79,13 @@ def test_the_page_is_there_while_the_hub_is_made(
     hub.made.result().close()
 
 
-def test_files_that_are_named_by_their_content_are_kept_and_the_page_is_not(
-    web: Path, tmp_path: Path
-) -> None:
+def test_hashed_files_are_cached_and_the_page_is_not(web: Path, tmp_path: Path) -> None:
     hub = HubToCome(ProjectFolder(tmp_path))
     assert answered(web, hub, "/assets/index-1a2b.js")[1]["cache-control"] == FOREVER
     assert answered(web, hub, "/")[1]["cache-control"] == "no-cache"
 
 
-def test_a_server_whose_hub_cannot_be_made_ends_with_the_reason(
+def test_a_server_whose_hub_cannot_be_created_ends_with_the_reason(
     web: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def broken(folder: ProjectFolder) -> Hub:

@@ -1,4 +1,4 @@
-"""Two pages on one document: no edit is lost without a word, and both pages end up with the same drawing."""
+"""Two pages on one document: no edit is lost silently, and both pages end with the same diagram."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ PEACE: list[tuple[DiagramEdit, DiagramEdit]] = [
 
 
 @pytest.mark.parametrize(("theirs", "mine"), CLASHES)
-def test_an_edit_of_what_another_page_changed_is_refused(theirs: DiagramEdit, mine: DiagramEdit) -> None:
+def test_an_edit_that_conflicts_with_another_page_is_refused(theirs: DiagramEdit, mine: DiagramEdit) -> None:
     document = drawing()
     base = document.version
     document.perform(change("other", base, theirs))
@@ -84,11 +84,11 @@ def test_an_edit_of_what_another_page_changed_is_refused(theirs: DiagramEdit, mi
     ):
         document.perform(change("me", base, mine))
     assert document.diagram is before
-    document.perform(change("me", document.version, mine))  # having seen it, one may
+    document.perform(change("me", document.version, mine))  # accepted after seeing the change
 
 
 @pytest.mark.parametrize(("theirs", "mine"), PEACE)
-def test_edits_of_different_things_are_both_carried_out(theirs: DiagramEdit, mine: DiagramEdit) -> None:
+def test_edits_of_different_aspects_are_both_applied(theirs: DiagramEdit, mine: DiagramEdit) -> None:
     document, other_order = drawing(), drawing()
     base = document.version
     document.perform(change("other", base, theirs))
@@ -98,7 +98,7 @@ def test_edits_of_different_things_are_both_carried_out(theirs: DiagramEdit, min
     assert document.diagram == other_order.diagram
 
 
-def test_what_is_inside_a_subsystem_is_looked_at_too() -> None:
+def test_conflicts_inside_subsystems_are_detected() -> None:
     document = drawing()
     document.edit(GroupBlocks(blocks=["b0", "b1"], name="S"))
     base = document.version
@@ -110,7 +110,7 @@ def test_what_is_inside_a_subsystem_is_looked_at_too() -> None:
         document.perform(change("me", base, RemoveBlocks(blocks=["S"])))
 
 
-def test_a_page_does_not_clash_with_its_own_edits_that_are_under_way() -> None:
+def test_a_page_does_not_conflict_with_its_own_pending_edits() -> None:
     document = drawing()
     base = document.version
     for value in (2.0, 3.0, 4.0):
@@ -118,7 +118,7 @@ def test_a_page_does_not_clash_with_its_own_edits_that_are_under_way() -> None:
     assert document.diagram.blocks["b0"].parameter_value("gain") == 4.0
 
 
-def test_undo_takes_back_what_the_page_saw_and_nothing_else() -> None:
+def test_undo_of_an_unseen_change_is_refused() -> None:
     document = drawing()
     base = document.version
     document.perform(change("other", base, gain("b0", 2.0)))
@@ -130,13 +130,13 @@ def test_undo_takes_back_what_the_page_saw_and_nothing_else() -> None:
 
 
 @pytest.mark.parametrize("base", [-1, 10_000])
-def test_a_version_that_nobody_knows_is_refused(base: int) -> None:
+def test_an_edit_based_on_an_unknown_version_is_refused(base: int) -> None:
     with pytest.raises(InputError, match="the page shows a version of the drawing that is too old"):
         drawing().perform(change("me", base, gain("b0", 2.0)))
 
 
 class Page:
-    """What a page knows: the sheet that it was told of, some messages late."""
+    """A page that receives the changes of the sheet with a delay of some messages."""
 
     def __init__(self, name: str, document: Document) -> None:
         self.name = name
@@ -146,7 +146,7 @@ class Page:
         self.coming: deque[tuple[int, SheetChange]] = deque()
 
     def hear(self) -> None:
-        """Take the next message in."""
+        """Process the next message."""
         self.version, told = self.coming.popleft()
         for name, block in told.blocks.items():
             if block is None:
@@ -157,7 +157,7 @@ class Page:
 
 
 def random_edit(random_: random.Random, page: Page) -> DiagramEdit:
-    """Something that a person does to what the page shows."""
+    """A random user edit of the displayed sheet."""
     names = sorted(page.blocks) or ["b0"]
     block, other = random_.choice(names), random_.choice(names)
     return random_.choice(
@@ -173,9 +173,9 @@ def random_edit(random_: random.Random, page: Page) -> DiagramEdit:
 
 
 @pytest.mark.parametrize("seed", range(50))
-def test_whatever_two_pages_do_nothing_unseen_is_overwritten_and_both_agree(seed: int) -> None:
-    """200 turns each: 10 000 interleavings. An edit that was carried out and is not there any more was undone
-    by somebody who had seen it."""
+def test_random_edits_of_two_pages_overwrite_no_unseen_change_and_converge(seed: int) -> None:
+    """200 turns for each seed, 10 000 interleavings. An applied edit that has disappeared was undone by a
+    page that had seen it."""
     random_ = random.Random(seed)
     document = drawing()
     pages = [Page("one", document), Page("two", document)]

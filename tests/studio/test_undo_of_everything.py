@@ -1,4 +1,4 @@
-"""Any sequence of edits undone gives the same file, to the last byte: edits of every kind, on every sheet."""
+"""Undoing any sequence of edits restores the file byte by byte: edits of every kind, on every sheet."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from armblocks.studio.sheet.edits import EDITS
 BEGINNINGS = ("puma560_servos", "van_der_pol_pid", "kr180model", "puma560_payload_drop")
 SEEDS = 28
 LEAST = 3
-"""How often each kind of edit must have been carried out, or this would say nothing of it."""
+"""Minimum number of applied edits of each kind, so that the test covers all kinds."""
 
 
 def content(document: Document) -> bytes:
     return diagram_to_bytes(document.diagram, load_robot)
 
 
-def test_every_kind_of_edit_is_made() -> None:
+def test_the_generators_cover_every_kind_of_edit() -> None:
     assert set(MAKERS) == set(EDITS.entries)
 
 
-def test_all_is_undone_and_redone_and_comes_back_from_the_journal(tmp_path: Path) -> None:
+def test_random_edits_are_undone_redone_and_recovered_from_the_journal(tmp_path: Path) -> None:
     done: Counter[type] = Counter()
     inner = 0
 
@@ -78,7 +78,7 @@ def test_all_is_undone_and_redone_and_comes_back_from_the_journal(tmp_path: Path
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_the_makers_make_the_same_of_the_same_chance(seed: int, tmp_path: Path) -> None:
+def test_random_edits_are_reproducible_from_the_seed(seed: int, tmp_path: Path) -> None:
     (tmp_path / "project").mkdir()
 
     async def talking() -> None:

@@ -28,11 +28,11 @@ from armblocks.studio.server.hub import Hub
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals and limits of POSIX")
 PATIENCE_SECONDS = 60.0
-"""Nothing here waits so long on a machine that works; it is there so that a hang fails and does not hang."""
+"""Time limit far above any normal waiting time, s, so that a hang fails the test."""
 
 
 class Talk:
-    """A page that runs models, and hears what becomes of them."""
+    """A page that runs models and collects the messages of the runs."""
 
     def __init__(self, folder: Path) -> None:
         self.hub = Hub(ProjectFolder(folder))
@@ -58,7 +58,7 @@ class Talk:
         return reply["value"]
 
     async def until(self, run: str, *states: str) -> dict[str, Any]:
-        """The first word about a run that says it is in one of these states."""
+        """Wait for the first message that reports one of these states of a run."""
         async with asyncio.timeout(PATIENCE_SECONDS):
             while True:
                 self.news.clear()
@@ -86,11 +86,11 @@ def talk(folder: Path, talking: Callable[[Talk], Awaitable[None]]) -> None:
 
 
 def in_worker(monkeypatch: pytest.MonkeyPatch, begin: Callable[[Connection], None]) -> None:
-    """Let the next workers begin so; what they do then is what they always do."""
+    """Replace the start of the next workers; they then continue as usual."""
     monkeypatch.setattr(workers, "_work", begin)
 
 
-# What follows runs in workers.
+# The following functions run in workers.
 
 
 def crash(pipe: Connection) -> None:
@@ -112,7 +112,7 @@ def hang_in_python(pipe: Connection) -> None:
 
 def hang_in_native_code(pipe: Connection) -> None:
     def forever(_: RunHistory) -> None:
-        ctypes.PyDLL(None).pause()  # and Python's lock is held meanwhile
+        ctypes.PyDLL(None).pause()  # Python's global lock is held meanwhile
 
     RunHistory.mark = forever
     run_worker.work(pipe)
@@ -151,7 +151,7 @@ DEATHS: list[tuple[Callable[[Connection], None], str]] = [
 
 
 @pytest.mark.parametrize(("death", "words"), DEATHS)
-def test_a_worker_that_breaks_is_told_and_the_next_run_works(
+def test_a_failed_worker_is_reported_and_the_next_run_works(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, death: Callable[[Connection], None], words: str
 ) -> None:
     async def talking(talk: Talk) -> None:
@@ -165,7 +165,7 @@ def test_a_worker_that_breaks_is_told_and_the_next_run_works(
             assert told["fault"]["what"] == words
             assert told["fault"]["where"] == "run"
             assert told["fault"]["fix"]
-            talk.hub.runs.workers.end()  # the next one was made as the first
+            talk.hub.runs.workers.end()  # the next worker was prepared with the same fault
         assert await talk.ask("ping") is None
         await talk.ask("change", document=document, key="1", edit={"kind": "arrange"})
         again = await talk.ask("run", document=document)
@@ -175,7 +175,7 @@ def test_a_worker_that_breaks_is_told_and_the_next_run_works(
 
 
 @pytest.mark.parametrize("hang", [hang_in_python, hang_in_native_code])
-def test_stop_answers_whatever_the_worker_is_busy_with(
+def test_stop_ends_a_run_in_any_state_of_its_worker(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, hang: Callable[[Connection], None]
 ) -> None:
     in_worker(monkeypatch, hang)
@@ -184,7 +184,7 @@ def test_stop_answers_whatever_the_worker_is_busy_with(
         document = await talk.ask("open_shipped", document_kind="diagram", name="falling_pendulum")
         run = await talk.ask("run", document=document)
         pid = talk.pid(run)
-        for _ in range(3000):  # more than a pipe holds: nobody waits for one that does not listen
+        for _ in range(3000):  # more than the capacity of the pipe: sending must not block
             await talk.ask("speed", run=run, speed=1.0)
         await talk.ask("control", run=run, action="stop")
         told = await talk.until(run, "stopped", "failed", "done")
@@ -192,11 +192,11 @@ def test_stop_answers_whatever_the_worker_is_busy_with(
         with pytest.raises(ProcessLookupError):
             os.kill(pid, 0)
 
-    assert run_process.STOP_SECONDS < 1.0  # what is left of the second is for the system to end it
+    assert run_process.STOP_SECONDS < 1.0  # leaves time for the system to end the process
     talk(tmp_path, talking)
 
 
-def test_a_worker_that_hangs_is_ended_when_nobody_stops_it(
+def test_a_hung_worker_is_killed_without_a_stop_request(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     in_worker(monkeypatch, hang_in_python)
@@ -210,7 +210,7 @@ def test_a_worker_that_hangs_is_ended_when_nobody_stops_it(
     talk(tmp_path, talking)
 
 
-def test_no_run_lasts_for_ever_also_while_it_is_paused(tmp_path: Path) -> None:
+def test_a_paused_run_is_ended_at_the_time_limit(tmp_path: Path) -> None:
     async def talking(talk: Talk) -> None:
         document = await talk.ask("open_shipped", document_kind="diagram", name="falling_pendulum")
         run = await talk.ask("run", document=document, speed=0.1)
@@ -227,7 +227,7 @@ def test_no_run_lasts_for_ever_also_while_it_is_paused(tmp_path: Path) -> None:
     talk(tmp_path, talking)
 
 
-def test_a_worker_that_is_killed_is_told_and_its_samples_stay(tmp_path: Path) -> None:
+def test_a_killed_worker_is_reported_and_its_samples_remain(tmp_path: Path) -> None:
     async def talking(talk: Talk) -> None:
         document = await talk.ask("open_shipped", document_kind="diagram", name="falling_pendulum")
         run = await talk.ask("run", document=document, speed=1.0)
@@ -245,13 +245,15 @@ def test_a_worker_that_is_killed_is_told_and_its_samples_stay(tmp_path: Path) ->
         request = {"kind": "attach", "document": document, "document_kind": "diagram"}
         attach = {"number": 1, "request": request}
         await talk.hub.answer(other, json.dumps(attach))
-        assert any(isinstance(said, bytes) for said in late), "the samples are shown to who comes later"
+        assert any(isinstance(said, bytes) for said in late), (
+            "a page that connects later receives the samples"
+        )
 
     talk(tmp_path, talking)
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a disk that is always full is Linux's")
-def test_a_run_whose_samples_find_no_room_on_the_disk_is_told(
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="/dev/full exists only on Linux")
+def test_a_run_whose_samples_do_not_fit_on_disk_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(**_: object) -> object:
@@ -293,7 +295,7 @@ def defect_in_the_report(pipe: Connection, job: dict[str, Any]) -> None:
         (defect_in_the_report, "armblocks has a defect (KeyError)"),
     ],
 )
-def test_a_report_whose_process_breaks_is_refused_in_words(
+def test_a_report_whose_process_fails_raises_an_error_with_the_reason(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     death: Callable[[Connection, dict[str, Any]], None],

@@ -1,4 +1,4 @@
-"""Processes for runs: one is always there, a dead one is given to nobody, and what is missing is said."""
+"""Worker processes: one is always prepared, a dead one is never used, and a failed start is reported."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ def with_workers(going: Callable[[Workers], Awaitable[None]]) -> None:
 
 
 async def waiting_worker(pool: Workers) -> Worker:
-    """The worker that the next run will get."""
+    """The prepared worker for the next run."""
     made = pool._next  # pyright: ignore[reportPrivateUsage]
     assert made is not None
     return await made
 
 
-def test_the_next_worker_is_made_while_one_is_used() -> None:
+def test_the_next_worker_is_started_while_one_is_in_use() -> None:
     async def going(pool: Workers) -> None:
         first = await pool.take()
         ready = await waiting_worker(pool)
@@ -47,7 +47,7 @@ def test_the_next_worker_is_made_while_one_is_used() -> None:
     with_workers(going)
 
 
-def test_a_worker_that_died_while_it_waited_is_given_to_nobody() -> None:
+def test_a_worker_that_died_while_waiting_is_not_used() -> None:
     async def going(pool: Workers) -> None:
         pool.prepare()
         dead = await waiting_worker(pool)
@@ -62,7 +62,7 @@ def test_a_worker_that_died_while_it_waited_is_given_to_nobody() -> None:
     with_workers(going)
 
 
-def test_a_worker_that_is_wanted_later_is_made_at_once_when_it_is_taken() -> None:
+def test_taking_a_worker_starts_a_delayed_one_at_once() -> None:
     async def going(pool: Workers) -> None:
         pool.prepare(after=3600.0)
         assert pool._next is None  # pyright: ignore[reportPrivateUsage]
@@ -71,7 +71,7 @@ def test_a_worker_that_is_wanted_later_is_made_at_once_when_it_is_taken() -> Non
     with_workers(going)
 
 
-def test_a_system_that_gives_no_process_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failed_process_start_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     def refused() -> Worker:
         raise OSError(11, "Resource temporarily unavailable")
 
@@ -86,8 +86,8 @@ def test_a_system_that_gives_no_process_is_reported(monkeypatch: pytest.MonkeyPa
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere every worker imports for itself")
-def test_a_worker_is_no_copy_of_the_server() -> None:
-    # A copy would hold the server's sockets, and its threads' locks as they happened to be.
+def test_a_worker_is_not_a_fork_of_the_server() -> None:
+    # A fork would hold the server's sockets and the locks of its threads in arbitrary states.
     worker = Worker()
     status = Path(f"/proc/{worker.process.pid}/status").read_text()
     parent = int(next(line for line in status.splitlines() if line.startswith("PPid")).split()[1])
