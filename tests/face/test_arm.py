@@ -33,7 +33,7 @@ def states(puma: ab.Arm) -> list[np.ndarray]:
 
 
 @pytest.mark.parametrize("method", METHODS_OF_Q)
-def test_a_batch_is_its_samples_bit_for_bit(puma: ab.Arm, states: list[np.ndarray], method: str) -> None:
+def test_a_batch_equals_its_samples_bit_for_bit(puma: ab.Arm, states: list[np.ndarray], method: str) -> None:
     call = getattr(puma, method)
     q = states[0]
     batch = call(q)
@@ -57,7 +57,7 @@ def test_loads_are_run_time_inputs(puma: ab.Arm, states: list[np.ndarray], metho
     assert np.abs(pushed - plain[3]).max() > 1e-3
 
 
-def test_arguments_come_by_name_too(puma: ab.Arm, states: list[np.ndarray]) -> None:
+def test_arguments_may_be_given_by_name(puma: ab.Arm, states: list[np.ndarray]) -> None:
     q, qd, third = states
     for k in (slice(None), 3):
         np.testing.assert_array_equal(puma.fkine(q=q[k]), puma.fkine(q[k]))
@@ -70,7 +70,7 @@ def test_arguments_come_by_name_too(puma: ab.Arm, states: list[np.ndarray]) -> N
         )
 
 
-def test_wrong_calls_say_the_right_one(puma: ab.Arm) -> None:
+def test_errors_about_wrong_calls_state_the_correct_call(puma: ab.Arm) -> None:
     q = np.zeros(6)
     with pytest.raises(InputError, match=r"rne: 0 arguments were given.*Fix: call rne\(q, qd, qdd\)"):
         puma.rne(payload=2.0)  # pyright: ignore[reportCallIssue]
@@ -83,12 +83,12 @@ def test_wrong_calls_say_the_right_one(puma: ab.Arm) -> None:
 
 
 @pytest.mark.parametrize("method", [*METHODS_OF_Q, "friction"])
-def test_a_method_is_pickled_by_its_arm(puma: ab.Arm, states: list[np.ndarray], method: str) -> None:
+def test_a_pickled_method_contains_its_arm(puma: ab.Arm, states: list[np.ndarray], method: str) -> None:
     again = pickle.loads(pickle.dumps(getattr(puma, method)))
     np.testing.assert_array_equal(again(states[0]), getattr(puma, method)(states[0]))
 
 
-def test_integers_lists_and_strides_are_taken(puma: ab.Arm) -> None:
+def test_integers_lists_and_strided_arrays_are_accepted(puma: ab.Arm) -> None:
     expected = puma.rne(np.zeros(6), np.zeros(6), np.ones(6))
     np.testing.assert_array_equal(puma.rne([0] * 6, [0] * 6, [1] * 6), expected)
     np.testing.assert_array_equal(
@@ -103,12 +103,12 @@ def test_out_receives_the_result(puma: ab.Arm, states: list[np.ndarray]) -> None
     np.testing.assert_array_equal(out, puma.rne(q, qd, qdd))
 
 
-def test_wrong_shapes_name_the_input_and_what_is_allowed(puma: ab.Arm) -> None:
+def test_errors_about_wrong_shapes_name_the_input_and_the_allowed_shape(puma: ab.Arm) -> None:
     with pytest.raises(InputError, match=r"q.*\(5,\).*\(6,\)"):
         puma.fkine(np.zeros(5))
 
 
-def test_nofriction_takes_the_toolbox_words(puma: ab.Arm) -> None:
+def test_nofriction_accepts_the_options_of_the_toolbox(puma: ab.Arm) -> None:
     qd = np.ones(6)
     both = puma.friction(qd)
     np.testing.assert_allclose(
@@ -129,20 +129,20 @@ def test_older_friction_formulas_are_chosen_by_name(puma: ab.Arm) -> None:
         puma.with_friction_model("signed")
 
 
-def test_operation_count_of_an_unknown_method(puma: ab.Arm) -> None:
+def test_the_operation_count_of_an_unknown_method_is_refused(puma: ab.Arm) -> None:
     assert puma.operation_count("rne").multiplies >= 0
     with pytest.raises(UnknownNameError, match=r"no compiled method named 'rnea'.*did you mean 'rne'"):
         puma.operation_count("rnea")
 
 
-def test_payload_refuses_what_is_no_body() -> None:
+def test_an_impossible_payload_is_refused() -> None:
     with pytest.raises(InputError, match=r"payload mass -1.0 kg is negative"):
         ab.Payload(mass=-1.0)
     with pytest.raises(InputError, match=r"not made of 1 \+ 3 \+ 6 finite numbers"):
         ab.Payload(mass=np.nan)
 
 
-def test_an_arm_shows_itself(puma: ab.Arm) -> None:
+def test_representations_of_an_arm_in_text_and_notebooks(puma: ab.Arm) -> None:
     assert "6 joints RRRRRR" in repr(puma)
     assert "| link1 |         q|    0.6718|" in str(puma)
     html = puma._repr_html_()
@@ -150,7 +150,7 @@ def test_an_arm_shows_itself(puma: ab.Arm) -> None:
     assert "<svg" in html
 
 
-def test_descriptions_show_themselves_in_notebooks(puma: ab.Arm) -> None:
+def test_notebook_representations_of_robots_trajectories_and_diagrams(puma: ab.Arm) -> None:
     assert puma.robot._repr_html_() == puma._repr_html_()
     diagram = ab.load_diagram("van_der_pol_pid")
     assert diagram._repr_svg_() == drawing_bytes(diagram, "svg").decode()
@@ -158,7 +158,7 @@ def test_descriptions_show_themselves_in_notebooks(puma: ab.Arm) -> None:
     assert html.count("<figure>") == 3 and "2 joints, 5 samples to 1 s" in html
 
 
-def test_a_result_shows_angles_in_degrees() -> None:
+def test_the_notebook_representation_of_a_result_shows_degrees() -> None:
     html = ab.simulate("kr180model", stop_time=0.5)._repr_html_()
     assert "<figcaption>jtraj/q <span>deg · 4</span>" in html
     assert "<figcaption>jtraj/qd <span>deg/s · 4</span>" in html

@@ -1,4 +1,4 @@
-"""Every block has a worked example that runs, as a diagram and as the Python that is shown for it."""
+"""Every block has a worked example that runs as a diagram and as its generated Python code."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from worked_examples import worked_example
 
 
 def run_as_typed(code: str) -> dict[str, object]:
-    """What a reader has after typing the lines."""
+    """Execute the lines of an example and return the variables."""
     namespace: dict[str, object] = {}
     exec(compile(code, "example", "exec"), namespace)  # noqa: S102
     return namespace
@@ -25,10 +25,10 @@ def run_as_typed(code: str) -> dict[str, object]:
 
 @pytest.mark.filterwarnings("ignore::armblocks.errors.LimitWarning")
 @pytest.mark.parametrize("kind", BLOCKS.values(), ids=BLOCKS)
-def test_the_worked_example_runs_and_its_python_is_the_same_diagram(kind: type[Block]) -> None:
+def test_the_worked_example_runs_and_its_python_code_gives_the_same_diagram(kind: type[Block]) -> None:
     diagram = worked_example(kind)
     assert kind in map(type, diagram.blocks.values())
-    assert diagram_views(diagram) or kind.type_name() == "Terminator", "something is to be seen"
+    assert diagram_views(diagram) or kind.type_name() == "Terminator", "the diagram has a view"
     assert caption(kind).endswith((".", "…"))
     typed = run_as_typed(diagram_to_python(diagram))
     assert typed["diagram"] == dataclasses.replace(diagram, description="", settings=ab.SimulationOptions())
@@ -40,7 +40,7 @@ def test_the_worked_example_runs_and_its_python_is_the_same_diagram(kind: type[B
 
 
 @pytest.mark.parametrize("name", [name for name in ab.list_examples() if name != "falling_pendulum"])
-def test_a_shipped_example_as_python_is_the_same_diagram(name: str) -> None:
+def test_the_python_code_of_a_shipped_example_gives_the_same_diagram(name: str) -> None:
     diagram = dataclasses.replace(
         ab.load_diagram(name), layout={}, description="", settings=ab.SimulationOptions()
     )
@@ -49,7 +49,7 @@ def test_a_shipped_example_as_python_is_the_same_diagram(name: str) -> None:
     assert f"stop_time={ab.load_diagram(name).settings.stop_time}" in run
 
 
-def test_a_robot_without_a_name_cannot_be_said_in_python() -> None:
+def test_a_robot_without_name_or_file_cannot_be_written_as_python() -> None:
     with pytest.raises(
         FormatError, match=r"neither a shipped one nor that of a file.*write the diagram as JSON"
     ):

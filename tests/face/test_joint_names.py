@@ -1,4 +1,4 @@
-"""A joint has one name, that of its link, wherever entries of its signals are shown."""
+"""Entries of joint signals have the names of the links in data columns, views and the studio."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def test_views_have_the_names_of_the_joints(diagram: ab.Diagram, result: ab.Simu
         assert set(JOINTS) <= {mark.text for mark in text_marks(figures[name].picture)}
 
 
-def test_the_studio_and_its_widgets_are_told_the_names(
+def test_messages_to_the_studio_and_its_widgets_have_the_joint_names(
     diagram: ab.Diagram, result: ab.SimulationResult
 ) -> None:
     class Pipe:
@@ -85,7 +85,7 @@ def test_the_studio_and_its_widgets_are_told_the_names(
         assert entries["pair/y"] == ()
 
 
-def test_a_signal_of_two_robots_has_no_names_and_a_mux_parts_them() -> None:
+def test_only_signals_of_a_single_robot_have_joint_names() -> None:
     builder = ab.DiagramBuilder("two")
     q = builder.add("q", Constant(value=[1.0, 2.0]))
     builder.add("one", RobotPlot(robot=robot(*JOINTS)), q)
@@ -93,7 +93,7 @@ def test_a_signal_of_two_robots_has_no_names_and_a_mux_parts_them() -> None:
     both = builder.add("both", Mux(inputs=2), builder.add("a", Constant()), builder.add("b", Constant()))
     builder.add("third", RobotPlot(robot=robot(*JOINTS)), both)
     shapes = {"q/y": (2,), "both/y": (2,), "a/y": (), "b/y": (), "one/poses": (4, 4, 4)}
-    builder.add("sums", CumulativeSum(), both)  # its entries are no longer those of single joints
+    builder.add("sums", CumulativeSum(), both)  # the entries are not those of single joints
     shapes["sums/y"] = (2,)
     assert entry_names(builder.build(), shapes) == {"both/y": JOINTS}
     assert entry_names(ab.load_diagram("van_der_pol_pid"), {}) == {}

@@ -1,4 +1,4 @@
-"""Dead time in linear systems: exact over the frequency, approximated by states, and at rest."""
+"""Dead time in linear systems: exact frequency response, approximation by states, and steady state."""
 
 from __future__ import annotations
 
@@ -39,17 +39,18 @@ def response(diagram: ab.Diagram, source: str, seen: str) -> np.ndarray:
     return ab.frequency_response(diagram, source, seen, FREQUENCIES)[:, 0, 0]
 
 
-def test_a_loop_with_dead_time_is_exact_over_the_frequency() -> None:
+def test_the_frequency_response_of_a_loop_with_dead_time_is_exact() -> None:
     np.testing.assert_allclose(response(loop(), "c", "x"), 1.0 / (S + np.exp(-DELAY * S)), rtol=1e-13)
 
 
-def test_the_loop_transfer_function_is_that_of_the_open_loop() -> None:
+def test_the_frequency_response_with_an_opened_signal_is_that_of_the_open_loop() -> None:
     found = ab.frequency_response(loop(), "x", "x", FREQUENCIES, open="x")[:, 0, 0]
     np.testing.assert_allclose(found, -np.exp(-DELAY * S) / S, rtol=1e-13)
 
 
-def test_delays_one_behind_another_and_their_derivative() -> None:
-    """A delay that feeds a delay at once, beside a path around both; and s exp(-s T) behind a Derivative."""
+def test_delays_in_series_and_their_derivative() -> None:
+    """A delay in series with the sum of another delay and a direct path; after a Derivative the response is
+    multiplied by s."""
     builder = ab.DiagramBuilder("row")
     u = builder.add("u", Constant())
     lag = builder.add("lag", FirstOrderLag(), u)
@@ -61,11 +62,11 @@ def test_delays_one_behind_another_and_their_derivative() -> None:
     np.testing.assert_allclose(response(builder.build(), "u", "rate"), S * expected, rtol=1e-12)
     system = ab.linearize(builder.build(), "u", "second", delay_order=10)
     assert system.order == 21
-    # an approximation of order 10 is right to 1e-9 as far as 9 rad/s, where s T = 4
+    # an approximation of order 10 has an error of 1e-9 up to 9 rad/s, where |s| T = 4
     assert np.abs(system.frequency_response(FREQUENCIES[:5])[:, 0, 0] - expected[:5]).max() < 1e-9
 
 
-def test_the_approximation_becomes_better_with_its_order() -> None:
+def test_the_error_of_the_approximation_decreases_with_its_order() -> None:
     exact = 1.0 / (S + np.exp(-DELAY * S))
     errors = [
         np.abs(
@@ -77,8 +78,8 @@ def test_the_approximation_becomes_better_with_its_order() -> None:
     assert errors[-1] < 1e-11
 
 
-def test_an_approximation_has_the_gain_one_and_the_slowest_poles_of_the_delay() -> None:
-    """The slowest pole is the root of s + exp(-s T) next to -1.6 + 1.5 j, here by Newton's method."""
+def test_the_approximation_has_gain_1_and_the_slowest_poles_of_the_delay() -> None:
+    """The slowest pole is the root of s + exp(-s T) near -1.6 + 1.5 j, found by Newton's method."""
     poles = ab.linearize(loop(), "c", "x", delay_order=10).poles()
     slowest = -1.6 + 1.5j
     for _ in range(20):
@@ -94,8 +95,8 @@ def test_an_approximation_has_the_gain_one_and_the_slowest_poles_of_the_delay() 
         np.testing.assert_allclose(gains, 1.0, rtol=1e-9)
 
 
-def test_dead_time_between_samples() -> None:
-    """A hold of 0.1 s, a dead time of two periods and a lag: (1 - a) / (z - a) / z^2, for slow changes."""
+def test_dead_time_in_a_sampled_system() -> None:
+    """A hold of 0.1 s, a dead time of two periods and a lag: (1 - a) / (z - a) / z^2 at low frequencies."""
     builder = ab.DiagramBuilder("sampled")
     hold = builder.add("hold", ZeroOrderHold(sample_time=0.1), builder.add("u", Constant()))
     late = builder.add("late", TransportDelay(delay=0.2), builder.add("lag", FirstOrderLag(), hold))
@@ -105,7 +106,7 @@ def test_dead_time_between_samples() -> None:
     z = np.exp(0.1j * FREQUENCIES[:4])
     a = np.exp(-0.1)
     expected = (1 - a) / (z - a) / z**2
-    # the steps of a hold have all frequencies: those far beyond order / delay come out too early
+    # a step contains all frequencies; those far above order / delay are delayed too little
     np.testing.assert_allclose(
         system.frequency_response(FREQUENCIES[:4])[:, 0, 0], expected, atol=2e-3, rtol=0
     )
@@ -115,7 +116,7 @@ def test_dead_time_between_samples() -> None:
         response(builder.build(), "u", "seen")
 
 
-def test_a_delay_that_changes_stands_still() -> None:
+def test_a_variable_delay_is_linearised_with_its_present_value() -> None:
     builder = ab.DiagramBuilder("variable")
     u, how_long = builder.add("u", Constant()), builder.add("T", Constant(value=0.7))
     builder.add(
@@ -133,7 +134,7 @@ def test_a_diagram_without_dead_time_has_the_response_of_its_linear_system() -> 
 
 
 @pytest.mark.parametrize("order", [0, 11, 2.0, True])
-def test_an_order_is_a_whole_number_from_1_to_10(order: int) -> None:
+def test_an_order_that_is_not_an_integer_from_1_to_10_is_refused(order: int) -> None:
     with pytest.raises(InputError, match=r"the delay_order is .*an integer from 1 to 10.*3 is a good start"):
         ab.linearize(loop(), "c", "x", delay_order=order)
 
@@ -143,7 +144,7 @@ def test_without_an_order_dead_time_is_refused() -> None:
         ab.linearize(loop(), "c", "x")
 
 
-def test_at_rest_what_comes_out_of_a_delay_is_what_goes_in() -> None:
+def test_in_steady_state_the_output_of_a_delay_equals_its_input() -> None:
     found = ab.trim(loop())
     assert float(found.point.states["x/x"]) == pytest.approx(1.0, rel=1e-12)
     assert float(found.point.discrete["late/past"]) == pytest.approx(1.0, rel=1e-12)

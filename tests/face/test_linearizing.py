@@ -1,4 +1,4 @@
-"""Exact linear systems of diagrams, against what is known of them without the tracing."""
+"""Exact linear systems of diagrams compared with closed forms and simulations."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def oscillator(mass: float = 2.0, damping: float = 0.4, stiffness: float = 8.0) 
     return builder.build()
 
 
-def test_an_oscillator_has_the_matrices_of_the_textbook() -> None:
+def test_the_matrices_of_an_oscillator_agree_with_the_textbook() -> None:
     system = ab.linearize(oscillator(), "force", ["x", "v"])
     assert system.states == ("v/x", "x/x")
     assert np.array_equal(system.A, [[-0.2, -4.0], [1.0, 0.0]])
@@ -46,7 +46,7 @@ def test_an_oscillator_has_the_matrices_of_the_textbook() -> None:
     assert np.array_equal(system.D, np.zeros((2, 1)))
 
 
-def test_a_parameter_is_an_input_like_the_signal_that_it_makes() -> None:
+def test_a_parameter_may_be_the_input_of_a_linear_system() -> None:
     signal, value = (ab.linearize(oscillator(), name, "x") for name in ("force", "force.value"))
     assert np.array_equal(signal.B, value.B)
     stiffness = ab.linearize(oscillator(), "k.gain", "x", at=5.0)
@@ -55,25 +55,25 @@ def test_a_parameter_is_an_input_like_the_signal_that_it_makes() -> None:
     assert stiffness.B[0, 0] == pytest.approx(-float(stiffness.point.signals["x/y"]) / 2.0, rel=1e-12)
 
 
-def test_an_opened_loop_is_cut_and_its_signal_stands_still() -> None:
+def test_an_opened_loop_is_cut_at_its_signal() -> None:
     loop = ab.linearize(oscillator(), "sum", "sum", open="sum")
-    # The sum is cut: the way around is -(c s + k) / (m s^2).
+    # The loop is cut at the sum: its transfer function is -(c s + k) / (m s^2).
     s = 0.7 + 1.3j
     assert loop.at(s)[0, 0] == pytest.approx(-(0.4 * s + 8.0) / (2.0 * s**2), rel=1e-12)
     closed = ab.linearize(oscillator(), "sum", "sum")
     assert closed.at(s)[0, 0] == pytest.approx(loop.at(s)[0, 0] / (1.0 - loop.at(s)[0, 0]), rel=1e-12)
 
 
-def test_an_input_port_is_one_wire_and_an_output_port_all() -> None:
+def test_an_input_port_perturbs_one_connection_and_an_output_port_all() -> None:
     one = ab.linearize(oscillator(), "c/u", ["v", "c/u"])
     assert np.array_equal(one.B[:, 0], [-0.2, 0.0])
-    assert np.array_equal(one.D[:, 0], [0.0, 1.0])  # before and behind the point
+    assert np.array_equal(one.D[:, 0], [0.0, 1.0])  # before and after the perturbed port
     both = ab.linearize(oscillator(), "v", "v")
     assert np.array_equal(both.B[:, 0], [-0.2, 1.0])
 
 
 def pendulum() -> ab.Diagram:
-    """qdd = torque - sin(q), starting at 0.5 rad."""
+    """qdd = torque - sin(q), with q(0) = 0.5 rad."""
     builder = ab.DiagramBuilder("pendulum")
     torque = builder.add("torque", Constant(value=0.0))
     total = builder.add("sum", Sum(signs="+-"), torque)
@@ -83,7 +83,7 @@ def pendulum() -> ab.Diagram:
     return builder.build()
 
 
-def test_times_of_a_run_give_one_system_each() -> None:
+def test_several_times_give_one_linear_system_each() -> None:
     diagram = pendulum()
     systems = ab.linearize(diagram, "torque", "q", at=[2.0, 0.0, 1.0], rtol=1e-10, atol=1e-12)
     result = ab.simulate(diagram, stop_time=2.0, sample_time=1.0, rtol=1e-10, atol=1e-12)
@@ -94,7 +94,7 @@ def test_times_of_a_run_give_one_system_each() -> None:
     assert np.allclose(again.A, systems[0].A, atol=1e-9, rtol=0.0)
 
 
-def test_a_limiter_at_its_limit_lets_nothing_through() -> None:
+def test_the_gain_of_a_limiter_at_its_limit_is_zero() -> None:
     def through(value: float) -> float:
         builder = ab.DiagramBuilder("limiter")
         source = builder.add("u", Constant(value=value))
@@ -106,7 +106,7 @@ def test_a_limiter_at_its_limit_lets_nothing_through() -> None:
 
 
 def sampled_servo(period: float) -> ab.Diagram:
-    """x' = -x + hold(gain (1 - x)), the hold every period."""
+    """x' = -x + hold(gain (1 - x)), with a hold of the given period."""
     builder = ab.DiagramBuilder("servo")
     wanted = builder.add("wanted", Constant(value=1.0))
     error = builder.add("error", Sum(signs="+-"), wanted)
@@ -118,18 +118,18 @@ def sampled_servo(period: float) -> ab.Diagram:
     return builder.build()
 
 
-def test_a_sampled_loop_has_the_map_of_one_period() -> None:
+def test_the_linear_system_of_a_sampled_loop_is_the_map_over_one_period() -> None:
     period = 0.3
     system = ab.linearize(sampled_servo(period), "wanted", "x")
     decay = np.exp(-period)
     assert system.dt == period
-    assert system.states == ("x/x",)  # the held output is worked out anew at every tick
+    assert system.states == ("x/x",)  # the held output is computed anew at every tick
     assert system.A[0, 0] == pytest.approx(decay - 2.0 * (1.0 - decay), rel=1e-14)
     assert system.B[0, 0] == pytest.approx(2.0 * (1.0 - decay), rel=1e-14)
     assert np.array_equal(system.C, [[1.0]])
 
 
-def test_a_sampled_loop_moves_as_its_linear_system() -> None:
+def test_the_run_of_a_sampled_loop_agrees_with_its_linear_system() -> None:
     diagram, period = sampled_servo(0.3), 0.3
     system = ab.linearize(diagram, "wanted", "x")
     result = ab.simulate(diagram, stop_time=6.0, sample_time=period, rtol=1e-11, atol=1e-13)
@@ -138,7 +138,7 @@ def test_a_sampled_loop_moves_as_its_linear_system() -> None:
 
 
 @pytest.mark.parametrize(("fast_every", "slow_every", "unit"), [(2, 3, 0.1), (3, 10, 1.0 / 30.0)])
-def test_clocks_of_several_rates_give_the_map_of_their_common_period(
+def test_clocks_of_several_rates_give_the_map_over_their_common_period(
     fast_every: int, slow_every: int, unit: float
 ) -> None:
     builder = ab.DiagramBuilder("two rates")
@@ -146,13 +146,13 @@ def test_clocks_of_several_rates_give_the_map_of_their_common_period(
     total = builder.add("sum", Sum(signs="+-"), source)
     fast = builder.add("fast", ZeroOrderHold(sample_time=round(fast_every * unit, 12)), total)
     state = builder.add("x", Integrator(), fast)
-    # 10/30 s is no decimal number: its double is a third only to rounding.
+    # 1/3 s is not exact in binary: its double equals a third only up to rounding.
     slow = ZeroOrderHold(sample_time=slow_every / round(1.0 / unit))
     builder.connect(builder.add("slow", slow, state), total["u2"])
     system = ab.linearize(builder.build(), "u", "x")
     assert system.dt == pytest.approx(fast_every * slow_every * unit, rel=1e-15)
 
-    # By hand, for 0.2 s and 0.3 s: slow takes x at 0 and 0.3, fast takes u - slow at 0, 0.2, 0.4.
+    # Reference for 0.2 s and 0.3 s: slow samples x at 0 and 0.3, fast samples u - slow at 0, 0.2, 0.4.
     def period(x: float, slow: float, u: float) -> float:
         fast_value = 0.0
         for k in range(fast_every * slow_every):
@@ -167,7 +167,7 @@ def test_clocks_of_several_rates_give_the_map_of_their_common_period(
     assert system.B[0, 0] == pytest.approx(period(0.0, 0.0, 1.0), rel=1e-13)
 
 
-def test_a_delay_line_is_a_shift() -> None:
+def test_two_unit_delays_have_the_transfer_function_z_to_the_minus_2() -> None:
     builder = ab.DiagramBuilder("delays")
     source = builder.add("u", Constant(value=0.0))
     first = builder.add("first", UnitDelay(sample_time=0.1), source)
@@ -177,7 +177,7 @@ def test_a_delay_line_is_a_shift() -> None:
     assert system.at(z)[0, 0] == pytest.approx(z**-2, rel=1e-14)
 
 
-def test_an_implicit_equation_is_taken_out_exactly() -> None:
+def test_an_implicit_equation_is_eliminated_exactly() -> None:
     builder = ab.DiagramBuilder("implicit")
     state = builder.add("x", Integrator(initial=0.7))
     total = builder.add("sum", Sum(signs="+-"), state)
@@ -192,7 +192,7 @@ def test_an_implicit_equation_is_taken_out_exactly() -> None:
     assert system.A[0, 0] == pytest.approx(-1.0 / (1.0 + 3.0 * y**2), rel=1e-13)
 
 
-def test_a_discrete_hold_of_a_matrix_plant_is_its_exponential() -> None:
+def test_a_held_input_of_a_state_space_plant_gives_the_matrix_exponential() -> None:
     A = np.array([[0.0, 1.0], [-4.0, -0.2]])
     builder = ab.DiagramBuilder("plant")
     source = builder.add("u", Constant(value=0.0))
@@ -213,7 +213,7 @@ def test_every_shipped_example_is_linearised(name: str) -> None:
     assert np.isfinite(system.A).all()
 
 
-def test_names_that_mean_nothing_are_refused() -> None:
+def test_unknown_names_and_unsuitable_times_are_refused() -> None:
     diagram = oscillator()
     with pytest.raises(UnknownNameError, match="there is no block named 'forse'"):
         ab.linearize(diagram, "forse")
@@ -231,7 +231,7 @@ def test_names_that_mean_nothing_are_refused() -> None:
         ab.linearize(diagram, at=ab.simulate(pendulum(), stop_time=1.0).final_state)
 
 
-def test_a_block_with_several_outputs_needs_the_port() -> None:
+def test_a_block_with_several_outputs_without_a_port_is_refused() -> None:
     with pytest.raises(InputError, match=r"is a block with 3 outputs.*Fix: name the port"):
         ab.linearize("puma560_computed_torque", "arm")
 
@@ -245,7 +245,7 @@ def test_clocks_without_a_common_period_are_refused() -> None:
         ab.linearize(builder.build())
 
 
-def test_a_slope_that_is_not_finite_is_refused() -> None:
+def test_a_derivative_that_is_not_finite_is_refused() -> None:
     builder = ab.DiagramBuilder("root")
     state = builder.add("x", Integrator(initial=0.0))
     builder.connect(builder.add("root", Expression(formula="sqrt(u)"), state), state["u"])
@@ -254,7 +254,7 @@ def test_a_slope_that_is_not_finite_is_refused() -> None:
 
 
 def implicit(value: float, formula: str) -> ab.Diagram:
-    """w = formula(w, value)."""
+    """A diagram with the implicit equation w = formula(w, value)."""
     builder = ab.DiagramBuilder("implicit")
     source = builder.add("u", Constant(value=value))
     answer = builder.add("answer", Expression(formula=formula, inputs=2), source)
@@ -269,7 +269,7 @@ def test_implicit_equations_without_a_solution_are_refused() -> None:
         ab.linearize(implicit(0.0, "u2 + u2^3 + u1"))
 
 
-def test_a_subsystem_is_seen_through_like_the_flat_diagram() -> None:
+def test_signals_in_a_subsystem_are_linearised_as_in_a_flat_diagram() -> None:
     inside = ab.DiagramBuilder("inside")
     entry = inside.add("in", Inport())
     lag = inside.add("lag", Sum(signs="+-"), entry)
@@ -288,7 +288,7 @@ def test_a_subsystem_is_seen_through_like_the_flat_diagram() -> None:
     assert ab.linearize(diagram, "plant/gain.gain", "twice").D[0, 0] == 0.0
 
 
-def test_a_puma_falls_as_its_mass_matrix_and_the_slope_of_its_weight_say() -> None:
+def test_the_linearised_puma_agrees_with_mass_matrix_and_gravity_gradient() -> None:
     puma = ab.load_robot("puma560")
     q = np.array([0.1, 0.6, -0.4, 0.2, 0.5, -0.3])
     builder = ab.DiagramBuilder("puma")
@@ -301,6 +301,7 @@ def test_a_puma_falls_as_its_mass_matrix_and_the_slope_of_its_weight_say() -> No
     slope = np.column_stack(
         [(puma.gravload(q + e) - puma.gravload(q - e)) / (2 * step) for e in step * np.eye(6)]
     )
-    # At rest and in balance the only slope of qdd by q is that of the weight; central differences: h^2.
+    # In equilibrium the derivative of qdd by q is that of the gravity load; central differences have the
+    # error h^2.
     assert np.allclose(system.A[6:, :6], -inverse @ slope, rtol=0.0, atol=1e-5 * np.abs(inverse).max())
     assert np.array_equal(system.A[:6, 6:], np.eye(6))

@@ -1,4 +1,4 @@
-"""Slopes by parameters of masks: what follows from them by formulas moves with them."""
+"""Derivatives by mask parameters include the parameters that depend on them through formulas."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from armblocks.errors import InputError, UnknownNameError
 
 
 def loop() -> Diagram:
-    """x' = K^2 (u - 3 K x) through two masks, u = sin t."""
+    """x' = K^2 (u - 3 K x) with two masks and u = sin t."""
     inner = DiagramBuilder("inner")
     a = inner.parameter("a", 1.0, unit="1/s")
     inner.output("y", inner.add("gain", Gain(gain=a), inner.input("u")))
@@ -30,18 +30,18 @@ def loop() -> Diagram:
     return builder.build()
 
 
-def test_sensitivity_by_a_mask_is_the_slope_of_runs() -> None:
+def test_sensitivity_to_a_mask_parameter_agrees_with_differences_of_runs() -> None:
     settings: dict[str, Any] = {"stop_time": 2.0, "rtol": 1e-12, "atol": 1e-14, "sample_time": 0.1}
     found = ab.sensitivity(loop(), ["K", "forward.a"], "x", **settings)
     h = 1e-5
     runs = [ab.simulate(loop(), parameters={"K": 2.0 + step}, **settings)["x"] for step in (h, -h)]
-    # The error of a central difference is h^2/6 of the third derivative, and rounding over h.
+    # A central difference has the error h^2/6 times the third derivative, plus rounding errors over h.
     assert np.abs(found["x", "K"] - (runs[0] - runs[1]) / (2 * h)).max() < 1e-8
     assert found["x", "K"][0] == 0.25
     assert np.abs(found["x", "forward.a"]).max() > 0.01
 
 
-def test_linearization_by_a_mask_is_the_chain_rule() -> None:
+def test_linearisation_by_a_mask_parameter_uses_the_chain_rule() -> None:
     point = ab.linearize(loop(), inputs=["K", "forward.a", "back.gain"], outputs="x", at=1.0)
     u, x = np.sin(1.0), ab.simulate(loop(), stop_time=1.0)["x"][-1]
     row = point.B[0] if point.B.shape[0] == 1 else point.B[list(point.states).index("x/x")]
@@ -53,7 +53,7 @@ def test_linearization_by_a_mask_is_the_chain_rule() -> None:
     assert x
 
 
-def test_what_has_no_slope_says_why() -> None:
+def test_mask_parameters_without_derivative_are_refused_with_the_reason() -> None:
     with pytest.raises(InputError, match=r"'hold.sample_time', which is not tunable, depends on 'n'"):
         ab.sensitivity(loop(), "n", "x")
     with pytest.raises(InputError, match="the mask parameter 'way' is str, which has no derivative"):

@@ -1,4 +1,4 @@
-"""Public values are pickled, copied and sent to other processes: by their description, with the same bits."""
+"""Public values are pickled, copied and sent to other processes with the same bits."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def small_builder() -> ab.DiagramBuilder:
 
 @cache
 def examples() -> Mapping[str, Any]:
-    """One value or more of every public type, by a name that begins with the type's."""
+    """Return at least one value of every public type, by a name that starts with that of the type."""
     arm, diagram = ab.load_robot("twolink"), small_builder().build()
     robot, compiled = arm.robot, ab.CompiledDiagram(diagram)
     result = ab.simulate(compiled, stop_time=1.0)
@@ -74,7 +74,7 @@ def examples() -> Mapping[str, Any]:
 
 
 def content(value: Any) -> object:
-    """All that a value holds, arrays with their bits."""
+    """Return the whole content of a value, with the bytes of arrays."""
     if isinstance(value, np.ndarray):
         return str(value.dtype), value.shape, value.tobytes()
     if isinstance(value, Mapping):
@@ -101,15 +101,15 @@ def test_every_public_type_is_among_the_examples() -> None:
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_a_copy_holds_what_its_original_holds(way: str) -> None:
+def test_a_copy_has_the_content_of_the_original(way: str) -> None:
     for name, value in examples().items():
         assert content(WAYS[way](value)) == content(value), name
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_constant_arrays_stay_read_only(way: str) -> None:
+def test_arrays_of_copies_are_read_only(way: str) -> None:
     payload, system, table = (examples()[name] for name in ("Payload", "LinearSystem", "TimeTable"))
-    assert payload.numbers.sum() == 2.0  # worked out before it is copied
+    assert payload.numbers.sum() == 2.0  # computed and cached before the copy
     copies = [WAYS[way](value) for value in (payload, system, table)]
     assert not any(array.flags.writeable for array in (copies[0].numbers, copies[1].A, copies[2].rows))
 
@@ -133,12 +133,12 @@ def test_shipped_robots_and_examples_are_pickled() -> None:
         diagram = formats.load_diagram(name, BLOCKS, draft=True)
         again = pickle.loads(pickle.dumps(diagram))
         assert again == diagram and content(again) == content(diagram)
-        # the copy finds the code of the original in the cache
+        # the copy loads the code of the original from the cache
         assert content_key(again) == content_key(diagram)
 
 
 def raised(kind: type[errors.ArmblocksError]) -> errors.ArmblocksError:
-    """An error of each kind: its lists are lists, everything else that it has to be given is text."""
+    """Construct an error of this type with texts, or lists, for its required arguments."""
     lists = {"known": ["gain"], "loop": ["a/y", "b/y"]}
     required = [name for name, p in inspect.signature(kind).parameters.items() if p.default is p.empty]
     error = kind(*(lists.get(name, f"the {name}") for name in required), where="here")
@@ -148,7 +148,7 @@ def raised(kind: type[errors.ArmblocksError]) -> errors.ArmblocksError:
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_errors_keep_their_parts(way: str) -> None:
+def test_copies_of_errors_keep_all_their_parts(way: str) -> None:
     kinds = [kind for kind in vars(errors).values() if isinstance(kind, type)]
     for kind in kinds:
         if issubclass(kind, errors.ArmblocksError):
@@ -173,7 +173,7 @@ def test_a_python_function_is_pickled_by_its_name(tmp_path: Path) -> None:
         pickle.loads(pickle.dumps(trusted))
 
 
-def test_what_cannot_be_found_by_a_name_is_refused() -> None:
+def test_a_local_function_or_lambda_cannot_be_pickled() -> None:
     factor = 2.0
 
     def scaled(u: float) -> float:
@@ -183,10 +183,10 @@ def test_what_cannot_be_found_by_a_name_is_refused() -> None:
         diagram = diagram_with(function)
         with pytest.raises(errors.InputError, match=r"cannot be pickled.*Fix: define it with def at the top"):
             pickle.dumps(diagram)
-        assert copy.deepcopy(diagram) == diagram  # within one process the function itself is there
+        assert copy.deepcopy(diagram) == diagram  # a copy in the same process refers to the function itself
 
 
-def test_a_run_in_progress_is_refused() -> None:
+def test_a_run_in_progress_cannot_be_pickled() -> None:
     run = ab.begin("van_der_pol_pid")
     for way in WAYS.values():
         with pytest.raises(errors.InputError, match=r"a run in progress cannot be copied.*initial_state"):
@@ -197,7 +197,7 @@ def test_a_run_in_progress_is_refused() -> None:
 
 
 def in_another_process(sent: Mapping[str, Any], answer: Any) -> None:
-    """Compute with what was sent; send the bits back, or the error."""
+    """Compute with the received values; send the bytes of the results back, or the error."""
     try:
         q = np.linspace(-1, 1, 6)
         bits = {
@@ -216,7 +216,7 @@ def in_another_process(sent: Mapping[str, Any], answer: Any) -> None:
         raise
 
 
-def test_values_travel_to_a_process_of_its_own() -> None:
+def test_values_sent_to_another_process_give_the_same_results() -> None:
     arm = ab.load_robot("puma560")
     compiled = ab.compile_diagram(ab.load_diagram("van_der_pol_pid"))
     function = diagram_with(half)

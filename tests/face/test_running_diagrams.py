@@ -25,7 +25,7 @@ def paper() -> ab.Diagram:
     return ab.load_diagram("kr180model")
 
 
-def test_the_papers_positions(paper: ab.Diagram) -> None:
+def test_the_run_reproduces_the_positions_of_the_paper(paper: ab.Diagram) -> None:
     result = ab.simulate(paper)
     assert len(result.time) == 1001
     for t, expected in POSITIONS.items():
@@ -35,7 +35,7 @@ def test_the_papers_positions(paper: ab.Diagram) -> None:
 
 
 def test_derivative_blocks_are_exact(paper: ab.Diagram) -> None:
-    """The torques fed by du/dt twice equal those of the trajectory's own rates."""
+    """Torques from two Derivative blocks equal those from the speeds and accelerations of the trajectory."""
     result = ab.simulate(paper)
     path = ab.jtraj([0, 0, 0, 0], [3.14, 0, 1.57, 0], result.time)
     arm = ab.load_robot("kr180")
@@ -65,7 +65,7 @@ def test_signatures_list_the_settings_of_a_run() -> None:
             call(**given, **dict.fromkeys(required, ""), stop_tme=1.0)
 
 
-def test_unknown_settings_and_parameters_say_the_nearest(paper: ab.Diagram) -> None:
+def test_unknown_settings_and_parameters_are_refused_with_the_nearest_name(paper: ab.Diagram) -> None:
     with pytest.raises(UnknownNameError, match=r"no argument named 'stoptime'.*did you mean 'stop_time'"):
         ab.simulate(paper, stoptime=3)
     with pytest.raises(UnknownNameError, match=r"no block named 'jtrai'.*did you mean 'jtraj'"):
@@ -77,14 +77,15 @@ def test_unknown_settings_and_parameters_say_the_nearest(paper: ab.Diagram) -> N
 
 
 @pytest.mark.parametrize("name", ab.list_examples())
-def test_every_example_runs_and_shows_itself(name: str) -> None:
+def test_every_example_runs_and_has_a_notebook_representation(name: str) -> None:
     result = ab.simulate(name, stop_time=0.5)
     assert result.run.complete
     assert "<svg" in result._repr_html_()
 
 
-def test_a_trajectory_beyond_the_joint_limits_is_warned_of(paper: ab.Diagram) -> None:
-    """Joint 2 ends at 90 deg, so 2 rad = 114.6 deg is beyond; it passes 90 deg where the quintic says so."""
+def test_a_trajectory_beyond_the_joint_limits_raises_a_warning(paper: ab.Diagram) -> None:
+    """The limit of joint 2 is 90 deg, and 2 rad = 114.6 deg exceeds it; the quintic gives the time at 90
+    deg."""
     with pytest.warns(LimitWarning) as caught:
         ab.simulate(paper, parameters={"jtraj.qf": (3.14, 2.0, 1.57, 0.0)})
     (text,) = (str(warning.message) for warning in caught)
@@ -95,12 +96,12 @@ def test_a_trajectory_beyond_the_joint_limits_is_warned_of(paper: ab.Diagram) ->
     assert f"from t = {crossing:.4g} s on" in text
 
 
-def test_a_joint_that_is_too_fast_is_warned_of(paper: ab.Diagram) -> None:
+def test_a_joint_above_its_speed_limit_raises_a_warning(paper: ab.Diagram) -> None:
     with pytest.warns(LimitWarning, match=r"joint 'link1' is faster than allowed \(at most 105 deg/s\)"):
         ab.simulate(paper, parameters={"jtraj.tmax": 3.0}, stop_time=3.0)
 
 
-def test_a_run_is_paused_tuned_and_taken_up_again() -> None:
+def test_a_run_is_paused_tuned_and_continued() -> None:
     run = ab.begin("van_der_pol_pid", stop_time=30.0)
     run.advance(10.0, exactly=True)
     assert run.time == 10.0 and not run.finished and run.stop_time == 30.0
@@ -116,7 +117,7 @@ def test_a_run_is_paused_tuned_and_taken_up_again() -> None:
     assert run.samples(run.recorded - 5)["x1"].shape == (5,)
 
 
-def test_a_run_refuses_what_is_not_tunable() -> None:
+def test_a_run_refuses_parameters_that_are_not_tunable() -> None:
     run = ab.begin("van_der_pol_pid", parameters={"PID.P": 3.0})
     assert run.parameters["PID.P"] == 3.0
     run.advance(steps=10)
@@ -128,7 +129,7 @@ def test_a_run_refuses_what_is_not_tunable() -> None:
     assert run.finished and run.result().run.message == "stopped"
 
 
-def test_a_run_begins_from_a_saved_state(tmp_path: Path) -> None:
+def test_a_run_starts_from_a_saved_state(tmp_path: Path) -> None:
     first = ab.begin("van_der_pol_pid", stop_time=20.0)
     first.advance(5.0)
     first.state().save(tmp_path / "state.npz")

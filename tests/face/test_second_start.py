@@ -1,4 +1,4 @@
-"""Models that an earlier process has compiled run without tracing."""
+"""Models whose compiled code is in the disk cache run without tracing."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ def refuse(diagram: ab.Diagram) -> HybridSystem:
 
 
 @pytest.mark.parametrize("name", ["van_der_pol_pid", "dc_motor_sampled_pid", "robertson_kinetics"])
-def test_a_second_start_of_a_shipped_model_traces_nothing(
+def test_a_second_start_of_a_shipped_model_does_not_trace(
     name: str, own_cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first = ab.simulate(ab.load_diagram(name))
     monkeypatch.setattr(face_model, "trace_diagram", refuse)
-    # a new object, as another process would have: nothing is shared with the first
+    # a new object that shares nothing with the first, as in another process
     second = ab.simulate(ab.load_diagram(name))
     assert second.names == first.names and second.units == first.units
     assert second.columns() == first.columns()
@@ -55,24 +55,26 @@ def chain(gain: float, factor: float = 2.0) -> ab.Diagram:
     return builder.build()
 
 
-def test_a_change_of_content_is_traced_anew(own_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_diagram_with_changed_content_is_traced_again(
+    own_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     plain = ab.simulate(chain(1.0))["integral"]
-    # by keys alone: other numbers, other code
+    # other numbers and other code have other keys
     np.testing.assert_allclose(ab.simulate(chain(3.0))["integral"], 3 * plain, rtol=1e-5, atol=1e-5)
     np.testing.assert_allclose(ab.simulate(chain(1.0, 4.0))["integral"], 2 * plain, rtol=1e-5, atol=1e-5)
     monkeypatch.setattr(face_model, "trace_diagram", refuse)
     assert ab.simulate(chain(1.0))["integral"].tobytes() == plain.tobytes()
-    longer = dataclasses.replace(chain(1.0), description="how it runs and looks is no part of the equations")
+    longer = dataclasses.replace(chain(1.0), description="settings and layout are not part of the equations")
     assert ab.simulate(longer, stop_time=2.0)["integral"].size
     with pytest.raises(AssertionError, match="chain was traced"):
         ab.simulate(chain(1.5))
 
 
-def test_a_model_whose_content_cannot_be_known_is_traced_each_time(
+def test_a_model_with_a_foreign_block_class_is_traced_each_time(
     own_cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     class Doubled(Gain):
-        """Somebody else's block."""
+        """A block class outside the package."""
 
     builder = ab.DiagramBuilder("theirs")
     builder.add("scope", Scope(), builder.add("doubled", Doubled(gain=2.0), builder.add("wave", SineWave())))

@@ -1,4 +1,4 @@
-"""Derivatives of runs by parameters, against closed forms and differences of runs."""
+"""Derivatives of runs by parameters compared with closed forms and differences of runs."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def decay() -> ab.Diagram:
     return builder.build()
 
 
-def test_a_decay_follows_its_rate_and_its_start_as_the_closed_form() -> None:
+def test_sensitivities_of_a_decay_agree_with_the_closed_form() -> None:
     for solver in ({}, {"solver": "rk4", "step": 0.001}):
         result = ab.sensitivity(decay(), ["k.gain", "x.initial"], "x", **{**TIGHT, **solver})
         t = result.time
@@ -65,7 +65,7 @@ def test_a_decay_follows_its_rate_and_its_start_as_the_closed_form() -> None:
 def differences(
     diagram: ab.Diagram, parameter: str, output: str, step: float, **settings: object
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Central differences of runs, extrapolated (Richardson), and what half the step changes of them."""
+    """Return Richardson-extrapolated central differences of runs, and their change with half the step."""
     compiled = ab.compile_diagram(diagram)
     middle = compiled.system.parameters.unpack(compiled.system.parameter_values)[parameter]
 
@@ -101,7 +101,7 @@ def implicit() -> ab.Diagram:
 
 
 def limited() -> ab.Diagram:
-    """A gain behind a sine that is cut, into an integrator."""
+    """The integral of a sine after a gain and a limiter."""
     builder = ab.DiagramBuilder("limited")
     wave = builder.add("wave", SineWave(frequency=3.0, amplitude=2.0))
     gain = builder.add("gain", Gain(gain=1.3), wave)
@@ -110,7 +110,7 @@ def limited() -> ab.Diagram:
 
 
 def delayed() -> ab.Diagram:
-    """A delay in a loop, two delays in front of a Derivative, and a delay that varies."""
+    """A delay in a loop, two delays before a Derivative, and a variable delay."""
     builder = ab.DiagramBuilder("delayed")
     square = builder.add("square", SignalGenerator(waveform="square", frequency=0.9, amplitude=1.2))
     rate = builder.add("rate", Sum(signs="+-++"), square)
@@ -133,7 +133,7 @@ def delayed() -> ab.Diagram:
 
 
 def switched() -> ab.Diagram:
-    """Enabled, triggered and resettable subsystems in one loop with their controls' signals."""
+    """Enabled, triggered and resettable subsystems in one loop with their control signals."""
     builder = ab.DiagramBuilder("switched")
     wave = builder.add("wave", SineWave(frequency=2.0, bias=0.3))
     ramp = builder.add("ramp", Ramp(slope=0.8, initial=0.2))
@@ -153,7 +153,7 @@ def switched() -> ab.Diagram:
 
 
 def inside(*, states: bool = True) -> ab.Diagram:
-    """A gain, and an integrator behind it."""
+    """A gain followed by an integrator."""
     builder = ab.DiagramBuilder("inside")
     last = builder.add("gain", Gain(gain=1.5), builder.add("In1", Inport()))
     last = builder.add("state", Integrator(initial=0.3), last) if states else last
@@ -162,7 +162,8 @@ def inside(*, states: bool = True) -> ab.Diagram:
 
 
 def pushed() -> ab.Diagram:
-    """Backlash that is switched on and reset beyond its play, with an event behind it at the same instant."""
+    """Backlash that is enabled and reset outside its dead band, followed by a block with an event at the same
+    time."""
     builder = ab.DiagramBuilder("pushed")
     wave = builder.add("wave", SineWave(frequency=3.0, amplitude=2.0, phase=0.3))
     control = builder.add("control", SineWave(frequency=2.1, bias=0.2, phase=-0.6))
@@ -184,7 +185,7 @@ def pushed() -> ab.Diagram:
 
 
 def pulses() -> ab.Diagram:
-    """Pulses of a width that varies, a sawtooth that is cut, and a step, all into one integrator."""
+    """Pulses of variable width, a limited sawtooth and a step; the integrator adds them."""
     builder = ab.DiagramBuilder("pulses")
     pwm = builder.add("pwm", PWM(period=0.13), builder.add("duty", SineWave(amplitude=0.3, bias=0.5)))
     total = builder.add("total", Sum(signs="+++"), pwm)
@@ -196,7 +197,7 @@ def pulses() -> ab.Diagram:
 
 
 def limited_loop() -> ab.Diagram:
-    """An implicit equation that hangs on a state which a limiter drives."""
+    """An implicit equation that depends on a state; the input of the state is limited."""
     builder = ab.DiagramBuilder("limited loop")
     state = builder.add("x", Integrator(initial=0.7))
     total = builder.add("sum", Sum(signs="+-"), state)
@@ -234,24 +235,25 @@ def limited_loop() -> ab.Diagram:
         ),
     ],
 )
-def test_sensitivities_are_the_differences_of_runs(
+def test_sensitivities_agree_with_differences_of_runs(
     make: Callable[[], ab.Diagram], step: float, parameters: list[str]
 ) -> None:
     diagram = make()
-    # At a multiple of the sample time none of the signals jumps.
+    # No signal jumps at a multiple of the sample time.
     settings = {**TIGHT, "sample_time": 0.0997}
     result = ab.sensitivity(diagram, parameters, "x", **settings)
     for parameter in parameters:
         found = result["x", parameter]
-        # Where an event passes a row between two of the runs, their difference tells nothing.
+        # Where an event of one run is before a sample and that of another run after it, differences are
+        # invalid.
         expected, doubt = differences(diagram, parameter, "x", step, **settings)
         assert np.mean(doubt < 1e-3) > 0.8
         assert np.all(np.abs(found - expected) <= 1e-5 * (1.0 + np.abs(expected)) + 10.0 * doubt), parameter
         assert np.abs(found).max() > 1e-2
 
 
-def test_the_sensitivity_of_a_delayed_ramp_is_that_of_the_time_before() -> None:
-    """y = a (t - d) for t > d, else the initial value."""
+def test_the_sensitivity_of_a_delayed_ramp_agrees_with_the_closed_form() -> None:
+    """y = a (t - d) for t > d, otherwise y is the initial value."""
     builder = ab.DiagramBuilder("ramp")
     builder.add("y", TransportDelay(delay=0.7, initial=0.2), builder.add("u", Ramp(slope=1.5)))
     result = ab.sensitivity(builder.build(), ["u.slope", "y.delay", "y.initial"], "y", **TIGHT)
@@ -261,8 +263,8 @@ def test_the_sensitivity_of_a_delayed_ramp_is_that_of_the_time_before() -> None:
     assert np.array_equal(result["y", "y.initial"], result.time < 0.65)
 
 
-def test_what_is_held_when_a_subsystem_is_switched_off_follows_the_time_of_that() -> None:
-    """The subsystem passes t on until c - t = 0; then it holds c, with the derivative 1."""
+def test_a_held_output_depends_on_the_time_when_the_subsystem_is_disabled() -> None:
+    """The subsystem outputs t until c - t = 0, and then holds c, whose derivative is 1."""
     builder = ab.DiagramBuilder("off")
     ramp = builder.add("t", Ramp(slope=1.0))
     off = builder.add("off", Sum(signs="+-"), builder.add("c", Constant(value=1.33)), ramp)
@@ -275,7 +277,7 @@ def test_what_is_held_when_a_subsystem_is_switched_off_follows_the_time_of_that(
     assert np.allclose(result["held/Out1", "c.value"], result.time > 1.35, atol=1e-12)
 
 
-def test_a_parameter_of_several_entries_has_its_derivatives_in_an_axis_of_their_own() -> None:
+def test_derivatives_by_a_vector_parameter_have_an_additional_axis() -> None:
     builder = ab.DiagramBuilder("entries")
     state = builder.add("x", Integrator(initial=(1.0, 2.0)))
     both = builder.add("f", Expression(formula="a*u - b", names="a, b", values=(-0.5, 0.2)), state)
@@ -289,7 +291,7 @@ def test_a_parameter_of_several_entries_has_its_derivatives_in_an_axis_of_their_
     assert np.allclose(result["x", "x.initial"], decay[:, np.newaxis, np.newaxis] * np.eye(2), atol=1e-9)
 
 
-def test_events_that_a_parameter_would_part_are_refused() -> None:
+def test_coinciding_events_that_a_parameter_separates_are_refused() -> None:
     builder = ab.DiagramBuilder("together")
     total = builder.add("sum", Sum(signs="++"), builder.add("first", Step()), builder.add("second", Step()))
     builder.add("x", Integrator(), total)
@@ -297,8 +299,8 @@ def test_events_that_a_parameter_would_part_are_refused() -> None:
         ab.sensitivity(builder.build(), "first.time", "x")
 
 
-def test_a_reset_comes_earlier_where_its_trigger_rises_faster() -> None:
-    """x' = 2, set to 0 when y = a t reaches 1, at 1 / a: then x = 2 (t - 1 / a), dx/da = 2 / a^2."""
+def test_the_sensitivity_includes_the_shift_of_a_reset_time() -> None:
+    """x' = 2, reset to 0 when y = a t reaches 1 at t = 1 / a: then x = 2 (t - 1 / a), dx/da = 2 / a^2."""
     builder = ab.DiagramBuilder("reset")
     rate = builder.add("a", Constant(value=0.8))
     ramp = builder.add("y", Integrator(), rate)
@@ -312,8 +314,8 @@ def test_a_reset_comes_earlier_where_its_trigger_rises_faster() -> None:
     assert np.allclose(result["x", "a.value"][~after & (result.time < 1.2)], 0.0, atol=1e-12)
 
 
-def test_a_jump_at_a_known_time_moves_no_event() -> None:
-    """A step makes a limiter switch: the instant is the step's, whatever the gain is."""
+def test_an_event_at_a_breakpoint_does_not_depend_on_the_gain() -> None:
+    """The limiter switches at the time of the step for every gain."""
     builder = ab.DiagramBuilder("known")
     gain = builder.add("gain", Gain(gain=3.0), builder.add("step", Step(time=1.0)))
     builder.add("x", Integrator(), builder.add("limit", Saturation(lower=-1.0, upper=1.5), gain))
@@ -333,7 +335,7 @@ def test_delays_and_implicit_equations_together_are_refused() -> None:
         ab.sensitivity(builder.build(), "gain.gain", "x")
 
 
-def test_a_source_that_a_parameter_moves_and_an_implicit_equation_together_are_refused() -> None:
+def test_a_parameter_of_a_jump_time_with_an_implicit_equation_is_refused() -> None:
     builder = ab.DiagramBuilder("both")
     total = builder.add("sum", Sum(signs="+-"), builder.add("step", Step()))
     builder.connect(builder.add("cube", Expression(formula="u^3"), total), total["u2"])
@@ -344,7 +346,7 @@ def test_a_source_that_a_parameter_moves_and_an_implicit_equation_together_are_r
         ab.sensitivity(builder.build(), "step.time", "x")
 
 
-def test_events_at_the_start_that_a_parameter_moves_are_refused_where_they_change_something() -> None:
+def test_events_at_the_start_that_depend_on_the_parameter_are_refused() -> None:
     def behind(block: Block) -> ab.Diagram:
         builder = ab.DiagramBuilder("start")
         builder.add("x", Integrator(), builder.add("y", block, builder.add("wave", SineWave())))
@@ -353,12 +355,12 @@ def test_events_at_the_start_that_a_parameter_moves_are_refused_where_they_chang
     for block, parameter in ((Sign(), "wave.phase"), (PWM(), "y.offset"), (FirstOrderHold(), "y.offset")):
         with pytest.raises(InputError, match=f"event of 'y' at the start moves with .* '{parameter}'"):
             ab.sensitivity(behind(block), parameter, "x")
-    # The magnitude has a kink there and does not jump: dx/dphase = |sin(t)|.
+    # The absolute value has a kink at the start but no jump: dx/dphase = |sin(t)|.
     result = ab.sensitivity(behind(Abs()), "wave.phase", "x", **TIGHT)
     assert np.allclose(result["x", "wave.phase"], np.sin(result.time), atol=1e-9)
 
 
-def test_by_the_speed_of_a_mass_that_rests_is_refused() -> None:
+def test_the_sensitivity_to_the_speed_of_a_stuck_mass_is_refused() -> None:
     builder = ab.DiagramBuilder("rest")
     mass = builder.add("mass", StickSlipFriction(), builder.add("force", Ramp(slope=0.8)))
     builder.add("x", Integrator(), mass["x"])
@@ -366,14 +368,14 @@ def test_by_the_speed_of_a_mass_that_rests_is_refused() -> None:
         ab.sensitivity(builder.build(), "mass.initial_speed", "x")
 
 
-def test_a_seed_is_refused() -> None:
+def test_the_sensitivity_to_a_seed_is_refused() -> None:
     builder = ab.DiagramBuilder("noise")
     builder.add("x", Integrator(), builder.add("noise", RandomNumber(sample_time=0.1)))
     with pytest.raises(InputError, match=r"'noise.seed' acts only through comparisons or its integer part"):
         ab.sensitivity(builder.build(), "noise.seed", "x")
 
 
-def test_what_cannot_be_differentiated_is_refused() -> None:
+def test_unknown_names_and_empty_lists_are_refused() -> None:
     with pytest.raises(UnknownNameError, match=r"there is no tunable parameter named 'k.gian'"):
         ab.sensitivity(decay(), "k.gian", "x")
     with pytest.raises(UnknownNameError, match="there is no signal named 'y'"):
@@ -385,7 +387,7 @@ def test_what_cannot_be_differentiated_is_refused() -> None:
         _ = result["x", "k"]
 
 
-def test_a_table_that_is_read_by_index_is_refused_and_all_else_beside_it_is_right() -> None:
+def test_the_sensitivity_to_an_indexed_table_is_refused_and_others_are_correct() -> None:
     builder = ab.DiagramBuilder("table", settings=ab.SimulationOptions(stop_time=2.0, sample_time=0.5))
     table = builder.add("table", FromFile(data=((0.0, 1.0), (1.0, 3.0), (2.0, -1.0))))
     builder.add("sum", Integrator(), builder.add("gain", Gain(gain=2.0), table))
@@ -393,5 +395,5 @@ def test_a_table_that_is_read_by_index_is_refused_and_all_else_beside_it_is_righ
     with pytest.raises(InputError, match=r"'table\.data' is a table that is read by index"):
         ab.sensitivity(diagram, "table.data", "sum")
     found = ab.sensitivity(diagram, ["gain.gain"], ["sum"])
-    # d/dk of k times the integral of the table is that integral: 0, 0.75, 2, 3, 3 at the half seconds
+    # d/dk of k times the integral of the table is that integral: 0, 0.75, 2, 3, 3 every half second
     assert found["sum", "gain.gain"] == pytest.approx([0.0, 0.75, 2.0, 3.0, 3.0], rel=1e-5, abs=1e-6)

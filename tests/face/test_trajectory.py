@@ -8,7 +8,7 @@ from armblocks.blocks import Constant, JTraj, RobotPlot
 from armblocks.errors import ArmblocksWarning, InputError
 
 
-def test_jtraj_starts_and_ends_where_and_how_it_is_told() -> None:
+def test_jtraj_has_the_given_positions_and_speeds_at_both_ends() -> None:
     t = np.linspace(0, 4, 401)
     path = ab.jtraj([0, 1], [2, -1], t, qd0=[0.1, 0.0], qd1=[0.0, -0.2])
     assert len(path) == 401
@@ -18,7 +18,7 @@ def test_jtraj_starts_and_ends_where_and_how_it_is_told() -> None:
     np.testing.assert_allclose(np.gradient(path.q, t, axis=0)[1:-1], path.qd[1:-1], atol=2e-4)
 
 
-def test_a_count_of_samples_means_normalised_time() -> None:
+def test_jtraj_with_a_number_of_samples_uses_normalised_time() -> None:
     path = ab.jtraj([0.0], [1.0], 5)
     np.testing.assert_array_equal(path.t, [0, 0.25, 0.5, 0.75, 1])
     s = path.t
@@ -35,7 +35,7 @@ def test_a_count_of_samples_means_normalised_time() -> None:
         (([0], [1], [1.0, 2.0]), "finite ascending times that start at 0"),
     ],
 )
-def test_jtraj_refuses_in_words(arguments: tuple, message: str) -> None:
+def test_jtraj_refuses_invalid_arguments(arguments: tuple, message: str) -> None:
     with pytest.raises(InputError, match=message):
         ab.jtraj(*arguments)
 
@@ -46,7 +46,7 @@ def test_a_trajectory_unpacks_as_in_the_toolbox() -> None:
     assert q is path.q and qd is path.qd and qdd is path.qdd
 
 
-def test_angles_that_look_like_degrees_are_doubted() -> None:
+def test_angles_that_are_probably_in_degrees_raise_a_warning() -> None:
     with pytest.warns(ArmblocksWarning, match=r"jtraj, qf: an angle of 90 rad is more than two whole turns"):
         ab.jtraj([0, 0], [90, 0], 5)
     builder = ab.DiagramBuilder("degrees")

@@ -1,4 +1,4 @@
-"""Operating points at which diagrams rest."""
+"""Operating points: steady states of diagrams."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def pendulum() -> ab.Diagram:
     return builder.build()
 
 
-def test_a_pendulum_hangs_down_and_stands_up_by_where_the_search_starts() -> None:
+def test_the_guess_selects_the_lower_or_upper_equilibrium_of_a_pendulum() -> None:
     down = ab.trim(pendulum())
     assert float(down.point.states["q/x"]) == pytest.approx(0.0, abs=1e-12)
     up = ab.trim(pendulum(), guess={"q": 3.0})
@@ -50,7 +50,7 @@ def test_a_pendulum_hangs_down_and_stands_up_by_where_the_search_starts() -> Non
 
 @pytest.mark.parametrize("seed", range(5))
 def test_values_that_are_zero_to_their_accuracy_are_shown_as_zero(seed: int) -> None:
-    """x' = A x + b rests at (1, 0, 1e-9): of the numbers found, the middle one is a rounding error."""
+    """x' = A x + b has the steady state (1, 0, 1e-9); the computed middle value is a rounding error."""
     random = np.random.default_rng(seed)
     A = random.normal(size=(3, 3)) - 3.0 * np.eye(3)
     rest = np.array([1.0, 0.0, 1e-9])
@@ -88,7 +88,7 @@ def test_a_state_may_move_while_another_is_steady() -> None:
         ab.trim(builder.build(), guess={"speed": 1.0})
 
 
-def test_a_sampled_controller_rests_where_its_integrator_holds_the_plant() -> None:
+def test_the_steady_state_of_a_sampled_controller_with_integral_action() -> None:
     builder = ab.DiagramBuilder("sampled")
     wanted = builder.add("wanted", Constant(value=2.0))
     error = builder.add("error", Sum(signs="+-"), wanted)
@@ -103,7 +103,7 @@ def test_a_sampled_controller_rests_where_its_integrator_holds_the_plant() -> No
 
 
 def limited(torque: float) -> ab.Diagram:
-    """x' = sat(torque) - x."""
+    """A diagram of x' = sat(torque) - x."""
     builder = ab.DiagramBuilder("limited")
     source = builder.add("torque", Constant(value=torque))
     limit = builder.add("limit", Saturation(lower=-1.0, upper=1.0), source)
@@ -113,12 +113,12 @@ def limited(torque: float) -> ab.Diagram:
     return builder.build()
 
 
-def test_modes_follow_the_point() -> None:
+def test_modes_are_consistent_with_the_operating_point() -> None:
     found = ab.trim(limited(0.0), free=["torque"], guess={"torque.value": 5.0}, outputs={"x": 0.4})
     assert float(found.free["torque.value"]) == pytest.approx(0.4, rel=1e-12)
 
 
-def test_bounds_are_kept_and_named_where_they_stand_in_the_way() -> None:
+def test_bounds_are_respected_and_active_bounds_are_named() -> None:
     two = ab.trim(pendulum(), free=["torque"], states={"q": 0.3}, bounds={"torque": (-20.0, 20.0)})
     assert not two.at_bounds
     with pytest.raises(
@@ -129,7 +129,7 @@ def test_bounds_are_kept_and_named_where_they_stand_in_the_way() -> None:
     assert caught.value.partial.at_bounds == ("torque.value",)
 
 
-def test_an_implicit_equation_is_part_of_the_point() -> None:
+def test_an_operating_point_solves_implicit_equations() -> None:
     builder = ab.DiagramBuilder("implicit")
     source = builder.add("u", Constant(value=3.0))
     total = builder.add("sum", Sum(signs="+--"), source)
@@ -140,7 +140,7 @@ def test_an_implicit_equation_is_part_of_the_point() -> None:
     assert float(found.point.states["x/x"]) == pytest.approx(3.0, rel=1e-12)
 
 
-def test_a_puma_is_held_by_the_torque_of_its_weight() -> None:
+def test_the_torque_that_holds_a_puma_is_its_gravity_load() -> None:
     puma = ab.load_robot("puma560")
     q = np.array([0.1, 0.6, -0.4, 0.2, 0.5, -0.3])
     builder = ab.DiagramBuilder("held")
@@ -150,19 +150,19 @@ def test_a_puma_is_held_by_the_torque_of_its_weight() -> None:
     assert np.allclose(found.free["torque.value"], puma.gravload(q), rtol=0.0, atol=1e-9)
 
 
-def test_what_nothing_free_moves_is_named() -> None:
+def test_an_equation_that_depends_on_nothing_free_is_named() -> None:
     builder = ab.DiagramBuilder("ramp")
     builder.add("x", Integrator(), builder.add("u", Constant(value=1.0)))
     with pytest.raises(SimulationError, match=r"rate of x/x is 1.*follows from nothing free"):
         ab.trim(builder.build())
 
 
-def test_more_equations_than_unknowns_are_said() -> None:
+def test_more_equations_than_unknowns_are_refused() -> None:
     with pytest.raises(SimulationError, match="as many equations as unknowns"):
         ab.trim(pendulum(), outputs={"q": 0.7})
 
 
-def test_an_equation_without_a_root_is_said() -> None:
+def test_an_equation_without_a_root_is_reported() -> None:
     builder = ab.DiagramBuilder("rootless")
     state = builder.add("x", Integrator(initial=0.3))
     builder.connect(builder.add("f", Expression(formula="1 + u^2"), state), state["u"])
@@ -177,7 +177,7 @@ def test_an_equation_without_a_root_is_said() -> None:
         ab.trim(builder.build())
 
 
-def test_a_counter_never_rests() -> None:
+def test_a_counter_has_no_operating_point() -> None:
     builder = ab.DiagramBuilder("counter")
     total = builder.add("sum", Sum(signs="++"), builder.add("one", Constant(value=1.0)))
     builder.connect(builder.add("count", UnitDelay(sample_time=1.0), total), total["u2"])
@@ -185,7 +185,7 @@ def test_a_counter_never_rests() -> None:
         ab.trim(builder.build())
 
 
-def test_what_does_not_fit_is_refused() -> None:
+def test_unknown_names_and_unsuitable_values_are_refused() -> None:
     with pytest.raises(UnknownNameError, match="there is no state named 'angle'"):
         ab.trim(pendulum(), states={"angle": 1.0})
     with pytest.raises(UnknownNameError, match="there is no parameter named 'tork'"):
@@ -198,7 +198,7 @@ def test_what_does_not_fit_is_refused() -> None:
         ab.trim(pendulum(), bounds={"q": (2.0, 1.0)})
 
 
-def test_time_stands_still_where_the_search_starts() -> None:
+def test_the_search_uses_the_given_time() -> None:
     builder = ab.DiagramBuilder("timed")
     total = builder.add("sum", Sum(signs="+-"), builder.add("t", Clock()))
     state = builder.add("x", Integrator(), total)
@@ -206,8 +206,8 @@ def test_time_stands_still_where_the_search_starts() -> None:
     assert float(ab.trim(builder.build(), at=4.0).point.states["x/x"]) == pytest.approx(4.0, rel=1e-12)
 
 
-def test_modes_that_chase_each_other_are_named() -> None:
-    """x' = -1 - x / 10 above 0 and 1 - x / 10 below: each piece rests in the other."""
+def test_modes_that_remain_inconsistent_are_named() -> None:
+    """x' = -1 - x / 10 above 0 and 1 - x / 10 below: the equilibrium of each branch is in the other."""
     builder = ab.DiagramBuilder("chase")
     state = builder.add("x", Integrator(initial=0.5))
     above = builder.add("above", Expression(formula="-1 - 0.1 * u"), state)
@@ -218,14 +218,14 @@ def test_modes_that_chase_each_other_are_named() -> None:
 
 
 def table_of(count: int) -> LookupTable1D:
-    """u^2 - 2 at ``count`` points from 0 to 5, straight in between."""
+    """A piecewise linear table of u^2 - 2 at ``count`` points from 0 to 5."""
     points = np.linspace(0.0, 5.0, count)
     return LookupTable1D(positions=points, table=points**2 - 2.0)
 
 
 @pytest.mark.parametrize("count", [9, 1000])
-def test_a_curve_of_many_pieces_is_followed_piece_by_piece(count: int) -> None:
-    """x' = 2 - x^2 rests at the root of the piece around sqrt(2), though the first one points far beyond."""
+def test_trim_finds_the_root_of_a_curve_with_many_segments(count: int) -> None:
+    """x' = 2 - x^2: the root is in the segment near sqrt(2); a Newton step from the first one overshoots."""
     builder = ab.DiagramBuilder("pieces")
     state = builder.add("x", Integrator(initial=0.2))
     curve = builder.add("curve", table_of(count), state)
@@ -237,8 +237,8 @@ def test_a_curve_of_many_pieces_is_followed_piece_by_piece(count: int) -> None:
     assert float(ab.trim(builder.build()).point.states["x/x"]) == pytest.approx(expected, rel=1e-12)
 
 
-def test_single_entries_are_free_but_for_those_of_long_tables() -> None:
-    """The state follows a table at 2: of the entries 1.875 and 2.5, the lower one has a say of 4/5."""
+def test_single_entries_of_short_tables_may_be_free() -> None:
+    """The state follows a table at 2: the entries at 1.875 and 2.5 have the weights 4/5 and 1/5."""
 
     def following(count: int) -> ab.Diagram:
         builder = ab.DiagramBuilder("follows")

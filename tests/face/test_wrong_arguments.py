@@ -1,4 +1,4 @@
-"""Wrong arguments of constructors: the error names the class, the argument and what is right."""
+"""Wrong arguments of constructors: the error names the class, the argument and the correct name."""
 
 from collections.abc import Callable
 
@@ -77,25 +77,25 @@ def test_a_value_of_a_wrong_type_is_rejected_with_the_allowed_types(where: str) 
 
 
 @pytest.mark.parametrize("case", WRONG)
-def test_wrong_arguments_are_refused_in_own_words(case: str) -> None:
+def test_wrong_arguments_raise_an_error_of_the_package(case: str) -> None:
     call, words = WRONG[case]
     with pytest.raises(ArmblocksError, match=words):
         call()
 
 
-def test_every_block_names_the_nearest_parameter() -> None:
+def test_every_block_refuses_an_unknown_argument() -> None:
     for name, kind in BLOCKS.items():
         with pytest.raises(ArmblocksError, match=rf"^{name}: there is no argument named 'no_such_name'"):
             kind(no_such_name=1)
 
 
-def test_a_matrix_is_a_pose() -> None:
+def test_a_matrix_is_accepted_as_a_pose() -> None:
     T = ab.Transform(translation=(1.0, 2.0, 3.0))
     assert robot(base=T.matrix, tool=T.matrix.tolist()) == robot(base=T, tool=T)
     assert ab.Link(name="x", before=T.matrix) == ab.Link(name="x", before=T)
 
 
-def test_blocks_take_an_arm_for_its_robot() -> None:
+def test_blocks_accept_an_arm_in_place_of_its_robot() -> None:
     block = RobotPlot(robot=ARM)
     assert block == RobotPlot(robot=ARM.robot)
     assert block.robot is ARM.robot

@@ -1,6 +1,7 @@
-"""Calls of the public functions as type checkers see them; pyright reads this file, nothing runs it.
+"""Calls of the public functions for type checkers: pyright checks this file, and no test runs it.
 
-A line with ``ignore`` is a mistake that pyright has to report: an ignore without a mistake is an error here.
+A line with ``ignore`` has an error that pyright must report. An ``ignore`` without an error is itself an
+error.
 """
 
 # pyright: strict, reportUnnecessaryTypeIgnoreComment=true

@@ -1,4 +1,4 @@
-"""These tests compile: they neither use nor fill the user's own cache."""
+"""The tests of the integrators use an empty disk cache: they neither read nor fill the cache of the user."""
 
 from collections.abc import Iterator
 
@@ -7,7 +7,7 @@ import pytest
 
 @pytest.fixture(scope="session", autouse=True)
 def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """An empty disk cache for this run."""
+    """Set an empty disk cache for this test session."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("ARMBLOCKS_CACHE_DIR", str(tmp_path_factory.mktemp("cache")))
         yield

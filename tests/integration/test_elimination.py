@@ -1,4 +1,4 @@
-"""The plan of a sparse elimination, against NumPy and against what is known of its fill."""
+"""The plan of a sparse elimination: solutions compared with NumPy, and the fill-in of known patterns."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def pattern_of(matrix: np.ndarray, states: int) -> JacobianPattern:
 
 
 def solve(plan: Elimination, values: np.ndarray, right: np.ndarray, diagonal: np.ndarray) -> np.ndarray:
-    """The elimination that the plan describes, in plain Python: only planned places are ever touched."""
+    """Execute the elimination of the plan in Python; only planned entries are read or written."""
     n = len(plan.columns)
     L: list[dict[int, float]] = []
     U: list[dict[int, float]] = []
@@ -44,7 +44,7 @@ def solve(plan: Elimination, values: np.ndarray, right: np.ndarray, diagonal: np
 
 @pytest.mark.parametrize("seed", range(5))
 def test_the_plan_solves_random_sparse_equations(seed: int) -> None:
-    """Forty states and six implicit equations, whose own places are empty, so that a matching is needed."""
+    """Forty states and six implicit equations with zeros on their diagonal, which need a matching."""
     random = np.random.default_rng(seed)
     n, m = 40, 6
     J = np.where(random.random((n + m, n + m)) < 0.06, random.normal(size=(n + m, n + m)), 0.0)
@@ -56,22 +56,22 @@ def test_the_plan_solves_random_sparse_equations(seed: int) -> None:
     np.testing.assert_allclose(found, np.linalg.solve(np.diag(diagonal) + J, right), rtol=1e-9, atol=1e-11)
 
 
-def test_a_chain_fills_nothing_in() -> None:
-    """A tridiagonal matrix has an order without any fill, and least degree finds it."""
+def test_the_elimination_of_a_chain_has_no_fill_in() -> None:
+    """A tridiagonal matrix has an elimination order without fill-in, and the minimum-degree rule finds it."""
     chain = np.eye(200) + np.eye(200, k=1) + np.eye(200, k=-1)
     assert plan_elimination(pattern_of(chain, 200)).filled == np.count_nonzero(chain)
 
 
-def test_a_star_is_eliminated_from_its_points() -> None:
-    """One state that all others touch, the first one: in the given order everything would fill in."""
+def test_the_elimination_of_a_star_has_no_fill_in() -> None:
+    """The first state is coupled with all others: in the given order the matrix would fill completely."""
     star = np.eye(100)
     star[0, :] = star[:, 0] = 1.0
     plan = plan_elimination(pattern_of(star, 100))
     assert plan.filled == np.count_nonzero(star)
 
 
-def test_equations_without_a_matching_still_have_a_plan() -> None:
-    """An implicit equation without its unknowns is singular in any order: the numbers will say so."""
+def test_equations_without_a_matching_have_a_plan() -> None:
+    """An implicit equation without unknowns is singular in every order, which the factorisation detects."""
     J = np.zeros((4, 4))
     J[2, 0] = J[3, 2] = 1.0
     assert sorted(plan_elimination(pattern_of(J, 2)).equations) == [0, 1, 2, 3]

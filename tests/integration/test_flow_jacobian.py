@@ -1,4 +1,4 @@
-"""The Jacobian of the flow: exact, sparse, and of every operation that equations may use."""
+"""The Jacobian of the flow: exact, sparse, and defined for every operation."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ OPERATIONS = {
 
 
 def test_every_operation_can_be_differentiated_and_compiled() -> None:
-    """Against complex-free central differences: a run on auto may ask for the Jacobian of any of them."""
+    """Comparison with central differences: the solver "auto" may need the Jacobian of any operation."""
     names = list(OPERATIONS)
     n = len(names)
     x = ca.SX.sym("x", 2 * n)
@@ -68,7 +68,7 @@ def test_every_operation_can_be_differentiated_and_compiled() -> None:
         aliases={},
     )
     jacobian = trace_flow_jacobian(system)
-    assert len(jacobian.rows) <= 4 * n  # the two states of its own, and no others
+    assert len(jacobian.rows) <= 4 * n  # each rate depends on its two states only
     tape = tape_from(jacobian.function)
     point = np.tile([0.7, 0.9], n)
     empty = np.empty(0)

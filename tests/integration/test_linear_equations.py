@@ -1,4 +1,5 @@
-"""Native linear equations of a stiff step, against NumPy: sparse, whole, and from one to the other."""
+"""Native linear equations of a stiff step compared with NumPy: sparse elimination and dense elimination with
+pivoting."""
 
 from __future__ import annotations
 
@@ -19,7 +20,7 @@ GAMMA, H = 0.25, 0.1
 
 
 class Solver:
-    """The native functions for one pattern, called from outside."""
+    """The native functions of one sparsity pattern."""
 
     def __init__(self, J: np.ndarray, states: int) -> None:
         rows, columns = np.nonzero(J)
@@ -59,7 +60,7 @@ class Solver:
         self.matrix = np.diag(E) - H * J
 
     def solve(self, how: str, right: np.ndarray) -> tuple[bool, np.ndarray]:
-        """Whether it counts as well solved, and the solution."""
+        """Return whether the solution passes the accuracy check, and the solution."""
         space = self.space
         self.scratch[space.right : space.right + space.size] = right
         good = self.functions[how](self.scratch.ctypes.data, H)
@@ -83,8 +84,9 @@ def test_both_eliminations_agree_with_numpy(n: int, filled: float) -> None:
 
 @pytest.mark.parametrize("n", [2, 7, 40])
 @pytest.mark.parametrize("spread", [0.0, 3.0])
-def test_the_bound_of_the_rates_is_above_every_eigenvalue_and_near_the_largest(n: int, spread: float) -> None:
-    """Also where states have units that differ by many powers of ten, which no eigenvalue sees."""
+def test_the_rate_bound_is_above_every_eigenvalue_and_near_the_largest(n: int, spread: float) -> None:
+    """This also holds for units of states that differ by many powers of ten; eigenvalues do not depend on
+    units."""
     random = np.random.default_rng(n)
     for _ in range(10):
         scales = 10.0 ** random.uniform(-spread, spread, n)
@@ -93,7 +95,7 @@ def test_the_bound_of_the_rates_is_above_every_eigenvalue_and_near_the_largest(n
         solver = Solver(J, n)
         bound = solver.rate(solver.scratch.ctypes.data)
         assert bound >= np.abs(np.linalg.eigvals(J)).max() * (1 - 1e-12)
-        # The best that any scaling of the states gives is the largest eigenvalue of |J|.
+        # The least bound over all scalings of the states is the largest eigenvalue of |J|.
         assert bound <= 40.0 * max(np.abs(np.linalg.eigvals(np.abs(J))).max(), 0.1)
     oscillator = Solver(np.array([[0.0, 1.0], [-100.0, 0.0]]), 2)
     assert oscillator.rate(oscillator.scratch.ctypes.data) == pytest.approx(10.0)
@@ -105,8 +107,8 @@ def test_small_and_full_matrices_have_no_plan() -> None:
     assert Solver(np.eye(20), 20).space.plan is not None
 
 
-def test_a_vanishing_pivot_is_noticed_and_pivoting_helps() -> None:
-    """A chain whose first pivot ``1 / gamma - h J`` is a rounding error beside its neighbours."""
+def test_a_vanishing_pivot_is_detected_and_pivoting_solves_the_equations() -> None:
+    """A chain in which every fourth pivot ``1 / gamma - h J`` is relatively a rounding error."""
     n = 40
     J = np.diag(np.full(n - 1, 1.0), 1) + np.diag(np.full(n - 1, -2.0), -1) + np.diag(np.full(n, -1.0))
     for k in range(0, n, 4):
@@ -121,8 +123,8 @@ def test_a_vanishing_pivot_is_noticed_and_pivoting_helps() -> None:
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
 
 
-def test_the_judgement_does_not_depend_on_units() -> None:
-    """States in units from 1e-12 to 1e12: the same elimination, and as good."""
+def test_the_accuracy_check_does_not_depend_on_units() -> None:
+    """States with units from 1e-12 to 1e12: the same elimination with the same accuracy."""
     n = 30
     J = random_sparse(7, n, 0.06) - np.eye(n)
     units = 10.0 ** np.random.default_rng(1).integers(-12, 13, n)
@@ -135,7 +137,7 @@ def test_the_judgement_does_not_depend_on_units() -> None:
 
 
 def test_implicit_equations_are_eliminated_with_the_states() -> None:
-    """Their own places are empty: each is matched with another one's unknown."""
+    """Their diagonal entries are zero: each equation is matched with the unknown of another one."""
     n, m = 20, 4
     J = random_sparse(5, n + m, 0.1)
     J[n:, n:] = np.roll(np.diag([1.0, 2.0, 3.0, 4.0]), 1, axis=0)

@@ -1,4 +1,4 @@
-"""Tables of Rosenbrock methods: what is refused, and two forms that are one method."""
+"""Tableaux of Rosenbrock methods: rejected tableaux, stability, order, and the textbook form."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ every_method = pytest.mark.parametrize(
 )
 
 
-def test_rows_that_do_not_fit_are_refused() -> None:
+def test_rows_of_the_wrong_length_are_refused() -> None:
     with pytest.raises(InputError, match="'weights' does not fit the 8 stages"):
         replace(RODAS5P, weights=RODAS5P.weights[:7])
     with pytest.raises(InputError, match="'couplings' does not fit the 3 stages"):
         replace(ROS23, couplings=((), (), ()))
 
 
-def test_a_misprint_is_noticed_by_the_sums() -> None:
+def test_a_wrong_coefficient_is_detected_by_the_row_sums() -> None:
     weights = list(RODAS5P.weights)
     weights[3] += 1e-6
     with pytest.raises(InputError, match=r"weights adds up to 1\.0000"):
@@ -47,9 +47,10 @@ def stability(tableau: RosenbrockTableau, z: complex) -> complex:
 
 @every_method
 def test_methods_are_l_stable(tableau: RosenbrockTableau) -> None:
-    """``|R| <= 1`` on the imaginary axis and so, by the maximum principle, to its left; and R goes to zero.
+    """``|R| <= 1`` on the imaginary axis and thus, by the maximum principle, in the left half-plane; R tends
+    to zero.
 
-    Rounding of the published digits bounds both from below.
+    The rounding of the published digits limits the accuracy of both checks.
     """
     for omega in np.concatenate([np.linspace(0.01, 20.0, 500), np.logspace(1.5, 6, 60)]):
         assert abs(stability(tableau, 1j * omega)) <= 1.0 + 1e-9
@@ -58,12 +59,13 @@ def test_methods_are_l_stable(tableau: RosenbrockTableau) -> None:
 
 @every_method
 def test_stability_function_has_the_order_of_the_exponential(tableau: RosenbrockTableau) -> None:
-    """Independent of the native loop: the error of one step of a linear decay falls like h^(order + 1)."""
+    """Independent of the native loop: the error of one step of a linear decay is proportional to h^(order +
+    1)."""
     errors = [abs(stability(tableau, -h) - np.exp(-h)) for h in (0.2, 0.1)]
     assert np.log2(errors[0] / errors[1]) > tableau.order + 0.7
 
 
-def test_textbook_form_of_implicit_euler_is_the_table() -> None:
+def test_the_textbook_form_of_implicit_euler_gives_its_tableau() -> None:
     made = RosenbrockTableau(
         name="euler",
         title="",

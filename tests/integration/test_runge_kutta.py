@@ -1,4 +1,4 @@
-"""The native integrator loop, below the level of systems: numbers in, numbers out."""
+"""The native integrator loop without compiled systems."""
 
 from __future__ import annotations
 
@@ -58,8 +58,8 @@ def integrator(
 NONE = np.empty(0)
 
 
-def test_loops_and_written_out_states_give_the_same_bits() -> None:
-    """Twelve independent copies of an equation go through IR loops, one copy does not."""
+def test_states_in_loops_and_in_unrolled_code_give_the_same_steps() -> None:
+    """The code for twelve independent copies of an equation has loops; that for one copy is unrolled."""
     alone = integrator(lambda t, x, p: -x * ca.sin(3 * t), 1)
     many = integrator(lambda t, x, p: -x * ca.sin(3 * t), 12)
     samples = np.linspace(0, 5, 101)
@@ -68,13 +68,13 @@ def test_loops_and_written_out_states_give_the_same_bits() -> None:
         run = native.begin(np.ones(native.states), NONE, samples, NONE)
         assert run.advance(10**9) is Status.DONE
         results.append(run)
-    # The error norm of twelve equal parts rounds otherwise than that of one: steps differ in the last place.
+    # The error norm of twelve equal parts is rounded differently: steps differ in the last place.
     assert results[0].accepted == results[1].accepted
     np.testing.assert_allclose(results[1].states, np.repeat(results[0].states, 12, axis=1), rtol=1e-13)
 
 
 @pytest.mark.parametrize("tableau", [PAIR, RK4])
-def test_chunks_of_steps_do_not_change_a_bit(tableau: ButcherTableau) -> None:
+def test_pauses_between_steps_do_not_change_the_bits(tableau: ButcherTableau) -> None:
     native = integrator(lambda t, x, p: ca.vertcat(x[1], (1 - x[0] ** 2) * x[1] - x[0]), 2, tableau)
     samples = np.linspace(0, 10, 51)
     outcomes = []
@@ -86,7 +86,7 @@ def test_chunks_of_steps_do_not_change_a_bit(tableau: ButcherTableau) -> None:
     assert outcomes[0] == outcomes[1] == outcomes[2]
 
 
-def test_the_same_run_twice_gives_the_same_bits() -> None:
+def test_a_repeated_run_gives_the_same_bits() -> None:
     native = integrator(lambda t, x, p: ca.vertcat(x[1], -ca.sin(x[0])), 2)
     runs = [native.begin(np.array([1.0, 0.0]), NONE, np.linspace(0, 9, 33), NONE) for _ in range(2)]
     for run in runs:
@@ -94,8 +94,8 @@ def test_the_same_run_twice_gives_the_same_bits() -> None:
     assert runs[0].states.tobytes() == runs[1].states.tobytes()
 
 
-def test_steps_end_on_breakpoints_and_see_the_old_value_before_them() -> None:
-    """x' jumps from 1 to -3 at 0.7: every method is exact on both pieces, if none of its stages peeks."""
+def test_steps_end_at_breakpoints_and_use_the_value_before_the_jump() -> None:
+    """x' jumps from 1 to -3 at 0.7: each method is exact on both sides if no stage uses the other side."""
     for tableau in (PAIR, RK4):
         native = integrator(lambda t, x, p: ca.if_else(t < p, SX(1), SX(-3)), 1, tableau, parameters=1)
         samples = np.array([0.0, 0.35, 0.7, 1.0, 2.0])
@@ -105,7 +105,7 @@ def test_steps_end_on_breakpoints_and_see_the_old_value_before_them() -> None:
         assert run.rejected == 0
 
 
-def test_breakpoints_in_any_order_twice_or_outside_are_fine() -> None:
+def test_breakpoints_may_be_unordered_repeated_or_outside_the_run() -> None:
     native = integrator(lambda t, x, p: ca.if_else(t < 1, SX(1), SX(-3)), 1)
     for points in ([1.0], [5.0, 1.0, -2.0, 1.0, 0.0, 2.0]):
         run = native.begin(np.zeros(1), NONE, np.array([0.0, 2.0]), np.array(points))
@@ -114,7 +114,7 @@ def test_breakpoints_in_any_order_twice_or_outside_are_fine() -> None:
 
 
 def test_a_fixed_step_keeps_its_grid_after_a_breakpoint() -> None:
-    """Grid 0, 0.1, …, 1 with a breakpoint at 0.25 is eleven steps, and the grid instants stay k h."""
+    """The grid 0, 0.1, …, 1 with a breakpoint at 0.25 has eleven steps, and the grid times remain k h."""
     native = integrator(lambda t, x, p: SX(1) + 0 * x, 1, RK4)
     run = native.begin(np.zeros(1), NONE, np.arange(11) * 0.1, np.array([0.25]), step=0.1)
     assert run.advance(10**9) is Status.DONE
@@ -122,7 +122,7 @@ def test_a_fixed_step_keeps_its_grid_after_a_breakpoint() -> None:
     np.testing.assert_allclose(run.states[:, 0], np.arange(11) * 0.1, atol=1e-15)
 
 
-def test_no_sliver_step_is_taken_where_the_grid_misses_the_end_by_rounding() -> None:
+def test_no_tiny_step_is_taken_when_the_grid_misses_the_end_by_rounding() -> None:
     native = integrator(lambda t, x, p: SX(1) + 0 * x, 1, RK4)
     run = native.begin(np.zeros(1), NONE, np.array([0.0, 3 * 0.7]), NONE, step=0.1)  # 21 * 0.1 < 3 * 0.7
     assert run.advance(10**9) is Status.DONE
@@ -130,13 +130,13 @@ def test_no_sliver_step_is_taken_where_the_grid_misses_the_end_by_rounding() -> 
     assert run.time == 3 * 0.7
 
 
-def test_a_run_of_no_length_records_its_start() -> None:
+def test_a_run_of_zero_duration_records_its_start() -> None:
     run = integrator(lambda t, x, p: -x, 1).begin(np.ones(1), NONE, np.zeros(1), NONE)
     assert run.advance(100) is Status.DONE
     assert run.states.tolist() == [[1.0]]
 
 
-def test_failures_are_told_apart() -> None:
+def test_failures_have_different_status_codes() -> None:
     samples = np.array([0.0, 2.0])
     grows = integrator(lambda t, x, p: x * x, 1)
     run = grows.begin(np.ones(1), NONE, samples, NONE)
@@ -157,8 +157,8 @@ def test_failures_are_told_apart() -> None:
     assert run.first_non_finite_stage()[0] == pytest.approx(1.05)
 
 
-def test_a_state_that_overflows_is_not_taken_for_exact() -> None:
-    """x' = 1e308: beyond the largest double, error over scale would be 0 / inf."""
+def test_a_state_that_overflows_is_a_failure() -> None:
+    """x' = 1e308: after an overflow the ratio of error and scale would be 0 / inf."""
     native = integrator(lambda t, x, p: SX(1e308) + 0 * x, 1)
     run = native.begin(np.zeros(1), NONE, np.array([0.0, 10.0]), NONE)
     assert run.advance(10**9) in (Status.NON_FINITE, Status.STEP_TOO_SMALL)
@@ -174,7 +174,7 @@ def test_a_state_that_overflows_is_not_taken_for_exact() -> None:
         ({"error": (0.1, 0.0, 0.0, 0.0)}, "error adds up to 0.1"),
     ],
 )
-def test_a_table_with_a_misprint_is_refused(changes: dict[str, object], message: str) -> None:
+def test_a_tableau_with_a_wrong_coefficient_is_refused(changes: dict[str, object], message: str) -> None:
     fields = {name: getattr(PAIR, name) for name in PAIR.__dataclass_fields__} | changes
     with pytest.raises(InputError, match=message) as raised:
         ButcherTableau(**fields)

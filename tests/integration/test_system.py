@@ -1,4 +1,4 @@
-"""Compiled systems: native functions against CasADi, and recall without tracing."""
+"""Compiled systems: native functions compared with CasADi, and loading from the cache without tracing."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from armblocks.integration.system import CompiledSystem, compile_system, recall_
 
 
 def pendulum(length: float = 2.0) -> HybridSystem:
-    """Angle and rate, two signals, a parameter and a breakpoint."""
+    """A pendulum with two states, two signals, a parameter and a breakpoint."""
     ends = signature(("t", ()), ("x", (2,)), ("p", (2,)))
     p = signature(("p", (2,)))
     return continuous_system(
@@ -47,7 +47,7 @@ def pendulum(length: float = 2.0) -> HybridSystem:
 
 
 @pytest.mark.parametrize("count", [1, 3, 8, 100, 1001])
-def test_signals_of_a_batch_are_those_of_casadi(count: int) -> None:
+def test_signals_of_a_batch_agree_with_casadi(count: int) -> None:
     system = pendulum()
     compiled = compile_system(system)
     random = np.random.default_rng(count)
@@ -59,7 +59,7 @@ def test_signals_of_a_batch_are_those_of_casadi(count: int) -> None:
     np.testing.assert_allclose(y[:, :20].T, expected, rtol=1e-14, atol=1e-15)
 
 
-def test_one_instant_and_many_give_the_same_bits() -> None:
+def test_signals_at_one_time_and_at_many_times_have_the_same_bits() -> None:
     compiled = compile_system(pendulum())
     random = np.random.default_rng(5)
     no = np.empty((37, 0))
@@ -72,7 +72,7 @@ def test_one_instant_and_many_give_the_same_bits() -> None:
         )
 
 
-def test_signals_of_a_long_tape_are_made_for_one_lane_and_have_the_same_bits(
+def test_code_of_a_long_tape_without_lanes_gives_the_same_bits(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     random = np.random.default_rng(6)
@@ -85,7 +85,7 @@ def test_signals_of_a_long_tape_are_made_for_one_lane_and_have_the_same_bits(
     assert compile_system(pendulum()).evaluate_signals(t, x, no, no, p).tobytes() == in_lanes.tobytes()
 
 
-def test_derivative_start_and_breakpoints_follow_the_parameters() -> None:
+def test_derivative_start_and_breakpoints_depend_on_the_parameters() -> None:
     compiled = compile_system(pendulum())
     p = np.array([5.0, 0.7])
     assert compiled.initial_states(p).tolist() == [0.5, 0.0]
@@ -122,7 +122,7 @@ def never() -> HybridSystem:
     raise AssertionError("was traced again")
 
 
-def test_a_known_key_is_recalled_without_tracing(own_cache: Path) -> None:
+def test_a_cached_system_is_loaded_without_tracing(own_cache: Path) -> None:
     first = recall_system("pendulum 2 m", pendulum)
     first.evaluate_signals(
         np.zeros(1), np.zeros((1, 2)), np.empty((1, 0)), np.empty((1, 0)), first.parameter_values
@@ -134,7 +134,7 @@ def test_a_known_key_is_recalled_without_tracing(own_cache: Path) -> None:
     assert not same(first, other)
 
 
-def test_damaged_records_and_tapes_are_made_anew(own_cache: Path) -> None:
+def test_damaged_records_and_tapes_are_written_again(own_cache: Path) -> None:
     first = recall_system("pendulum", pendulum)
     for content in (b"[]", b"not json", b'{"name": "pendulum"}'):
         cache.store(cache.record_name("system pendulum"), content)
@@ -147,15 +147,17 @@ def test_damaged_records_and_tapes_are_made_anew(own_cache: Path) -> None:
     assert same(first, again)
 
 
-def test_without_a_cache_every_recall_traces(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_cache_the_system_is_traced_each_time(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ARMBLOCKS_CACHE_DIR", "")
     assert same(recall_system("x", pendulum), recall_system("x", pendulum))
     with pytest.raises(AssertionError, match="was traced again"):
         recall_system("x", never)
 
 
-def test_an_operation_that_tapes_do_not_know_is_refused_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Before a run begins, not in its middle."""
+def test_an_operation_without_a_tape_opcode_is_refused_on_compilation(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The error is raised before a run starts."""
 
     def refuse(traced: TracedFunction) -> None:
         raise CompileError("the equations use the operation OP_PRINTME", where=traced.name)

@@ -1,4 +1,4 @@
-"""Against MuJoCo, where it takes the robot: it refuses inertias that no body can have."""
+"""Comparison with MuJoCo for robots that it accepts: it refuses physically impossible inertias."""
 
 import mujoco
 import numpy as np
@@ -25,7 +25,7 @@ def mujoco_model(robot: Robot) -> mujoco.MjModel:
     while waiting:
         link = next(link for link in waiting if link.parent in bodies)
         waiting.remove(link)
-        # A body at the joint, whose zero is at q = 0, and one at the link's frame.
+        # One body at the joint, with its zero at q = 0, and one at the frame of the link.
         T = link.before @ link.joint.motion(link.joint.offset)
         moving = bodies[link.parent].add_body(name=f"{link.name} joint", pos=T.p, quat=quaternion(T.R))
         if link.joint.moves:

@@ -1,4 +1,4 @@
-"""Against Pinocchio, built joint by joint from the description: an independent implementation."""
+"""Comparison with Pinocchio, an independent implementation; its models are built from the description."""
 
 import numpy as np
 import pinocchio as pin
@@ -11,12 +11,12 @@ from robots_for_tests import LAW_ROBOTS, evaluate, random_states
 
 
 def pinocchio_model(robot: Robot) -> tuple[pin.Model, pin.Data, int, np.ndarray]:
-    """Model with the robot's joints, rotor inertias as armature, a frame for the tool, and for each joint of
-    ours its place in Pinocchio's vectors."""
+    """Return the model with rotor inertias as armature, its data, the frame of the tool, and the index of
+    each joint in Pinocchio's vectors."""
     model = pin.Model()
     world = pin.SE3(robot.base.matrix)
     links: dict[str | None, tuple[int, pin.SE3]] = {None: (0, world)}
-    # Depth first: Pinocchio takes the joints of a branch to be numbered without a gap.
+    # Depth first: Pinocchio assumes that the joints of a branch have consecutive numbers.
     waiting = [link for link in robot.links if link.parent is None]
     while waiting:
         link = waiting.pop()
@@ -27,7 +27,7 @@ def pinocchio_model(robot: Robot) -> tuple[pin.Model, pin.Data, int, np.ndarray]
             axis = np.array(link.joint.axis)
             turning = isinstance(link.joint, Revolute)
             kind = pin.JointModelRevoluteUnaligned if turning else pin.JointModelPrismaticUnaligned
-            # The offset stands in the placement, so that both robots have the same q.
+            # The offset is part of the placement, so that both robots have the same q.
             placement = placement * pin.SE3(link.joint.motion(link.joint.offset).matrix)
             index = model.addJoint(parent, kind(axis), placement, link.name)
             at_link = pin.SE3(link.after.matrix)
@@ -82,7 +82,7 @@ def test_agrees_with_pinocchio(robot: Robot):
         close(evaluate(robot, "jacobe", q), np.array(Je)[:, place])
 
 
-def test_centre_of_mass_and_energies_agree_where_no_link_stands(puma560: Robot):
+def test_centre_of_mass_and_energies_agree_for_a_robot_without_fixed_base_links(puma560: Robot):
     model, data, _, _ = pinocchio_model(puma560)
     model.armature = np.zeros(model.nv)
     tree = KinematicTree.of(puma560)
