@@ -1,4 +1,4 @@
-"""Diagram files: identity, small differences for small changes, unknown keys kept, faults located."""
+"""Diagram files: round trip, small textual differences, unknown keys, located errors."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def arms(*robots: Robot) -> Diagram:
 
 @st.composite
 def diagrams(draw: st.DrawFn) -> Diagram:
-    """Chains of maths blocks with random names, numbers, places and foreign keys."""
+    """Chains of maths blocks with random names, numbers, positions and unknown keys."""
     texts = st.text(st.characters(exclude_categories=["C"], exclude_characters="/."), min_size=1, max_size=6)
     names = draw(st.lists(texts, min_size=2, max_size=6, unique_by=lambda name: name.casefold()))
     numbers = st.floats(-1e6, 1e6)
@@ -124,7 +124,7 @@ def diagrams(draw: st.DrawFn) -> Diagram:
 
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(diagrams())
-def test_reading_what_was_written_gives_the_diagram_back(diagram: Diagram) -> None:
+def test_reading_a_written_diagram_gives_the_same_diagram(diagram: Diagram) -> None:
     data = write(diagram)
     again = read(data)
     assert again == diagram
@@ -151,7 +151,7 @@ def test_order_in_the_file_does_not_matter() -> None:
     assert write(read(json.dumps(document).encode())) == write(small())
 
 
-def test_infinities_are_texts_and_numbers_keep_their_bits() -> None:
+def test_infinities_are_written_as_text_and_numbers_keep_their_bits() -> None:
     diagram = with_parameters(small(), {"gain.gain": 0.1 + 0.2, "speed.initial": -0.0})
     again = read(write(diagram))
     assert again.blocks["limit"] == Saturation(lower=-math.inf, upper=0.5)
@@ -214,7 +214,7 @@ def test_unknown_keys_are_kept_at_every_level() -> None:
     assert diagram.extras["blocks"] == {"gain": {"colour": "red"}}
 
 
-def test_keys_of_a_removed_block_go_with_it() -> None:
+def test_unknown_keys_of_a_removed_block_are_removed() -> None:
     extras: Mapping[str, object] = {"blocks": {"gone": {"colour": "red"}}}
     text = write(dataclasses.replace(small(), extras=extras)).decode()
     assert "gone" not in text
@@ -233,7 +233,7 @@ def robots_of(diagram: Diagram) -> dict[str, object]:
     }
 
 
-def test_shipped_robot_is_its_name() -> None:
+def test_a_shipped_robot_is_written_as_its_name() -> None:
     assert robots_of(arms(load_robot("kr180"))) == {"named": ["kr180"], "table": {}}
 
 
@@ -250,7 +250,7 @@ def test_shipped_robot_is_its_name() -> None:
         ),
     ],
 )
-def test_variant_of_a_shipped_robot_is_written_as_one(changed: Robot, entry: dict[str, str]) -> None:
+def test_a_variant_of_a_shipped_robot_is_written_as_a_variant(changed: Robot, entry: dict[str, str]) -> None:
     diagram = arms(changed, changed)
     assert robots_of(diagram) == {
         "named": ["KR180", "KR180"],
@@ -259,7 +259,7 @@ def test_variant_of_a_shipped_robot_is_written_as_one(changed: Robot, entry: dic
     assert read(write(diagram)) == diagram
 
 
-def test_foreign_robots_are_written_whole_once_under_names_of_their_own(
+def test_other_robots_are_written_completely_and_once_under_unique_names(
     schema: jsonschema.Draft202012Validator,
 ) -> None:
     one = dataclasses.replace(load_robot("twolink"), name="arm")
@@ -272,14 +272,14 @@ def test_foreign_robots_are_written_whole_once_under_names_of_their_own(
     assert read(write(diagram)) == diagram
 
 
-def test_keys_of_the_robot_table_survive() -> None:
+def test_names_in_the_robot_table_are_kept() -> None:
     document = json.loads(write(arms(load_robot("kr180").nofriction())))
     document["robots"] = {"my arm": document["robots"]["KR180"]}
     document["blocks"]["fkine0"]["parameters"]["robot"] = "my arm"
     assert json.loads(write(read(json.dumps(document).encode()))) == document
 
 
-def test_robot_file_is_referred_to_from_the_diagrams_folder(tmp_path: Path) -> None:
+def test_robot_files_are_written_as_paths_relative_to_the_diagram(tmp_path: Path) -> None:
     (tmp_path / "arms").mkdir()
     (tmp_path / "arms" / "mine.json").write_bytes(
         write_robot(load_robot("twolink").with_link("link1", mass=2.0))
@@ -294,7 +294,7 @@ def test_robot_file_is_referred_to_from_the_diagrams_folder(tmp_path: Path) -> N
     assert json.loads(far)["blocks"]["fkine0"]["parameters"]["robot"].endswith("/arms/mine.json")
 
 
-def test_robot_whose_file_has_changed_is_written_whole(tmp_path: Path) -> None:
+def test_a_robot_that_differs_from_its_file_is_written_completely(tmp_path: Path) -> None:
     path = tmp_path / "mine.json"
     path.write_bytes(write_robot(load_robot("planar3r").with_link("link1", mass=9.0)))
     diagram = arms(load_robot(path))
@@ -305,14 +305,14 @@ def test_robot_whose_file_has_changed_is_written_whole(tmp_path: Path) -> None:
     assert read(write(diagram)) == diagram
 
 
-def test_fault_in_a_robot_file_names_both_files(tmp_path: Path) -> None:
+def test_an_error_in_a_robot_file_names_both_files(tmp_path: Path) -> None:
     (tmp_path / "arm.m").write_text("x = 1;\nfor i = 1:3\n")
     data = write(arms(load_robot("kr180"))).replace(b'"kr180"', b'"arm.m"')
     with pytest.raises(FormatError, match=r"model\.json:5, blocks\.fkine0.*arm\.m:2: 'for' is not supported"):
         read(data, tmp_path)
 
 
-# -- faults ------------------------------------------------------------------------------------------------
+# -- errors ------------------------------------------------------------------------------------------------
 
 DOCUMENT = json.loads(write(small()))
 
@@ -392,20 +392,20 @@ FAULTS: list[tuple[bytes, type[ArmblocksError], str]] = [
 
 
 @pytest.mark.parametrize(("data", "kind", "message"), FAULTS, ids=[str(i) for i in range(len(FAULTS))])
-def test_fault_names_file_and_line(data: bytes, kind: type[ArmblocksError], message: str) -> None:
+def test_errors_name_file_and_line(data: bytes, kind: type[ArmblocksError], message: str) -> None:
     with pytest.raises(kind, match=message) as caught:
         read(data)
     assert caught.value.where.startswith("model.json")
 
 
-def test_slip_beside_no_right_key_is_refused() -> None:
+def test_a_misspelt_optional_key_is_refused() -> None:
     document = json.loads(write(small()))
     document["setings"] = document.pop("settings")
     with pytest.raises(FormatError, match=r"the key 'setings' is not known here.*did you mean 'settings'"):
         read(json.dumps(document).encode())
 
 
-def test_algebraic_loop_keeps_its_kind() -> None:
+def test_an_algebraic_loop_in_a_file_raises_its_own_error_class() -> None:
     document = {
         "format": 1,
         "blocks": {"a": {"type": "ZeroOrderHold", "parameters": {"sample_time": 0.1}}, "b": {"type": "Gain"}},
@@ -417,7 +417,7 @@ def test_algebraic_loop_keeps_its_kind() -> None:
     assert caught.value.where.startswith("model.json")
 
 
-def test_a_small_file_needs_little() -> None:
+def test_a_diagram_file_needs_only_the_format_number() -> None:
     diagram = read(b'{"format": 1}')
     assert (diagram.name, len(diagram.blocks), diagram.settings) == ("model", 0, SimulationOptions())
 
@@ -437,7 +437,7 @@ def test_failed_save_leaves_the_old_file(tmp_path: Path) -> None:
     assert path.read_bytes() == before
 
 
-def test_unknown_and_missing_diagrams_are_said(tmp_path: Path) -> None:
+def test_unknown_and_missing_diagrams_raise_errors_with_their_name(tmp_path: Path) -> None:
     with pytest.raises(
         UnknownNameError, match=r"there is no shipped diagram named 'kr180'.*mean 'kr180model'"
     ):
@@ -450,7 +450,7 @@ def test_unknown_and_missing_diagrams_are_said(tmp_path: Path) -> None:
 
 @settings(max_examples=150, deadline=None, derandomize=True)
 @given(st.data())
-def test_mutated_document_is_read_or_refused(data: st.DataObject) -> None:
+def test_a_mutated_document_is_read_or_refused_with_a_package_error(data: st.DataObject) -> None:
     document = json.loads(write(EXAMPLE))
     for _ in range(data.draw(st.integers(1, 3))):
         here: Any = document
@@ -517,7 +517,7 @@ def test_diagrams_inside_blocks_are_written_and_read_again(schema: jsonschema.Dr
             schema.validate(json.loads(data))
 
 
-def test_faults_inside_a_block_are_told_with_line_and_path() -> None:
+def test_errors_inside_a_block_have_line_and_path() -> None:
     text = diagram_to_bytes(_nested(1), load_robot).decode()
     wrong = text.replace('"gain": 2', '"gain": "two"')
     line = wrong[: wrong.index('"two"')].count("\n") + 1
@@ -533,7 +533,7 @@ def test_faults_inside_a_block_are_told_with_line_and_path() -> None:
         )
 
 
-def test_too_many_diagrams_inside_each_other_are_refused() -> None:
+def test_too_deeply_nested_diagrams_are_refused() -> None:
     start = '{"format": 1, "blocks": {' + '"s": {"type": "Subsystem", "diagram": {"blocks": {' * 110
     with pytest.raises(FormatError, match="objects and arrays are nested too deeply"):
         diagram_from_bytes((start + "}" * 332).encode(), "model.json", BLOCKS, load_robot)

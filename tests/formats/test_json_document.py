@@ -1,4 +1,4 @@
-"""Canonical JSON: strict when read, the same bytes for the same content when written."""
+"""Canonical JSON: strict reading, and equal bytes for equal content when written."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ def read(text: str | bytes) -> Node:
 
 @settings(max_examples=150, deadline=None, derandomize=True)
 @given(DOCUMENTS)
-def test_reading_what_was_written_gives_it_back(value: object) -> None:
+def test_reading_a_written_value_gives_the_same_value(value: object) -> None:
     data = canonical_bytes(value)
     again = read_document(data, "a.json", 10**6).value
     assert again == value
     assert canonical_bytes(again) == data
-    assert json.loads(data) == value, "any JSON reader gets the same"
+    assert json.loads(data) == value, "the standard JSON reader gives the same value"
 
 
 @settings(max_examples=100, deadline=None, derandomize=True)
@@ -102,7 +102,7 @@ def test_byte_order_mark_is_tolerated() -> None:
     assert read(b"\xef\xbb\xbf[1]").elements()[0].number() == 1
 
 
-def test_document_beyond_the_cap_is_refused() -> None:
+def test_a_document_above_the_size_limit_is_refused() -> None:
     with pytest.raises(FormatError, match="the document is too large"):
         read(" " * 1001)
 
@@ -117,12 +117,12 @@ def test_document_beyond_the_cap_is_refused() -> None:
         ("\ud800", "a text cannot be written, as it is not valid Unicode"),
     ],
 )
-def test_values_without_a_json_form_are_not_written(value: object, message: str) -> None:
+def test_values_without_a_json_form_are_refused(value: object, message: str) -> None:
     with pytest.raises(FormatError, match=message):
         canonical_bytes(value)
 
 
-def test_too_deep_a_value_is_not_written() -> None:
+def test_a_too_deeply_nested_value_is_refused() -> None:
     value: list[object] = []
     for _ in range(DEEPEST + 1):
         value = [value]
@@ -130,7 +130,7 @@ def test_too_deep_a_value_is_not_written() -> None:
         canonical_bytes(value)
 
 
-def test_place_is_the_line_of_the_value() -> None:
+def test_error_locations_have_the_line_of_the_value() -> None:
     root = read('{"a": {"x": 1,\n "b c":\n [1, {"d":\n 2}]}, "x": "a\\nb",\n"y": 5}')
     a = root.members()["a"].members()
     assert a["b c"].elements()[1].members()["d"].where == 'a.json:4, a."b c"[1].d'
@@ -140,7 +140,7 @@ def test_place_is_the_line_of_the_value() -> None:
     assert path_text(("layout", "XY Graph", 0)) == 'layout."XY Graph"[0]'
 
 
-def test_the_message_names_the_expected_kind() -> None:
+def test_type_errors_name_the_expected_type() -> None:
     root = read('{"n": null, "t": "x", "b": true, "f": false, "i": 3, "l": [1], "o": {}}').members()
     for key, words in {
         "n": "the value is null. Allowed: a number",
@@ -166,7 +166,7 @@ def test_the_message_names_the_expected_kind() -> None:
         root["t"].choice(["xy", "z"])
 
 
-def test_unknown_keys_are_kept_unless_they_are_slips() -> None:
+def test_unknown_keys_are_kept_unless_they_are_misspelt_known_keys() -> None:
     members, extra = split_members(read('{"name": 1, "vendor": {"a": [1]}}'), ("name", "layout"))
     assert (list(members), extra) == (["name"], {"vendor": {"a": [1]}})
     with pytest.raises(FormatError, match=r"the key 'nmae' is not known here.*did you mean 'name'"):

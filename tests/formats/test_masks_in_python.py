@@ -1,4 +1,4 @@
-"""Subsystems, masks and links as the Python that builds them."""
+"""Subsystems, masks and links in generated Python code."""
 
 from __future__ import annotations
 
@@ -41,14 +41,14 @@ def whole(folder: Path) -> Diagram:
     return builder.build()
 
 
-def test_what_is_written_builds_the_same(tmp_path: Path) -> None:
+def test_the_generated_code_builds_the_same_diagram(tmp_path: Path) -> None:
     diagram = whole(tmp_path)
     text = diagram_to_python(diagram)
     assert 'builder.parameter("K", 3.0, value=4.0)' in text
     assert "inner_inside" not in text
     assert '.with_parameters(a=ab.formula("K/2"))' in text
     assert f'ab.load_library("{tmp_path.resolve() / "parts.json"}")["Inner"]' in text
-    # The text is our own, from a diagram made above.
+    # The code is generated from the diagram above.
     scope: dict[str, object] = {}
     exec(compile(text, "listing", "exec"), scope)  # noqa: S102
     found = ab.diagram_difference(diagram, scope["diagram"])  # pyright: ignore

@@ -1,4 +1,4 @@
-"""Links and robots of scripts: both families of the toolbox, their orders, defaults, copies and handles."""
+"""Links and robots of scripts: both toolbox families, their argument orders, defaults, copies and handles."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from armblocks.robot import (
 )
 
 PRINTED = Path(__file__).with_name("kr180_as_printed.m")
-"""Both parts of the paper's Figure 5, line by line as printed; blank lines left out."""
+"""Both parts of Figure 5 of the paper, line by line as printed, without blank lines."""
 
 
 def robot(text: str, **options: FrictionModel) -> Robot:
@@ -38,7 +38,7 @@ def robot(text: str, **options: FrictionModel) -> Robot:
 
 
 def with_table_1(bare: Robot) -> Robot:
-    """The joint ranges and speeds of the paper's Table 1, which its script does not state."""
+    """The joint ranges and speeds of Table 1 of the paper, which its script does not contain."""
     table = [(-185, 185, 105), (-39, 90, 105), (-71, 109, 95), (-270, 270, 300)]
     for link, (low, high, speed) in zip(bare.links, table, strict=True):
         limits = JointLimits(position=(math.radians(low), math.radians(high)), speed=math.radians(speed))
@@ -79,8 +79,8 @@ def test_the_papers_script_loads_with_its_blank_lines(tmp_path: Path) -> None:
     assert "link 'link1': it has inertia but no mass" in str([w.message for w in caught])
 
 
-def test_the_papers_numbers_are_all_there() -> None:
-    """Against the table of the paper, link by link, without any of our own constructors."""
+def test_the_papers_script_has_all_numbers_of_its_tables() -> None:
+    """Compare with the tables of the paper, link by link, without constructors of the package."""
     arm = load_robot("kr180")
     assert (arm.name, arm.manufacturer, arm.comment) == ("KR180", "KUKA Robotics", "params of 8/95")
     assert arm.joint_letters == "RRRR"
@@ -133,7 +133,7 @@ def test_link_of_release_8_reads_alpha_first() -> None:
     assert isinstance(turning.joint, Revolute)
 
 
-def test_convention_is_known_by_three_letters() -> None:
+def test_the_convention_is_recognised_by_its_first_three_letters() -> None:
     (link,) = robot("L = {link([0.1 0.2 0 0.4], 'modif')}; r = robot(L);").links
     assert link == modified_dh("link1", alpha=0.1, a=0.2, d=0.4)
     assert link.dh is not None
@@ -157,7 +157,7 @@ def test_legacy_dyn_row_of_release_8() -> None:
     )
 
 
-def test_legacy_dyn_row_may_end_early() -> None:
+def test_a_legacy_dyn_row_may_omit_trailing_values() -> None:
     (link,) = robot(f"r = robot([{DYN} 2e-4]);").links
     assert link.motor == Motor(inertia=2e-4, gear_ratio=1)
     (link,) = robot(f"r = robot([{DYN}]);").links
@@ -169,7 +169,7 @@ def test_robot_from_a_matrix_is_named_by_its_variable() -> None:
     assert robot("r = robot([0 1 0 0]);").name == "noname"
 
 
-def test_robot_names_itself() -> None:
+def test_name_arguments_of_robot_are_read() -> None:
     made = robot("L{1} = link([0 1 0 0]); r = robot(L, 'A', 'B', 'C');")
     assert (made.name, made.manufacturer, made.comment) == ("A", "B", "C")
 
@@ -208,7 +208,7 @@ def test_nested_fields_are_read_and_set() -> None:
     assert script.robots["r"].links[0].mass == 7
 
 
-def test_gravity_changes_its_sign_at_the_door() -> None:
+def test_gravity_changes_its_sign_when_read() -> None:
     assert robot("r = robot([0 1 0 0]); r.gravity = [0; 1; -2];").gravity == (0, -1, 2)
 
 
@@ -218,7 +218,7 @@ def test_base_and_tool_are_poses() -> None:
     assert made.tool.translation == (0, 0, 0.1)
 
 
-def test_gear_ratio_is_one_where_a_script_says_none() -> None:
+def test_the_default_gear_ratio_is_one() -> None:
     (link,) = robot("L = {link([0 1 0 0])}; L{1}.Jm = 1e-3; r = robot(L);").links
     assert link.motor == Motor(inertia=1e-3, gear_ratio=1)
 
@@ -259,14 +259,14 @@ def test_legacy_dyn_row_of_release_9_starts_with_theta() -> None:
         ("Link()", 0),
     ],
 )
-def test_named_arguments_tell_the_joint(text: str, sigma: int) -> None:
+def test_named_arguments_determine_the_joint_type(text: str, sigma: int) -> None:
     (link,) = robot(f"r = SerialLink({text});").links
     assert link.dh is not None
     assert link.dh.sigma == sigma
     assert link.dh.convention is (DhConvention.MODIFIED if "MDH" in text else DhConvention.STANDARD)
 
 
-def test_named_arguments_hold_everything() -> None:
+def test_all_link_properties_can_be_named_arguments() -> None:
     text = (
         "L = Link('d', 0.4, 'a', 0.2, 'alpha', 0.1, 'offset', 0.5, 'qlim', [-1 2], 'm', 3, 'r', [1 2 3], "
         "'I', [1 1 1], 'Jm', 1e-4, 'G', 50, 'B', 1e-3, 'Tc', [0.1 -0.2], 'modified');\nr = SerialLink(L);"
@@ -286,7 +286,7 @@ def test_named_arguments_hold_everything() -> None:
     )
 
 
-def test_serial_link_takes_options() -> None:
+def test_serial_link_accepts_options() -> None:
     text = (
         "r = SerialLink([0 0 1 0; 0 0 2 0], 'name', 'A', 'manufacturer', 'B', 'comment', 'C', 'modified', "
         "'base', transl(1, 0, 0), 'tool', transl(0, 1, 0), 'gravity', [0 0 1.6], 'qlim', [-1 1; -inf inf], "
@@ -309,7 +309,7 @@ def test_handles_are_shared_in_release_9() -> None:
 
 
 @pytest.mark.parametrize("links", ["[L1 L2]", "{L1 L2}", "[[] L1 L2]", "[L1 L2]'", "[[L1] [L2]]"])
-def test_links_are_gathered_in_every_way(links: str) -> None:
+def test_links_can_be_collected_in_arrays_and_cell_arrays(links: str) -> None:
     assert robot(f"L1 = Link([0 0 1 0]); L2 = Link(L1); L2.a = 2; r = SerialLink({links});").n == 2
 
 
@@ -339,7 +339,7 @@ def test_poses_of_a_script_are_kept() -> None:
 TWO_ROBOTS = "left = robot([0 1 0 0]); left.name = 'L'; right = robot([0 2 0 0]); copy = right;"
 
 
-def test_one_of_several_robots_is_picked(tmp_path: Path) -> None:
+def test_one_of_several_robots_is_selected_by_name(tmp_path: Path) -> None:
     path = tmp_path / "two.m"
     path.write_text(TWO_ROBOTS)
     assert load_robot(path, name="right").links[0].dh == standard_dh("link1", a=2).dh

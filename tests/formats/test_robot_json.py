@@ -1,4 +1,4 @@
-"""Robot files: reading gives back what was written, the schema agrees, and slips are refused."""
+"""Robot files: round trip, agreement with the schema, and refused errors."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def robots(draw: st.DrawFn) -> Robot:
 
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(robots())
-def test_reading_what_was_written_gives_the_robot_back(robot: Robot) -> None:
+def test_reading_a_written_robot_gives_the_same_robot(robot: Robot) -> None:
     data = write_robot(robot)
     again = read_robot(data, "robot.json")
     assert again == robot
@@ -128,14 +128,14 @@ def test_reading_what_was_written_gives_the_robot_back(robot: Robot) -> None:
     validator("robot").validate(json.loads(data))
 
 
-def test_angles_are_written_in_degrees_where_nothing_is_lost() -> None:
+def test_angles_are_written_in_degrees_if_the_conversion_is_exact() -> None:
     row = DhRow(alpha=math.pi / 2, offset=math.radians(-12.5), theta=0.1)
     robot = Robot(name="r", links=(link_from_dh("a", row),))
     dh = json.loads(write_robot(robot))["links"][0]["dh"]
     assert (dh["alpha"], dh["offset"], dh["theta"]) == ("90 deg", "-12.5 deg", 0.1)
 
 
-def test_numbers_of_a_sliding_joint_are_metres() -> None:
+def test_limits_of_a_prismatic_joint_are_in_metres() -> None:
     slider = Prismatic(limits=JointLimits(position=(0.0, math.pi), speed=math.pi), offset=math.pi)
     entry = json.loads(write_robot(Robot(name="r", links=(Link(name="a", joint=slider),))))["links"][0]
     assert entry["limits"] == {"position": [0, math.pi], "speed": math.pi}
@@ -213,21 +213,21 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("data", "message"), REFUSED, ids=[str(i) for i in range(len(REFUSED))])
-def test_refusal_names_file_line_and_key(data: bytes, message: str) -> None:
+def test_errors_name_file_line_and_key(data: bytes, message: str) -> None:
     with pytest.raises(FormatError, match=message) as caught:
         read_robot(data, "arm.json")
     assert caught.value.where.startswith("arm.json:")
 
 
-def test_schema_knows_what_a_schema_can_know() -> None:
-    """All but what compares one value with another, or needs more than a shape's kind."""
+def test_the_schema_refuses_most_invalid_files() -> None:
+    """The rest are rules that compare values with each other or depend on more than a shape's type."""
     passed = [message for data, message in REFUSED if validator("robot").is_valid(json.loads(data))]
     assert len(passed) <= 12, passed
 
 
 @settings(max_examples=100, deadline=None, derandomize=True)
 @given(st.data())
-def test_mutated_document_is_read_or_refused(data: st.DataObject) -> None:
+def test_a_mutated_document_is_read_or_refused_with_a_package_error(data: st.DataObject) -> None:
     document = json.loads(write_robot(load_robot("puma560")))
     for _ in range(data.draw(st.integers(1, 3))):
         here: Any = document
@@ -248,7 +248,7 @@ def test_mutated_document_is_read_or_refused(data: st.DataObject) -> None:
     except FormatError as error:
         assert error.where.startswith("fuzz.json")
     except ArmblocksWarning:
-        pass  # friction that drives
+        pass  # warning about driving friction
     except ArmblocksError as error:
         pytest.fail(f"not located: {error}")
 
@@ -256,7 +256,7 @@ def test_mutated_document_is_read_or_refused(data: st.DataObject) -> None:
 # -- names and paths ---------------------------------------------------------------------------------------
 
 
-def test_user_files_warn_of_impossible_inertias_and_shipped_robots_do_not(tmp_path: Path) -> None:
+def test_user_files_warn_of_impossible_inertias_but_shipped_robots_do_not(tmp_path: Path) -> None:
     path = tmp_path / "mine.json"
     robot = load_robot("puma560")
     path.write_bytes(write_robot(robot))
@@ -277,7 +277,7 @@ def test_friction_model_of_a_file_can_be_replaced(tmp_path: Path) -> None:
     )
 
 
-def test_unknown_name_says_the_nearest() -> None:
+def test_the_error_for_an_unknown_name_suggests_the_nearest() -> None:
     with pytest.raises(
         UnknownNameError, match=r"there is no shipped robot named 'puma56'.*did you mean 'puma560'"
     ):
@@ -287,12 +287,12 @@ def test_unknown_name_says_the_nearest() -> None:
     assert load_robot("kr180", name="KR180") == load_robot("kr180")
 
 
-def test_missing_file_is_said() -> None:
+def test_a_missing_file_raises_an_error_with_its_path() -> None:
     with pytest.raises(FormatError, match=r"nowhere/arm\.json: there is no such file"):
         load_robot("nowhere/arm.json")
 
 
-def test_folder_is_refused_with_the_file_that_may_be_meant(tmp_path: Path) -> None:
+def test_a_folder_is_refused_with_the_allowed_file_types(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match=r"this is a folder.*Allowed: a robot file: \.json, \.m"):
         load_robot(tmp_path)
 
@@ -309,6 +309,6 @@ def test_oversized_file_is_refused(tmp_path: Path) -> None:
         load_robot(path)
 
 
-def test_incomplete_installation_is_said() -> None:
+def test_an_incomplete_installation_raises_an_error() -> None:
     with pytest.raises(FormatError, match=r"the shipped songs are missing.*install armblocks again"):
         shipped_folder("songs")

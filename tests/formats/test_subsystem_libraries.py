@@ -1,4 +1,4 @@
-"""Libraries of subsystems: links are looked up, confined, bounded, and given up on request."""
+"""Libraries of subsystems: resolving links, confinement to a folder, nesting limits, breaking links."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def model(block: Subsystem) -> Diagram:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """Two libraries, of which the second uses the first, and a model with a block of each."""
+    """Two libraries, the second of which uses the first, and a model with a block of each."""
     (tmp_path / "parts").mkdir()
     ab.save_library({"Amplifier": amplifier()}, tmp_path / "parts" / "base.json")
     base = ab.load_library(tmp_path / "parts" / "base.json")["Amplifier"]
@@ -53,7 +53,7 @@ def written(path: Path, library: Mapping[str, object]) -> None:
 
 
 def linked(reference: str) -> dict[str, object]:
-    """A diagram with one block that is linked."""
+    """A diagram with one linked block."""
     return {"blocks": {"part": {"type": "Subsystem", "library": reference}}}
 
 
@@ -62,7 +62,7 @@ def load(folder: Path, reference: str) -> Diagram:
     return diagram_from_bytes(data, "model.json", BLOCKS, load_robot, folder=folder)
 
 
-def test_a_link_is_the_library_block_with_values_of_its_own(folder: Path) -> None:
+def test_a_linked_block_is_the_library_block_with_its_own_parameter_values(folder: Path) -> None:
     diagram = ab.load_diagram(folder / "model.json")
     text = (folder / "model.json").read_text()
     assert '"library": "more.json#Double"' in text
@@ -77,7 +77,7 @@ def test_a_link_is_the_library_block_with_values_of_its_own(folder: Path) -> Non
     assert block_count(diagram) == 3 + 3 + 3
 
 
-def test_reading_undoes_writing_and_finds_what_the_library_has_become(folder: Path) -> None:
+def test_reading_a_link_uses_the_present_content_of_the_library(folder: Path) -> None:
     diagram = ab.load_diagram(folder / "model.json")
     data = diagram_to_bytes(diagram, load_robot, folder=folder)
     assert data == (folder / "model.json").read_bytes()
@@ -89,7 +89,7 @@ def test_reading_undoes_writing_and_finds_what_the_library_has_become(folder: Pa
     assert ab.simulate(ab.load_diagram(folder / "model.json"), stop_time=1.0)["amp"][-1] == 11 * np.sin(1.0)
 
 
-def test_a_copy_of_ones_own_is_free(folder: Path) -> None:
+def test_an_unlinked_copy_can_be_changed_inside(folder: Path) -> None:
     diagram = ab.load_diagram(folder / "model.json")
     with pytest.raises(
         DiagramError, match=r"'amp/first.k' is inside the library block.*more.json#Double'.*Allowed: amp.k"
@@ -119,7 +119,7 @@ def test_the_shipped_servo_is_used_six_times() -> None:
     model = ab.compile_diagram(diagram)
     slow, quick = (ab.simulate(model, parameters={"w": w}) for w in (10.0, 40.0))
     late = [float(np.abs(run["error"]).max()) for run in (slow, quick)]
-    # The torque that gravity needs is a disturbance; at the joint its error falls with the cube of w.
+    # Gravity acts as a disturbance torque; the position error that it causes is proportional to w**-3.
     assert late[1] < late[0] / 8
     assert np.abs(quick["q"][-1] - [0.8, 0.6, -1.0, 0.5, 0.4, -0.6]).max() < 1e-4
 
@@ -167,13 +167,13 @@ def cases(folder: Path) -> list[tuple[str, type[ArmblocksError], str]]:
 
 
 @pytest.mark.parametrize("number", range(17))
-def test_mistakes_are_named_with_file_and_line(folder: Path, number: int) -> None:
+def test_errors_name_file_and_line(folder: Path, number: int) -> None:
     reference, kind, message = cases(folder)[number]
     with pytest.raises(kind, match=f"(?s){message}"):
         load(folder, reference)
 
 
-def test_blocks_name_what_the_library_has(folder: Path) -> None:
+def test_linked_blocks_accept_only_mask_parameters_of_the_library_block(folder: Path) -> None:
     def read(block: dict[str, object]) -> Diagram:
         data = json.dumps({"format": 1, "blocks": {"part": {"type": "Subsystem", **block}}}).encode()
         return diagram_from_bytes(data, "model.json", BLOCKS, load_robot, folder=folder, draft=True)
@@ -197,7 +197,7 @@ def test_blocks_name_what_the_library_has(folder: Path) -> None:
         diagram_from_bytes(top, "model.json", BLOCKS, load_robot)
 
 
-def test_subsystems_may_be_a_hundred_deep_and_no_deeper() -> None:
+def test_subsystems_may_be_nested_100_levels_deep_and_not_deeper() -> None:
     diagram = Diagram(name="innermost", blocks={"one": Constant()})
     for _ in range(101):
         diagram = Diagram(name="around", blocks={"inside": Subsystem(diagram=diagram)})

@@ -1,4 +1,4 @@
-"""Pictures as SVG and PNG: valid, escaped, themed, the same bytes every time."""
+"""Pictures as SVG and PNG: valid, escaped, themed, reproducible."""
 
 import struct
 import xml.etree.ElementTree as ET
@@ -36,7 +36,7 @@ def one_of_each() -> Picture:
 
 
 def decoded(data: bytes) -> np.ndarray:
-    """A PNG of this package's own writing, read by the specification."""
+    """Decode a PNG written by this package, according to the specification."""
     width, height, depth, kind = struct.unpack(">IIBB", data[16:26])
     assert depth == 8
     channels = {2: 3, 6: 4}[kind]
@@ -48,7 +48,7 @@ def decoded(data: bytes) -> np.ndarray:
     return rows[:, 1:].reshape(height, width, channels)
 
 
-def test_a_file_is_valid_xml_and_its_words_stay_words() -> None:
+def test_a_file_is_valid_xml_and_its_text_is_escaped() -> None:
     text = svg_file(one_of_each())
     root = ET.fromstring(text)
     assert root.tag == f"{SVG}svg"
@@ -57,7 +57,7 @@ def test_a_file_is_valid_xml_and_its_words_stay_words() -> None:
     assert not root.findall(f".//{SVG}script")
 
 
-def test_nothing_is_fetched() -> None:
+def test_svg_files_refer_to_no_external_resources() -> None:
     for element in ET.fromstring(svg_file(one_of_each())).iter():
         for name, value in element.attrib.items():
             if name.rpartition("}")[2] in ("href", "src"):
@@ -65,14 +65,14 @@ def test_nothing_is_fetched() -> None:
             assert "url(" not in value
 
 
-def test_one_file_serves_both_themes_and_a_fixed_theme_only_one() -> None:
+def test_a_file_contains_both_themes_unless_one_is_fixed() -> None:
     both, dark = svg_file(one_of_each()), svg_file(one_of_each(), theme="dark")
     assert PALETTE[Tone.INK].light in both and PALETTE[Tone.INK].dark in both
     assert "prefers-color-scheme" in both and "prefers-color-scheme" not in dark
     assert PALETTE[Tone.INK].light not in dark
 
 
-def test_inline_pictures_use_the_pages_colours_and_are_named() -> None:
+def test_inline_pictures_use_the_colours_of_the_page_and_have_a_name() -> None:
     text = svg_inline(one_of_each(), "figure-1")
     root = ET.fromstring(text)
     assert root.get("aria-labelledby") == "figure-1-t"
@@ -85,18 +85,18 @@ def test_the_same_picture_gives_the_same_bytes() -> None:
     assert picture_png(one_of_each()) == picture_png(one_of_each())
 
 
-def test_a_png_shows_the_marks_where_they_are() -> None:
+def test_png_marks_are_at_their_positions() -> None:
     pixels = decoded(picture_png(one_of_each(), scale=2.0))
     assert pixels.shape == (160, 240, 3)
     assert tuple(pixels[158, 2]) == (255, 255, 255)
     assert tuple(pixels[40, 200]) == (0x00, 0x72, 0xB2)  # the disc
     red = pixels[90, 130].astype(int)
     assert red[0] > 250 and 120 < red[1] < 135  # the raster, half transparent on white
-    # The nasty text is drawn, upright and not clipped away.
+    # The text with special characters is drawn upright and not clipped.
     assert (pixels[120:150, 8:120].min(axis=2) < 100).sum() > 200
 
 
-def test_png_files_hold_their_pixels() -> None:
+def test_png_files_contain_their_pixels() -> None:
     pixels = np.random.default_rng(1).integers(0, 256, (7, 5, 4)).astype(np.uint8)
     assert (decoded(png_bytes(pixels)) == pixels).all()
     assert resampled(pixels, 14, 10).shape == (14, 10, 4)

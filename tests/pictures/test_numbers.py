@@ -1,4 +1,4 @@
-"""Numbers for people."""
+"""Formatting of numbers, tick marks and text widths."""
 
 import math
 
@@ -13,19 +13,19 @@ from armblocks.report.page_tables import value_cell
 
 
 @given(st.floats(-1e6, 1e6), st.floats(1e-6, 1e6), st.integers(2, 10))
-def test_ticks_are_several_and_within_the_range(low: float, span: float, count: int) -> None:
+def test_ticks_are_in_the_range_and_about_as_many_as_requested(low: float, span: float, count: int) -> None:
     ticks = nice_ticks(low, low + span, count)
     slack = 1e-6 * span + 4.0 * np.spacing(abs(low) + span)
     assert all(low - slack <= tick <= low + span + slack for tick in ticks)
     assert count / 2.5 - 1 <= len(ticks) <= 2.5 * count + 1
 
 
-def test_wide_angles_are_divided_as_a_turn_is() -> None:
+def test_ticks_of_wide_angle_ranges_divide_a_full_turn() -> None:
     assert nice_ticks(-190, 190, 4, degrees=True) == [-180.0, -90.0, 0.0, 90.0, 180.0]
 
 
 @pytest.mark.parametrize("rough", [0.0, -1.0, math.nan, math.inf])
-def test_a_step_exists_for_every_number(rough: float) -> None:
+def test_the_tick_step_of_an_invalid_range_is_one(rough: float) -> None:
     assert nice_step(rough) == 1.0
 
 
@@ -44,11 +44,11 @@ def test_a_step_exists_for_every_number(rough: float) -> None:
         (math.nan, "not a number"),
     ],
 )
-def test_numbers_are_written_as_people_do(value: float, text: str) -> None:
+def test_axis_numbers_are_formatted(value: float, text: str) -> None:
     assert axis_number(value) == text
 
 
-def test_tables_keep_the_digits_that_are_asked_for() -> None:
+def test_table_numbers_have_the_requested_digits() -> None:
     assert table_number(-2.949278739196, 9) == "−2.94927874"
     assert table_number(1234567.0, 3) == "1.23e6"
 
@@ -56,17 +56,17 @@ def test_tables_keep_the_digits_that_are_asked_for() -> None:
 @pytest.mark.parametrize(
     ("largest", "prefix"), [(2819.0, "k"), (0.004, "m"), (3.0, ""), (0.0, ""), (1e30, "T")]
 )
-def test_prefixes_bring_numbers_near_one(largest: float, prefix: str) -> None:
+def test_si_prefixes_fit_the_largest_number(largest: float, prefix: str) -> None:
     assert si_prefix(largest)[1] == prefix
 
 
-def test_text_is_cut_where_it_would_be_too_wide() -> None:
+def test_text_is_shortened_to_a_given_width() -> None:
     assert shorten("short", 10, 100) == "short"
     cut = shorten("a very long name of a block", 10, 60)
     assert cut.endswith("…") and text_width(cut, 10) <= 60
     assert text_width("機械", 10) == 20.0
 
 
-def test_of_long_arrays_a_report_gives_the_range() -> None:
+def test_long_arrays_are_shown_as_a_range() -> None:
     assert value_cell(np.linspace(-1.5, 2.5, 1000)) == "1000 numbers, −1.5 … 2.5"
     assert value_cell(np.array([1.0, 2.0])).count("<td") == 2

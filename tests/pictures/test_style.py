@@ -1,4 +1,4 @@
-"""Colours keep their contrast, and one joint keeps its colour."""
+"""Contrast of the colours, and distinct styles of the channels of a plot."""
 
 import pytest
 

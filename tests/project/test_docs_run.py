@@ -1,4 +1,4 @@
-"""Every Python block of the README, and of the pages and notebooks in docs, runs in order, as typed."""
+"""Every Python block of the README and of the pages and notebooks in docs runs, in order and unchanged."""
 
 import contextlib
 import io
@@ -18,7 +18,7 @@ BLOCK = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
 def python_blocks(page: Path) -> list[tuple[int, str]]:
-    """Line and text of each fenced Python block; place and text of each cell of a notebook."""
+    """Line and text of each fenced Python block, or position and text of each cell of a notebook."""
     text = page.read_text(encoding="utf-8")
     if page.suffix == ".ipynb":
         cells = enumerate(json.loads(text)["cells"], start=1)
@@ -36,10 +36,10 @@ def test_the_code_of_a_page_runs(page: Path, tmp_path: Path) -> None:
     os.chdir(tmp_path)
     try:
         with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
-            # The paper's own robot has inertias that no body can have, and says so.
+            # The robot of the paper has impossible inertias and issues a warning.
             warnings.simplefilter("ignore", InertiaWarning)
             for line, code in python_blocks(page):
-                # Lines are counted from the page's first, so that a traceback points into it.
+                # Line numbers are those of the page, so that a traceback refers to it.
                 exec(compile("\n" * (line - 1) + code, str(page), "exec"), namespace)  # noqa: S102
     finally:
         os.chdir(before)
@@ -57,7 +57,7 @@ def test_ci_runs_the_test_command_of_the_readme() -> None:
     assert script.splitlines()[-1] == "python3 scripts/test.py"
 
 
-def test_links_between_the_documents_lead_somewhere() -> None:
+def test_links_between_the_documents_have_targets() -> None:
     for page in (*ROOT.glob("*.md"), *PAGES):
         for target in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
             if "://" not in target:

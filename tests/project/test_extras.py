@@ -1,4 +1,4 @@
-"""The core works without the libraries of the extras, and whatever needs one says which and how to get it."""
+"""The core works without the libraries of the extras; features that need one name its extra in an error."""
 
 import json
 import subprocess
@@ -18,9 +18,9 @@ from armblocks.simulation.csv_rows import csv_rows
 
 ROOT = Path(__file__).resolve().parents[2]
 TYPERS_OWN = "pydantic"
-"""The core has it too: typer needs it."""
+"""Also a dependency of the core, through typer."""
 COME_ALONG = {"anywidget": {"traitlets"}}
-"""Libraries that another one brings."""
+"""Indirect dependencies."""
 
 WITHOUT_EXTRAS = """
 import importlib, json, pkgutil, sys, warnings
@@ -81,7 +81,7 @@ sys.exit(app(["studio", "--no-browser"], standalone_mode=False))
 """
 
 
-def test_the_core_runs_without_the_extras_and_names_what_is_missing(tmp_path: Path) -> None:
+def test_the_core_runs_without_the_extras_and_names_missing_libraries(tmp_path: Path) -> None:
     absent = sorted({name for names in LIBRARIES.values() for name in names} - {TYPERS_OWN} | {"PIL"})
     done = subprocess.run(
         [sys.executable, "-c", WITHOUT_EXTRAS, json.dumps(absent)],
@@ -122,7 +122,7 @@ def test_the_core_runs_without_the_extras_and_names_what_is_missing(tmp_path: Pa
         )
 
 
-def test_messages_and_pyproject_agree_on_what_an_extra_brings() -> None:
+def test_messages_and_pyproject_agree_on_the_libraries_of_the_extras() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     extras = project["optional-dependencies"]
     named = {name: {entry.partition(">")[0] for entry in extras[name]} for name in LIBRARIES}
@@ -134,19 +134,19 @@ def test_messages_and_pyproject_agree_on_what_an_extra_brings() -> None:
     assert "armblocks[all,docs]" in extras["test"]
 
 
-def test_a_library_that_is_broken_is_not_called_missing() -> None:
+def test_a_library_that_fails_to_import_is_not_reported_as_missing() -> None:
     with pytest.raises(ModuleNotFoundError, match="another"), from_extra("data", "data frames"):
         raise ModuleNotFoundError("No module named 'another'", name="another.part")
 
 
 @settings(deadline=None)  # the first call loads a library
 @given(st.lists(st.lists(st.floats(width=64), min_size=3, max_size=3), min_size=1, max_size=5))
-def test_csv_rows_have_the_bytes_that_pyarrow_writes(rows: list[list[float]]) -> None:
+def test_csv_rows_equal_the_output_of_pyarrow(rows: list[list[float]]) -> None:
     columns = [np.array(column) for column in zip(*rows, strict=True)]
     check_rows(columns)
 
 
-def test_csv_rows_at_the_borders_between_the_two_spellings() -> None:
+def test_csv_rows_at_the_limits_between_fixed_and_scientific_notation() -> None:
     powers = np.array(
         [sign * digits * 10.0**k for k in range(-9, 19) for digits in (1.0, 1.5, 1 / 3) for sign in (1, -1)]
     )
@@ -156,7 +156,7 @@ def test_csv_rows_at_the_borders_between_the_two_spellings() -> None:
 
 
 def check_rows(columns: list[np.ndarray]) -> None:
-    """The same text from both."""
+    """Compare the text of both writers."""
     import io
 
     written = io.BytesIO()

@@ -1,10 +1,10 @@
-"""``import armblocks`` and the command line's help load no heavy library."""
+"""``import armblocks`` and the help of the command line import no slow libraries."""
 
 import json
 import subprocess
 import sys
 
-# What else the studio's page can do without, so that it is there while the server imports it.
+# Further modules that are imported only after the page of the studio is served.
 BEHIND_THE_PAGE = {"casadi", "pydantic"} | {
     f"armblocks.{package}" for package in ("blocks", "diagram", "drawing", "rendering", "report")
 }
@@ -12,17 +12,17 @@ HEAVY = {"scipy", "matplotlib", "pandas", "pyarrow", "llvmlite", "starlette", "n
 
 
 def loaded_by(statement: str) -> set[str]:
-    """Names of the modules that a new process has loaded after the statement."""
+    """Names of the modules that a new process has imported after the statement."""
     script = f"{statement}\nimport sys, json\nprint(json.dumps(sorted(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     return set(json.loads(done.stdout))
 
 
-def test_import_armblocks_loads_no_heavy_library() -> None:
+def test_import_armblocks_imports_no_slow_library() -> None:
     assert loaded_by("import armblocks") & (HEAVY | {"typer", "rich"}) == set()
 
 
-def test_the_command_line_starts_without_heavy_libraries() -> None:
+def test_the_command_line_starts_without_slow_libraries() -> None:
     assert loaded_by("import armblocks.cli.main") & HEAVY == set()
 
 
@@ -38,7 +38,7 @@ def test_data_files_are_written_without_pandas() -> None:
     assert loaded_by(write) & (HEAVY - {"numpy"}) == {"pyarrow"}
 
 
-def test_the_page_of_the_studio_is_served_before_anything_heavy_is_imported() -> None:
+def test_the_page_of_the_studio_is_served_before_slow_imports() -> None:
     loaded = loaded_by("import armblocks.studio.server.launch")
     assert "starlette" in loaded
     assert loaded & (HEAVY - {"starlette"} | BEHIND_THE_PAGE) == set()

@@ -1,4 +1,4 @@
-"""The contracts of pyproject.toml hold, and each of them would notice a violation."""
+"""The import contracts of pyproject.toml are kept, and each of them detects a violation."""
 
 import re
 import shutil
@@ -17,27 +17,27 @@ VIOLATIONS = {
         "import armblocks.studio.runs.pace",
         "armblocks.studio.runs.pace",
     ),
-    "Numerics never meet modelling": ("simulation", "import armblocks.blocks", "armblocks.blocks"),
-    "Modelling never meets numerics": ("formats", "import armblocks.compiler", "armblocks.compiler"),
-    "llvmlite has one door: compiler": ("simulation", "import llvmlite.binding", "llvmlite"),
-    "On the numerics side casadi has one door: compiler.from_casadi": (
+    "Numerics does not import modelling": ("simulation", "import armblocks.blocks", "armblocks.blocks"),
+    "Modelling does not import numerics": ("formats", "import armblocks.compiler", "armblocks.compiler"),
+    "Only compiler imports llvmlite": ("simulation", "import llvmlite.binding", "llvmlite"),
+    "In numerics, only compiler.from_casadi imports casadi": (
         "compiler",
         "from casadi import SX",
         "casadi",
     ),
-    "typer and rich have one door: cli": ("report", "from rich.table import Table", "rich"),
-    "matplotlib has one door: pictures": ("face", "import matplotlib.pyplot", "matplotlib"),
-    "pandas, pyarrow and scipy have their doors: export, analysis": (
+    "Only cli imports typer and rich": ("report", "from rich.table import Table", "rich"),
+    "Only pictures imports matplotlib": ("face", "import matplotlib.pyplot", "matplotlib"),
+    "Only export and analysis import pandas, pyarrow and scipy": (
         "simulation",
         "def late():\n    from scipy.io import savemat",
         "scipy",
     ),
 }
-"""One violation a contract: the package of armblocks that gets the line, the line, and what it imports."""
+"""One violation of each contract: package, inserted line, and the imported module."""
 
 
 def judge(folder: Path) -> tuple[dict[str, bool], dict[str, str]]:
-    """Run import-linter over ``folder/src``: whether each contract is kept; what is said of broken ones."""
+    """Run import-linter in ``folder``; return which contracts are kept, and the output for broken ones."""
     script = (
         "import sys; sys.path.insert(0, 'src'); "
         "from importlinter.cli import lint_imports; sys.exit(lint_imports())"
@@ -70,8 +70,8 @@ def test_every_contract_is_kept(copy: Path) -> None:
     assert all(verdicts.values()), verdicts
 
 
-def test_a_contract_notices_its_violation(copy: Path) -> None:
-    """All violations stand side by side: what is said of each contract names its own."""
+def test_every_contract_detects_its_violation(copy: Path) -> None:
+    """All violations are present at the same time: the output for each contract names its own."""
     for package, line, _ in VIOLATIONS.values():
         with copy.joinpath("src", "armblocks", *package.split("."), "__init__.py").open(
             "a", encoding="utf-8"

@@ -1,4 +1,4 @@
-"""Packages that export lazily say the same thing to the interpreter and to type checkers."""
+"""Lazily exporting packages provide the same names to the interpreter and to type checkers."""
 
 import ast
 import importlib
@@ -30,7 +30,7 @@ def homes_for_type_checkers(package: str) -> dict[str, str]:
 
 
 @pytest.mark.parametrize("package", PACKAGES)
-def test_every_name_is_found_where_type_checkers_look(package: str) -> None:
+def test_every_name_comes_from_the_module_that_type_checkers_see(package: str) -> None:
     module = importlib.import_module(package)
     homes = homes_for_type_checkers(package)
     assert sorted(homes) == sorted(module.__all__)
@@ -43,8 +43,8 @@ def test_every_name_is_found_where_type_checkers_look(package: str) -> None:
 
 
 @pytest.mark.parametrize("package", PACKAGES)
-def test_no_name_is_that_of_a_module_which_holds_it(package: str) -> None:
-    # Importing the module would put it in the place of what it holds.
+def test_no_exported_name_equals_the_name_of_its_module(package: str) -> None:
+    # Importing the module would replace the exported object by the module.
     module = importlib.import_module(package)
     homes = homes_for_type_checkers(package)
     folder = Path(module.__file__ or "").parent
@@ -55,6 +55,6 @@ def test_no_name_is_that_of_a_module_which_holds_it(package: str) -> None:
 
 
 @pytest.mark.parametrize("package", PACKAGES)
-def test_an_unknown_name_is_an_attribute_error(package: str) -> None:
+def test_an_unknown_name_raises_an_attribute_error(package: str) -> None:
     with pytest.raises(AttributeError, match=f"module '{package}' has no attribute 'fkin'"):
         importlib.import_module(package).fkin  # noqa: B018 - the access is the test

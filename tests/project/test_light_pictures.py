@@ -1,4 +1,4 @@
-"""Curves on the pages of the documentation have fewer points, and look the same."""
+"""Thinned curves on the documentation pages have fewer points and look the same."""
 
 import runpy
 from itertools import pairwise
@@ -21,7 +21,7 @@ CURVES = {
 
 
 @pytest.mark.parametrize("name", CURVES)
-def test_no_left_out_point_is_farther_from_the_drawn_line_than_the_tolerance(name: str) -> None:
+def test_omitted_points_are_within_the_tolerance_of_the_drawn_line(name: str) -> None:
     points = CURVES[name]
     kept = np.flatnonzero(LIGHT["kept_points"](points))
     assert kept[0] == 0

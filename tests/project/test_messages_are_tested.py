@@ -1,8 +1,8 @@
-"""Every error and warning that the package can show is read by some test.
+"""Every error and warning of the package is checked by a test.
 
 The check is static and approximate: for each construction of an armblocks error or warning it takes the
-literal words of the message (what, allowed, fix) and looks whether three words in a row of them stand in a
-file under ``tests``.
+literal words of the message (what, allowed, fix) and searches three consecutive words of them in the files
+under ``tests``.
 """
 
 import ast
@@ -25,12 +25,12 @@ RUN_OF_WORDS = 3
 
 
 def words(text: str) -> list[str]:
-    """Words of a message or of a test, freed of quotes, regular-expression escapes and punctuation."""
+    """The words of a message or a test, without quotes, regular-expression escapes and punctuation."""
     return re.findall(r"[^\W_]+(?:[-'.][^\W_]+)*", text.replace("\\", ""))
 
 
 def literal_pieces(node: ast.expr, names: dict[str, ast.expr]) -> Iterator[str]:
-    """The constant texts in an expression; a local variable is followed to what was assigned to it."""
+    """The constant texts in an expression; local variables are replaced by their assigned expressions."""
     for part in ast.walk(node):
         if isinstance(part, ast.Constant) and isinstance(part.value, str):
             yield part.value
@@ -44,7 +44,7 @@ def literal_pieces(node: ast.expr, names: dict[str, ast.expr]) -> Iterator[str]:
 
 
 def is_message(node: ast.AST) -> bool:
-    """Whether an error or warning is made here."""
+    """Whether the node constructs an error or a warning."""
     if not isinstance(node, ast.Call) or not node.args:
         return False
     kind = called(node)
@@ -55,12 +55,12 @@ def is_message(node: ast.AST) -> bool:
 
 
 def called(node: ast.Call) -> str:
-    """The last name of what is called."""
+    """The last part of the name of the called function."""
     return node.func.id if isinstance(node.func, ast.Name) else getattr(node.func, "attr", "")
 
 
 def messages() -> Iterator[tuple[str, list[str]]]:
-    """Every place where an error or warning is made, with the literal pieces of its message."""
+    """Every construction of an error or warning, with the literal pieces of its message."""
     for path in sorted(SOURCE.rglob("*.py")):
         text = path.read_text(encoding="utf-8")
         if path.name == "errors.py" or not any(name in text for name in TREE):
@@ -80,7 +80,7 @@ def messages() -> Iterator[tuple[str, list[str]]]:
 
 
 def assigned(nodes: Sequence[ast.AST]) -> dict[str, ast.expr]:
-    """What is assigned to each name."""
+    """The expressions assigned to each name."""
     return {
         target.id: node.value
         for node in nodes
@@ -91,7 +91,7 @@ def assigned(nodes: Sequence[ast.AST]) -> dict[str, ast.expr]:
 
 
 def pieces_of(node: ast.Call, names: dict[str, ast.expr]) -> list[str]:
-    """The literal pieces of the message that is made here."""
+    """The literal pieces of the constructed message."""
     pieces = list(literal_pieces(node.args[0], names))
     if called(node) == "UnknownNameError":
         pieces = [f"there is no {' '.join(pieces)} named"]
@@ -102,9 +102,9 @@ def pieces_of(node: ast.Call, names: dict[str, ast.expr]) -> list[str]:
 
 
 def runs(pieces: list[str]) -> Iterator[tuple[str, ...]]:
-    """All runs of words by which a message can be known: three in a row, or a whole shorter piece.
+    """Word sequences that identify a message: three consecutive words, or a shorter complete piece.
 
-    Pieces of one word count only where there is nothing longer.
+    Pieces of one word count only if there is no longer piece.
     """
     split = [words(piece) for piece in pieces]
     least = min(2, max((len(piece) for piece in split), default=0))
@@ -117,7 +117,7 @@ def runs(pieces: list[str]) -> Iterator[tuple[str, ...]]:
 
 @pytest.fixture(scope="module")
 def tested() -> set[tuple[str, ...]]:
-    """All runs of one, two and three words in the texts of the tests."""
+    """All sequences of one, two and three words in the texts of the tests."""
     found: set[tuple[str, ...]] = set()
     for path in sorted((ROOT / "tests").rglob("*.py")):
         if path == Path(__file__):
@@ -130,7 +130,7 @@ def tested() -> set[tuple[str, ...]]:
     return found
 
 
-def test_every_message_is_read_by_a_test(tested: set[tuple[str, ...]]) -> None:
+def test_every_message_occurs_in_a_test(tested: set[tuple[str, ...]]) -> None:
     unread = []
     for place, pieces in messages():
         candidates = [run for run in runs(pieces) if run]

@@ -1,6 +1,6 @@
-"""Every error says where it arose and what to do about it.
+"""Every error states its place and a remedy.
 
-The check is static: each construction of an armblocks error under ``src`` names ``where`` and ``fix``.
+The check is static: each construction of an armblocks error under ``src`` has ``where`` and ``fix``.
 """
 
 import ast
@@ -17,18 +17,18 @@ TREE = {
     if isinstance(kind, type) and issubclass(kind, errors.ArmblocksError)
 }
 OWN = {
-    "UnknownNameError": {"where", "fix"},  # says the nearest name; its kind says of what it is a name
-    "MissingLibraryError": {"where", "fix"},  # says what it is needed for, and how to install it
-    "AlgebraicLoopError": {"where", "fix"},  # the loop itself is the place
+    "UnknownNameError": {"where", "fix"},  # contains the nearest name and the kind of name
+    "MissingLibraryError": {"where", "fix"},  # states its purpose and the install command
+    "AlgebraicLoopError": {"where", "fix"},  # the loop is the place
 }
-"""Errors whose class itself supplies the help."""
+"""Error classes that provide the arguments themselves."""
 PLACE_IS_ADDED = ("blocks/", "diagram/shape_rules.py")
-"""A block does not know its own name: shapes are checked by ``diagram.shapes``, equations by
-``diagram.model``, calls by ``simulation.calls``, which add the block's path."""
+"""Files in which blocks raise errors without ``where``: a block has no name. ``diagram.shapes``,
+``diagram.model`` and ``simulation.calls`` add the path of the block."""
 
 
 def constructions() -> Iterator[tuple[str, str, ast.Call]]:
-    """Every place where an error is made: file:line, the error's class, the call."""
+    """Every construction of an error: file:line, class of the error, call."""
     for path in sorted(SOURCE.rglob("*.py")):
         place = path.relative_to(SOURCE).as_posix()
         text = path.read_text(encoding="utf-8")
@@ -42,7 +42,7 @@ def constructions() -> Iterator[tuple[str, str, ast.Call]]:
 
 
 def lacking(place: str, kind: str, call: ast.Call) -> set[str]:
-    """What an error's construction does not say, though it could."""
+    """The missing arguments of an error's construction."""
     said = {keyword.arg for keyword in call.keywords if not _is_empty(keyword.value)}
     missing = {"where", "fix"} - said - OWN.get(kind, set())
     return missing - {"where"} if place.startswith(PLACE_IS_ADDED) else missing
@@ -52,7 +52,7 @@ def _is_empty(value: ast.expr) -> bool:
     return isinstance(value, ast.Constant) and not value.value
 
 
-def test_every_error_says_where_and_what_to_do() -> None:
+def test_every_error_has_a_place_and_a_remedy() -> None:
     found = list(constructions())
     assert len(found) > 300
     silent = [
@@ -63,7 +63,7 @@ def test_every_error_says_where_and_what_to_do() -> None:
     assert silent == [], f"{len(silent)} errors give no help:\n" + "\n".join(silent)
 
 
-def test_the_check_sees_what_is_missing() -> None:
+def test_the_check_detects_missing_arguments() -> None:
     call = ast.parse('InputError("x is 3", where="", allowed="2")', mode="eval").body
     assert isinstance(call, ast.Call)
     assert lacking("face/arm.py:1", "InputError", call) == {"where", "fix"}

@@ -1,4 +1,4 @@
-"""Every armblocks name in the tables for those who come from Simulink or the Robotics Toolbox exists."""
+"""All armblocks names in the tables for users of Simulink and of the Robotics Toolbox exist."""
 
 import ast
 import inspect
@@ -27,11 +27,11 @@ OBJECTS: dict[str, object] = {
     "robot": ab.Robot,
     "run": ab.DiagramRun,
 }
-"""What the code of the tables calls things that are no modules."""
+"""Objects to which the variable names in the tables refer."""
 
 
 def names_here(page: str) -> Iterator[str]:
-    """The pieces of code in the last column of every table of a page."""
+    """The code in the last column of every table of a page."""
     for line in (DOCS / f"{page}.md").read_text(encoding="utf-8").splitlines():
         if line.startswith("| ") and not line.endswith("| armblocks |"):
             cell = re.sub(r"\{\w+\}`[^`]*`", "", line.split("|")[-2])  # without links to pages
@@ -39,7 +39,7 @@ def names_here(page: str) -> Iterator[str]:
 
 
 def check(node: ast.expr) -> object:
-    """What an expression names; raises where a name, an attribute or an argument does not exist."""
+    """Resolve an expression; raise if a name, an attribute or an argument does not exist."""
     match node:
         case ast.Name(id=name):
             return OBJECTS[name] if name in OBJECTS else BLOCKS[name]
@@ -76,19 +76,19 @@ def test_every_name_of_the_tables_exists(page: str) -> None:
             check(ast.parse(code, mode="eval").body)
 
 
-def test_a_name_that_does_not_exist_is_found() -> None:
+def test_the_check_detects_a_missing_name() -> None:
     for code in ("ab.simulatte(x)", "Gian", "Gain(gian=2)", "arm.fkin(q)", "ab.Robot(grav=1)"):
         with pytest.raises((AttributeError, ab.errors.UnknownNameError, AssertionError)):
             check(ast.parse(code, mode="eval").body)
 
 
-def test_the_solvers_of_simulink_are_known_by_their_names() -> None:
+def test_solvers_are_found_by_their_simulink_names() -> None:
     text = (DOCS / "from-simulink.md").read_text(encoding="utf-8")
     named = set(re.findall(r"`(ode\w+)`", text)) | {"ode2", "ode3", "ode4"}
     assert named == {alias for tableau in TABLEAUX for alias in tableau.aliases if alias.startswith("ode")}
 
 
-def test_every_block_of_the_families_that_simulink_has_is_in_its_table() -> None:
+def test_every_block_of_the_families_of_simulink_is_in_its_table() -> None:
     page = (DOCS / "from-simulink.md").read_text(encoding="utf-8")
     own = {"CumulativeSum", "DegreesToRadians", "RadiansToDegrees", "CartesianToPolar", "PolarToCartesian"}
     own |= {"AngleDifference", "Norm", "FirstOrderLag", "SecondOrderLag", "LeadLag", "Pulse", "Counter"}

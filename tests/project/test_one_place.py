@@ -1,4 +1,4 @@
-"""A newcomer adds a thing in one file, and all parts of the product know it."""
+"""A block, joint type, solver or file format is added in one file, and all parts of the product use it."""
 
 from __future__ import annotations
 
@@ -163,7 +163,9 @@ assert ".dh" in READABLE
     ],
     ids=["a block with a face", "a joint type", "a solver", "a file format"],
 )
-def test_an_addition_is_one_file(place: str, file: str, use: str, tmp_path: Path) -> None:
+def test_an_addition_in_one_file_is_available_everywhere(
+    place: str, file: str, use: str, tmp_path: Path
+) -> None:
     copy = tmp_path / "armblocks"
     shutil.copytree(ROOT / "src" / "armblocks", copy, ignore=shutil.ignore_patterns("__pycache__", "web"))
     shutil.copytree(ROOT / "robots", copy / "shipped" / "robots")

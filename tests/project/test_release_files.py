@@ -1,4 +1,4 @@
-"""Version, citation, change log and the workflow of a public host agree with each other."""
+"""Version, citation, change log and the workflow of a public host agree."""
 
 import re
 import tomllib

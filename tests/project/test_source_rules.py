@@ -1,4 +1,4 @@
-"""Rules that every file of the package keeps, read from its syntax tree."""
+"""Rules for every file of the package, checked on its syntax tree."""
 
 import ast
 import re
@@ -26,19 +26,19 @@ FORBIDDEN_IMPORTS = {
     "requests",
 }
 DOORS = {"studio/server/launch.py": {"socket", "urllib"}}
-"""Files that may import one of these, for what they are there for."""
+"""Files that may import one of these modules, because it is their purpose."""
 VAGUE_NAMES = {"utils", "util", "helpers", "helper", "manager", "core", "misc", "common"}
 LONGEST_FUNCTION = 80
 LONGEST_LINE = 110
 CONTROL_FLOW = re.compile(r"\b(br label|br i1|switch i\d+|indirectbr) | = phi |\.(label|branch)\(")
-"""Text of LLVM IR that jumps, branches or merges, and calls that would write it."""
+"""LLVM IR text with jumps, branches or merges, and calls that would generate it."""
 
 
 def public_definitions(tree: ast.Module) -> Iterator[ast.FunctionDef | ast.ClassDef]:
     for node in tree.body:
         if not isinstance(node, ast.FunctionDef | ast.ClassDef) or node.name.startswith("_"):
             continue
-        # Of an overloaded function the last one, which is the one that runs, has the docstring.
+        # The implementation of an overloaded function, its last definition, has the docstring.
         if not any(isinstance(mark, ast.Name) and mark.id == "overload" for mark in node.decorator_list):
             yield node
 
@@ -58,7 +58,7 @@ def nodes(trees: dict[str, ast.Module]) -> dict[str, list[ast.AST]]:
     return {name: list(ast.walk(tree)) for name, tree in trees.items()}
 
 
-def test_a_module_says_what_it_is_for(trees: dict[str, ast.Module]) -> None:
+def test_modules_have_docstrings(trees: dict[str, ast.Module]) -> None:
     assert [name for name, tree in trees.items() if not ast.get_docstring(tree)] == []
 
 
@@ -72,7 +72,7 @@ def test_public_definitions_have_docstrings(trees: dict[str, ast.Module]) -> Non
 
 
 def forbidden_parts(nodes: Iterable[ast.AST], imports: set[str]) -> Iterator[int]:
-    """Lines that evaluate text, import one of these modules, or let a file be unpickled."""
+    """Lines that evaluate text, import one of these modules, or permit unpickling of a file."""
     for node in nodes:
         match node:
             case ast.Call(func=ast.Name(id=called)) if called in FORBIDDEN_CALLS:
@@ -105,11 +105,11 @@ def test_nothing_is_evaluated_pickled_or_fetched(nodes: dict[str, list[ast.AST]]
         ("load(f, allow_pickle=False)\nload(f, allow_pickle=True)\nload(f, allow_pickle=x)", [2, 3]),
     ],
 )
-def test_what_is_forbidden_is_found(source: str, lines: list[int]) -> None:
+def test_the_check_detects_forbidden_code(source: str, lines: list[int]) -> None:
     assert list(forbidden_parts(ast.walk(ast.parse(source)), FORBIDDEN_IMPORTS)) == lines
 
 
-def test_functions_can_be_read_in_one_sitting(nodes: dict[str, list[ast.AST]]) -> None:
+def test_functions_have_at_most_80_lines(nodes: dict[str, list[ast.AST]]) -> None:
     assert [
         f"{name}: {function.name} has {lines} lines"
         for name, inside in nodes.items()
@@ -119,8 +119,8 @@ def test_functions_can_be_read_in_one_sitting(nodes: dict[str, list[ast.AST]]) -
     ] == []
 
 
-def test_lines_of_the_front_end_fit() -> None:
-    """Of Python, ruff checks the same; prettier breaks code, but neither comments nor text."""
+def test_lines_of_the_front_end_have_at_most_110_characters() -> None:
+    """Ruff checks the same for Python; prettier breaks code, but neither comments nor text."""
     sources = (path for folder in ("src", "tests") for path in (FRONTEND / folder).rglob("*.ts*"))
     assert [
         f"{path.relative_to(FRONTEND).as_posix()}:{number}"
@@ -131,14 +131,14 @@ def test_lines_of_the_front_end_fit() -> None:
     ] == []
 
 
-def test_files_are_named_for_their_subject() -> None:
+def test_files_do_not_have_generic_names() -> None:
     assert [name for name in NAMES if set(Path(name).with_suffix("").parts) & VAGUE_NAMES] == []
 
 
 def imported(nodes: Iterable[ast.AST], modules: Collection[str]) -> Iterator[str]:
     """Every module among ``modules`` from which an import takes something.
 
-    Imports in functions and under ``TYPE_CHECKING`` count too: a reader of the module needs what they name.
+    Imports in functions and under ``TYPE_CHECKING`` are included, because a reader of the module needs them.
     """
     for node in nodes:
         if isinstance(node, ast.Import):
@@ -153,7 +153,7 @@ def imported(nodes: Iterable[ast.AST], modules: Collection[str]) -> Iterator[str
 
 
 def circles(graph: Mapping[str, set[str]]) -> list[list[str]]:
-    """The groups of modules that reach each other (Tarjan's strongly connected components), sorted."""
+    """The groups of mutually dependent modules (Tarjan's strongly connected components), sorted."""
     number: dict[str, int] = {}
     lowest: dict[str, int] = {}
     waiting: list[str] = []
@@ -191,11 +191,11 @@ def circles(graph: Mapping[str, set[str]]) -> list[list[str]]:
         ({"a": {"b"}, "b": {"c", "d"}, "c": {"d"}, "d": {"a"}, "e": {"a"}}, [["a", "b", "c", "d"]]),
     ],
 )
-def test_modules_in_a_circle_are_found(graph: dict[str, set[str]], expected: list[list[str]]) -> None:
+def test_import_cycles_are_detected(graph: dict[str, set[str]], expected: list[list[str]]) -> None:
     assert circles(graph) == expected
 
 
-def test_every_kind_of_import_counts() -> None:
+def test_every_kind_of_import_is_included() -> None:
     source = """
 from typing import TYPE_CHECKING
 import armblocks.a
@@ -211,7 +211,7 @@ def late():
     assert found == {f"armblocks.{name}" for name in ("a", "b", "c", "d", "e", "e.f")}
 
 
-def test_no_module_imports_itself_by_way_of_others(nodes: dict[str, list[ast.AST]]) -> None:
+def test_there_are_no_import_cycles(nodes: dict[str, list[ast.AST]]) -> None:
     modules = {
         ".".join(("armblocks", *Path(name).with_suffix("").parts)).removesuffix(".__init__"): inside
         for name, inside in nodes.items()

@@ -1,4 +1,4 @@
-"""The wheel is pure Python, brings what is shipped and the documentation, and runs without the checkout."""
+"""The wheel is pure Python, contains shipped files and documentation, and runs without the checkout."""
 
 import inspect
 import os
@@ -27,11 +27,11 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return Path(built)
 
 
-def test_the_wheel_fits_every_system(wheel: Path) -> None:
+def test_the_wheel_is_platform_independent(wheel: Path) -> None:
     assert wheel.name.endswith("-py3-none-any.whl")
 
 
-def test_the_wheel_brings_what_is_shipped(wheel: Path) -> None:
+def test_the_wheel_contains_the_shipped_files(wheel: Path) -> None:
     names = set(zipfile.ZipFile(wheel).namelist())
     for folder in ("robots", "examples", "libraries"):
         for path in (ROOT / folder).rglob("*.*"):
@@ -43,7 +43,7 @@ def test_the_wheel_brings_what_is_shipped(wheel: Path) -> None:
     assert "armblocks/py.typed" in names
 
 
-def test_the_wheel_brings_a_page_of_every_document_and_no_more_than_pages(wheel: Path) -> None:
+def test_the_wheel_contains_a_page_of_every_document_and_no_sources(wheel: Path) -> None:
     names = set(zipfile.ZipFile(wheel).namelist())
     documents = [path.stem for path in (ROOT / "docs").glob("*.md")]
     blocks = [f"reference/blocks/{name}" for name in BLOCKS]
@@ -54,7 +54,7 @@ def test_the_wheel_brings_a_page_of_every_document_and_no_more_than_pages(wheel:
 
 
 def public_members(kind: type) -> Iterator[str]:
-    """Methods and properties without an underscore, those of public bases among them."""
+    """Methods and properties without an underscore, including those of public base classes."""
     for name, member in inspect.getmembers_static(kind):
         described = isinstance(member, property | cached_property | classmethod | staticmethod)
         if not name.startswith("_") and (described or inspect.isfunction(member)):
@@ -63,7 +63,7 @@ def public_members(kind: type) -> Iterator[str]:
 
 def test_the_reference_has_every_public_name(wheel: Path) -> None:
     inventory = zipfile.ZipFile(wheel).read("armblocks/shipped/docs/objects.inv")
-    # Four lines of comments, then compressed lines: name, what it is, and where.
+    # Four comment lines, then compressed lines of name, type and location.
     lines = zlib.decompress(inventory.split(b"\n", maxsplit=4)[4]).decode().splitlines()
     described = {line.split()[0] for line in lines if " py:" in line}
     missing: list[str] = []

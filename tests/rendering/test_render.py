@@ -1,4 +1,4 @@
-"""The renderer: hidden surfaces, and the projection of a ball."""
+"""The renderer: hidden surfaces, projection, shadows, layers."""
 
 import math
 
@@ -22,7 +22,7 @@ def camera() -> Camera:
     return Camera.framing(corners, WIDTH, HEIGHT, margin=10.0)
 
 
-def test_framed_points_fill_the_panel_but_not_its_margin() -> None:
+def test_framed_points_fill_the_panel_up_to_its_margin() -> None:
     points = np.random.default_rng(5).normal(size=(100, 3))
     view = Camera.framing(points, 300, 200, margin=12)
     x, y, nearness = view.project(points)
@@ -31,7 +31,7 @@ def test_framed_points_fill_the_panel_but_not_its_margin() -> None:
     assert (nearness > 0).all()
 
 
-def test_up_is_up() -> None:
+def test_the_z_axis_points_up_in_the_picture() -> None:
     _, y, _ = camera().project(np.array([(0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]))
     assert y[1] < y[0]
 
@@ -42,12 +42,12 @@ def test_a_ball_covers_a_disc() -> None:
     x, _, nearness = view.project(np.array([(0.0, 0.0, 0.0)]))
     radius = 0.5 * view.scale * float(nearness[0]) * 2.0
     covered = float((ball.pixels[..., 3] / 255).sum())
-    # The facets of the outline lose 1 %, perspective adds less.
+    # The facets of the outline reduce the area by 1 %; perspective adds less.
     assert covered == pytest.approx(math.pi * radius**2, rel=0.03)
     assert x.shape == (1,)
 
 
-def test_the_nearer_body_is_seen() -> None:
+def test_the_nearer_body_hides_the_farther_one() -> None:
     view = camera()
     towards = view.axes[2]
     near = triangles(Sphere(radius=0.2, material=Material.PAINT)).moved(_shift(0.6 * towards))
@@ -66,7 +66,7 @@ def test_rendering_is_repeatable() -> None:
     assert (first.pixels == second.pixels).all()
 
 
-def test_a_body_outside_the_panel_is_cut_off() -> None:
+def test_a_body_outside_the_panel_is_clipped() -> None:
     big = triangles(Sphere(radius=30.0)).moved(_shift(-40.0 * camera().axes[2]))
     assert render([big], camera(), WIDTH, HEIGHT, 1.0).pixels.shape[:2] == (200, 200)
 
@@ -78,7 +78,7 @@ def test_a_shadow_is_black_and_soft() -> None:
     assert len(np.unique(dark[..., 3])) > 10
 
 
-def test_layers_combine_as_paint_does() -> None:
+def test_layers_are_composited_with_their_opacity() -> None:
     red = np.array([[[255, 0, 0, 255]]], dtype=np.uint8)
     blue = np.array([[[0, 0, 255, 255]]], dtype=np.uint8)
     assert over(red, blue).tolist() == red.tolist()
@@ -86,7 +86,7 @@ def test_layers_combine_as_paint_does() -> None:
     assert over(faded(red, 0.5), blue)[0, 0, 3] == 255
 
 
-def test_cropping_keeps_all_that_is_drawn() -> None:
+def test_cropping_keeps_all_drawn_pixels() -> None:
     pixels = np.zeros((10, 12, 4), dtype=np.uint8)
     pixels[3:5, 6:9, 3] = 9
     part, left, top = cropped(pixels)
@@ -94,7 +94,7 @@ def test_cropping_keeps_all_that_is_drawn() -> None:
     assert cropped(np.zeros((4, 4, 4), dtype=np.uint8))[0].shape == (1, 1, 4)
 
 
-def test_every_robot_can_be_pictured(robot: Robot) -> None:
+def test_every_robot_can_be_drawn(robot: Robot) -> None:
     picture = arm_picture(robot, [0.2] * robot.n, width=160, height=140)
     (raster,) = (mark for mark in picture.marks if isinstance(mark, Raster))
     assert (raster.pixels[..., 3] == 255).mean() > 0.005
@@ -106,7 +106,7 @@ def test_a_picture_for_notebooks_is_one_svg(puma560: Robot) -> None:
     assert text.startswith("<?xml") and text.count("<svg") == 1
 
 
-def test_moments_show_the_times_and_where_the_tool_is(kr180: Robot) -> None:
+def test_snapshots_show_their_times_and_tool_positions(kr180: Robot) -> None:
     time = np.linspace(0, 10, 41)
     q = np.outer(time / 10, [3.14, 0, 1.57, 0])
     poses = np.stack([link_frames(kr180, row) for row in q.tolist()])

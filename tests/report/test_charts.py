@@ -1,4 +1,4 @@
-"""Charts: labels that do not collide, peaks that stay, limits that show."""
+"""Charts: labels do not overlap, peaks remain, limits are visible."""
 
 import itertools
 
@@ -17,7 +17,7 @@ from armblocks.report.charts.time_chart import Panel, Trace, spread, time_chart
 
 
 def boxes(picture: Picture) -> list[tuple[float, float, float, float]]:
-    """The rectangle of every text: left, top, right, bottom."""
+    """The bounding rectangle of every text: left, top, right, bottom."""
     found: list[tuple[float, float, float, float]] = []
     for mark in text_marks(picture):
         width = text_width(mark.text, mark.size, bold=mark.bold, mono=mark.mono)
@@ -46,7 +46,7 @@ def chart(values: np.ndarray, limits: tuple[float, float] | None = None) -> Pict
 
 
 @pytest.mark.parametrize("scale", [0.0, 1e-9, 1.0, 1e7])
-def test_no_text_overlaps_another_and_none_leaves_the_picture(scale: float) -> None:
+def test_texts_do_not_overlap_and_are_inside_the_picture(scale: float) -> None:
     values = scale * np.random.default_rng(2).normal(size=(200, 7)).cumsum(axis=0)
     picture = chart(values)
     assert overlapping(picture) == []
@@ -61,7 +61,7 @@ def test_labels_are_spread_within_their_panel(wanted: list[float]) -> None:
     assert places[0] >= 0.0 and places[-1] <= 150.0 + 1e-9
 
 
-def test_labels_that_do_not_collide_stay_where_they_are_wanted() -> None:
+def test_labels_that_do_not_overlap_are_not_moved() -> None:
     assert spread([10.0, 60.0, 120.0], 15.0, 0.0, 150.0) == [10.0, 60.0, 120.0]
 
 
@@ -75,7 +75,7 @@ def test_thinning_keeps_the_ends_and_every_peak() -> None:
     assert (t[0], t[-1]) == (0.0, 1.0)
 
 
-def test_a_limit_is_drawn_when_near_and_stands_out_when_broken() -> None:
+def test_a_limit_is_drawn_when_near_and_highlighted_when_exceeded() -> None:
     ramp = np.linspace(0, 80, 50)[:, None]
     far = chart(ramp, (-500.0, 500.0))
     near = chart(ramp, (-500.0, 90.0))
@@ -90,14 +90,14 @@ def test_a_limit_is_drawn_when_near_and_stands_out_when_broken() -> None:
     assert any("over limit" in mark.text for mark in text_marks(broken))
 
 
-def test_a_gap_in_a_signal_stays_a_gap() -> None:
+def test_nan_values_leave_a_gap_in_the_line() -> None:
     values = np.ones((100, 1))
     values[40:60] = np.nan
     line = max((m for m in chart(values).marks if isinstance(m, Polyline)), key=lambda m: len(m.points))
     assert np.isnan(np.asarray(line.points)[:, 1]).sum() == 20
 
 
-def test_equal_axes_have_one_scale() -> None:
+def test_equal_axes_have_the_same_scale() -> None:
     angle = np.linspace(0, 2 * np.pi, 400)
     picture = path_chart(
         3 * np.cos(angle), np.sin(angle), x_label="x, m", y_label="y, m", width=320, height=340, equal=True
@@ -107,13 +107,13 @@ def test_equal_axes_have_one_scale() -> None:
     assert width / height == pytest.approx(3.0, rel=1e-3)
 
 
-def test_start_and_end_are_told_apart() -> None:
+def test_start_and_end_have_different_marks() -> None:
     x = np.linspace(0, 1, 50)
     picture = path_chart(x, x**2, x_label="x", y_label="y", width=320, height=340, equal=False)
     assert {"start", "end"} <= {mark.text for mark in text_marks(picture) if isinstance(mark, Text)}
 
 
 @pytest.mark.parametrize("values", [[1.0, 1.0], [0.0, 0.0], [np.nan, np.nan], [1.0, 1.0 + 1e-15]])
-def test_a_constant_has_a_range_too(values: list[float]) -> None:
+def test_the_axis_range_of_a_constant_is_not_empty(values: list[float]) -> None:
     low, high = padded(np.array(values), 0.1)
     assert high - low > 0.1

@@ -1,4 +1,4 @@
-"""Figures of linear systems: what they show, that nothing is clipped, and the files."""
+"""Figures of linear systems: content, clipping, and files."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def test_figures_are_painted_in_both_themes(theme: str) -> None:
     assert picture_png(bode_picture(servo()), theme=theme)[:4] == b"\x89PNG"  # type: ignore[arg-type]
 
 
-def test_a_bode_diagram_says_the_margins() -> None:
+def test_a_bode_diagram_shows_the_margins() -> None:
     words = [text.text for text in text_marks(bode_picture(servo(), margins=True))]
     assert "gain margin 6.02 dB" in words
     assert "phase margin 27.1 deg" in words
@@ -81,7 +81,7 @@ def test_a_bode_diagram_says_the_margins() -> None:
     assert "Frequency, Hz" in [text.text for text in text_marks(bode_picture(servo(), hertz=True))]
 
 
-def test_a_locus_says_the_gain_at_which_the_loop_becomes_unstable() -> None:
+def test_a_root_locus_shows_the_gain_at_which_the_loop_becomes_unstable() -> None:
     assert "gain 2" in [text.text for text in text_marks(root_locus_picture(servo()))]
 
 
@@ -91,7 +91,7 @@ def test_several_channels_have_a_legend() -> None:
     assert {"a from u1", "a from u2", "b from u1", "b from u2"} <= set(words)
 
 
-def test_lines_are_cut_exactly_at_the_edge() -> None:
+def test_lines_are_clipped_exactly_at_the_edge() -> None:
     field = straight_field((0.0, 1.0), (0.0, 1.0), (0.0, 0.0, 100.0, 100.0))
     points = within(field.points(np.array([-1.0, 0.5, 2.0]), np.array([0.5, 0.5, 0.5])), field.box)
     assert points.tolist() == [[0.0, 50.0], [50.0, 50.0], [100.0, 50.0]]
@@ -106,7 +106,7 @@ def test_a_logarithmic_scale_puts_decades_at_equal_distances() -> None:
     assert len(finer) == 4 * 8
 
 
-def test_a_report_holds_every_figure_and_the_system(tmp_path: Path) -> None:
+def test_a_report_contains_every_figure_and_the_system(tmp_path: Path) -> None:
     files = write_linear_report(tmp_path / "out", servo(), loop=True, formats=("svg",))
     names = {path.name for path in files}
     figures = {"bode", "nyquist", "step", "impulse", "poles-and-zeros", "root-locus"}

@@ -1,4 +1,4 @@
-"""Which signals of a run are the motion of which robot."""
+"""Search for the signals of a run that are the motion of a robot."""
 
 import numpy as np
 import pytest
@@ -28,8 +28,8 @@ def test_the_papers_model_has_one_motion_with_exact_rates() -> None:
     assert motion.tool[-1] == pytest.approx((-2.949278739196, 1.254698768685, 2.347929043243), abs=1e-9)
 
 
-def test_a_controllers_plan_is_not_taken_for_the_motion() -> None:
-    """Computed torque feeds the commanded acceleration to rne; the arm's own comes from its dynamics."""
+def test_commanded_signals_of_a_controller_are_not_the_motion() -> None:
+    """Computed torque passes the commanded acceleration to rne; that of the arm comes from its dynamics."""
     diagram = ab.load_diagram("puma560_computed_torque")
     result = ab.simulate(diagram)
     (motion,) = motions(diagram, result)
@@ -38,7 +38,7 @@ def test_a_controllers_plan_is_not_taken_for_the_motion() -> None:
     assert motion.tau is not None and (motion.tau == result[f"{owner}/tau"]).all()
 
 
-def test_rates_that_no_block_gives_come_from_differences_and_are_told(puma560: Robot) -> None:
+def test_missing_rates_are_computed_from_differences_with_a_note(puma560: Robot) -> None:
     builder = DiagramBuilder("swing", settings=SHORT)
     q = builder.add("swing", SineWave(amplitude=(1.0, 0.5, 0.2, 0.1, 0.1, 0.1)))
     builder.add("hand", Fkine(robot=puma560), q)
@@ -48,7 +48,7 @@ def test_rates_that_no_block_gives_come_from_differences_and_are_told(puma560: R
     assert len(motion.notes) == 2 and "differences between samples" in motion.notes[0]
     # Central differences of a sine over 10 ms steps: error below h^2 / 6 inside, h / 2 at the ends.
     assert motion.qd[1:-1, 0] == pytest.approx(np.cos(result.time[1:-1]), abs=2e-5)
-    assert motion.tau is None  # gravity's torque alone does not move an arm
+    assert motion.tau is None  # the gravity torque alone is not the joint torque
     assert motion.poses.shape == (len(result.time), 8, 4, 4)
 
 
@@ -65,6 +65,6 @@ def test_two_arms_have_two_motions(puma560: Robot, kr180: Robot) -> None:
     assert all(motion.tau is not None for motion in found)
 
 
-def test_blocks_without_a_robot_have_none(puma560: Robot) -> None:
+def test_a_diagram_without_a_robot_has_no_motion(puma560: Robot) -> None:
     assert robot_of(Constant()) is None
     assert robot_of(Fkine(robot=puma560)) == puma560

@@ -51,7 +51,7 @@ def test_a_sine_has_its_peaks_and_root_mean_square() -> None:
     summary = summarise(one_joint(position=(-2.0, 1.5)), TIME, q, qd, qdd, 3.0 * q, tool_of(q))
     (joint,) = summary.joints
     w = 2 * math.pi / T
-    # The grid holds the extremes, so only rounding and the chord's sag (h^2 / 8 = 1e-7) remain.
+    # The grid contains the extremes, so the error is rounding and the sag of the chord (h^2 / 8 = 1e-7).
     assert (joint.position_min, joint.position_max) == pytest.approx((-1.0, 1.0))
     assert joint.position_margin == pytest.approx(0.5)
     assert joint.speed_peak == pytest.approx(w)
@@ -63,8 +63,8 @@ def test_a_sine_has_its_peaks_and_root_mean_square() -> None:
     assert summary.findings == ()
 
 
-def test_a_springs_work_is_given_and_taken_back_in_full() -> None:
-    """tau = k q over one period: every quarter moves k/2 in or out."""
+def test_positive_and_negative_work_of_a_spring_are_equal() -> None:
+    """tau = k q over one period: every quarter transfers k/2 in or out."""
     q, qd, qdd = sine()
     (joint,) = summarise(one_joint(), TIME, q, qd, qdd, 3.0 * q, tool_of(q)).joints
     assert joint.work_done == pytest.approx(2 * 1.5, rel=1e-5)
@@ -81,11 +81,11 @@ def test_the_root_mean_square_of_a_ramp_is_exact() -> None:
     assert root_mean_square(np.array([0.0]), np.array([-2.0])) == 2.0
 
 
-def test_the_tools_path_is_the_arc() -> None:
+def test_the_path_length_of_the_tool_is_the_arc_length() -> None:
     q = np.linspace(0.0, math.pi, len(TIME))[:, None]
     rate = np.full_like(q, math.pi / T)
     summary = summarise(one_joint(), TIME, q, rate, 0 * q, None, tool_of(q))
-    # 4000 chords of a half circle fall short by (pi / 4000)^2 / 24.
+    # 4000 chords of a half circle are shorter by (pi / 4000)^2 / 24.
     assert summary.tool_path_length == pytest.approx(2 * math.pi, rel=1e-7)
     assert summary.tool_speed_peak == pytest.approx(2 * math.pi / T, rel=1e-6)
     assert summary.tool_end == pytest.approx((-2.0, 0.0, 0.0), abs=1e-12)
@@ -93,7 +93,7 @@ def test_the_tools_path_is_the_arc() -> None:
     assert summary.joints[0].torque_rms is None
 
 
-def test_limits_are_found_where_the_line_crosses_them() -> None:
+def test_limit_violations_start_at_the_interpolated_crossing() -> None:
     time, q = np.array([0.0, 1.0, 2.0]), np.array([[0.0], [1.0], [3.0]])
     (finding,) = limit_findings(one_joint(position=(-1.0, 2.0)), time, q)
     assert finding.kind is LimitKind.POSITION
@@ -101,12 +101,12 @@ def test_limits_are_found_where_the_line_crosses_them() -> None:
     assert (finding.worst, finding.worst_time, finding.limit) == (3.0, 2.0, 2.0)
 
 
-def test_a_limit_that_is_just_reached_is_not_broken() -> None:
+def test_a_limit_that_is_reached_exactly_is_not_exceeded() -> None:
     time, q = np.array([0.0, 1.0]), np.array([[0.0], [2.0 * (1 + 1e-12)]])
     assert limit_findings(one_joint(position=(-1.0, 2.0)), time, q) == ()
 
 
-def test_warnings_tell_joint_time_and_value_in_peoples_units() -> None:
+def test_warnings_have_joint_time_and_value_in_display_units() -> None:
     robot = one_joint(position=(-math.pi / 2, math.pi / 2), speed=0.5, torque=10.0)
     time = np.array([0.0, 1.0, 2.0])
     q, qd, tau = np.array([[0.0], [0.0], [math.pi]]), np.full((3, 1), -1.0), np.array([[0.0], [-12.0], [0.0]])
@@ -121,15 +121,15 @@ def test_warnings_tell_joint_time_and_value_in_peoples_units() -> None:
     ]
 
 
-def test_a_sliding_joint_is_told_in_metres() -> None:
+def test_warnings_of_a_prismatic_joint_are_in_metres() -> None:
     joint = Prismatic(limits=JointLimits(position=(0.0, 1.0)))
     robot = Robot(name="slide", links=(Link(name="z", joint=joint, mass=1.0),))
     (finding,) = limit_findings(robot, np.array([0.0, 1.0]), np.array([[0.0], [1.25]]))
     assert "(0 … 1 m)" in finding.text and "1.25 m" in finding.text
 
 
-def test_more_rows_where_nothing_new_happens_change_no_average() -> None:
-    """Rows of a logged run stand at uneven times: a row on the line between two others says nothing new."""
+def test_additional_interpolated_rows_change_no_average() -> None:
+    """Rows of a logged run have uneven times: a row on the line between two others adds no information."""
     time = np.array([0.0, 1.0, 3.0, 3.5, 7.0])
     values = np.array([0.0, 2.0, -1.0, 4.0, 0.5])
     random = np.random.default_rng(7)

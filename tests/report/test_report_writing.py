@@ -1,4 +1,4 @@
-"""The report folder: complete, self-contained, escaped, and honest about what went wrong."""
+"""The report folder: complete, self-contained, escaped; incomplete runs and errors are marked."""
 
 import dataclasses
 import re
@@ -38,7 +38,7 @@ VOID = {"meta", "br", "img", "link", "rect", "path", "circle", "image"}
 
 
 class Outline(HTMLParser):
-    """What a page holds: tags, headings, table heads without scope, and whether every tag is closed."""
+    """The structure of a page: tags, headings, table heads without scope, and unclosed tags."""
 
     def __init__(self) -> None:
         super().__init__(convert_charrefs=True)
@@ -88,8 +88,8 @@ def paper(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_an_xy_graph_of_two_lengths_has_one_scale(tmp_path: Path) -> None:
-    """0.5 m beside 2 m: both in m, where 0.5 m alone would be 500 mm."""
+def test_both_axes_of_an_xy_graph_of_lengths_have_the_same_unit(tmp_path: Path) -> None:
+    """0.5 m and 2 m are both shown in m; 0.5 m alone would be shown as 500 mm."""
     arm = serial_chain([standard_dh("reach", a=0.5, d=2.0)])
     builder = ab.DiagramBuilder("reach")
     q = builder.add("q", Constant(value=(0.0,)))
@@ -113,7 +113,7 @@ def test_the_papers_report_is_complete(paper: Path) -> None:
     assert (paper / "report.html").stat().st_size < 3_000_000
 
 
-def test_the_page_says_what_the_paper_looks_at(paper: Path) -> None:
+def test_the_page_contains_the_results_of_the_paper(paper: Path) -> None:
     text = (paper / "report.html").read_text(encoding="utf-8")
     for piece in (
         "33.73",
@@ -137,7 +137,7 @@ def test_the_page_needs_no_network_and_no_script(paper: Path) -> None:
     assert not re.search(r"https?://(?!www\.w3\.org/2000/svg)", (paper / "report.html").read_text("utf-8"))
 
 
-def test_the_page_is_well_formed_and_can_be_read_aloud(paper: Path) -> None:
+def test_the_page_is_well_formed_and_accessible(paper: Path) -> None:
     parsed = outline(paper / "report.html")
     assert parsed.mistakes == [] and parsed.open == []
     headings = [tag for tag in parsed.tags if re.fullmatch("h[1-6]", tag)]
@@ -159,7 +159,7 @@ def test_the_same_run_gives_the_same_bytes(tmp_path: Path) -> None:
             assert path.read_bytes() == (tmp_path / "b" / path.relative_to(tmp_path / "a")).read_bytes()
 
 
-def test_names_from_users_are_text_and_nothing_else(tmp_path: Path) -> None:
+def test_user_defined_names_are_escaped(tmp_path: Path) -> None:
     diagram, result = small_run("<img src=x onerror=alert(1)>")
     files = write_report(tmp_path, diagram, result)
     parsed = outline(files.page)
@@ -168,7 +168,7 @@ def test_names_from_users_are_text_and_nothing_else(tmp_path: Path) -> None:
         assert "<img" not in path.read_text(encoding="utf-8")
 
 
-def test_only_what_is_asked_for_is_written(tmp_path: Path) -> None:
+def test_only_the_requested_formats_are_written(tmp_path: Path) -> None:
     diagram, result = small_run()
     files = write_report(tmp_path, diagram, result, formats=("svg",), data=("npz",))
     assert {path.suffix for path in files.figures} == {".svg"}
@@ -186,7 +186,7 @@ def test_unknown_formats_are_refused_before_anything_is_written(tmp_path: Path) 
     assert not (tmp_path / "out").exists()
 
 
-def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+def test_the_error_for_an_unwritable_folder_names_it(tmp_path: Path) -> None:
     diagram, result = small_run()
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(FormatError, match="the report cannot be written") as caught:
@@ -207,7 +207,7 @@ def test_a_run_that_stopped_early_is_marked(tmp_path: Path) -> None:
     assert "Incomplete: the run stopped at t = 1 s" in text and "Stopped by Ctrl-C." in text
 
 
-def test_a_run_of_one_instant_still_has_a_report(tmp_path: Path) -> None:
+def test_a_run_of_one_instant_has_a_report(tmp_path: Path) -> None:
     diagram, result = small_run()
     first = dataclasses.replace(
         result, time=result.time[:1], signals=result.signals[:, :1], states=result.states[:1]
@@ -216,7 +216,7 @@ def test_a_run_of_one_instant_still_has_a_report(tmp_path: Path) -> None:
     assert files.figures == () and files.page.exists()
 
 
-def test_a_broken_limit_stands_out_in_words(tmp_path: Path, puma560: Robot) -> None:
+def test_an_exceeded_limit_is_described_and_highlighted(tmp_path: Path, puma560: Robot) -> None:
     tight = puma560.with_link(
         "link1", joint=dataclasses.replace(puma560.links[0].joint, limits=JointLimits(position=(-0.1, 0.2)))
     )
@@ -233,7 +233,7 @@ def test_a_broken_limit_stands_out_in_words(tmp_path: Path, puma560: Robot) -> N
     assert 'class="bad"' in text and "over limit from" in text
 
 
-def test_sinks_with_almost_the_same_name_have_a_file_each(tmp_path: Path) -> None:
+def test_sinks_with_similar_names_have_separate_files(tmp_path: Path) -> None:
     builder = DiagramBuilder("twins", settings=SimulationOptions(stop_time=1.0, sample_time=0.1))
     wave = builder.add("wave", SineWave())
     for name in ("view 1", "view-1", "view_1"):
@@ -248,7 +248,7 @@ def test_sinks_with_almost_the_same_name_have_a_file_each(tmp_path: Path) -> Non
     ("name", "expected"),
     [("Joint angles", "joint-angles"), ("../etc", "etc"), ("機械", "unnamed"), ("", "unnamed")],
 )
-def test_files_of_figures_have_harmless_names(name: str, expected: str) -> None:
+def test_file_names_of_figures_are_sanitised(name: str, expected: str) -> None:
     assert file_name(name) == expected
 
 
@@ -261,7 +261,7 @@ def test_files_of_figures_have_harmless_names(name: str, expected: str) -> None:
         (1.0, "rad/s2", 57.3, "deg/s²"),
     ],
 )
-def test_quantities_are_shown_in_peoples_units(
+def test_quantities_are_shown_in_display_units(
     value: float, unit: str, shown: float, shown_unit: str
 ) -> None:
     values, found = for_people(np.array([value]), unit)
@@ -269,7 +269,7 @@ def test_quantities_are_shown_in_peoples_units(
 
 
 def nested_run() -> tuple[ab.Diagram, ab.SimulationResult]:
-    """Two axes that are the same inside, and one that differs."""
+    """Two subsystems with equal diagrams, and one with a different diagram."""
     filtered = DiagramBuilder("axis")
     entering = filtered.add("u", Inport(port=1))
     filtered.add("y", Outport(port=1), filtered.add("first-order <lag>", FirstOrderLag(), entering))
@@ -286,7 +286,7 @@ def nested_run() -> tuple[ab.Diagram, ab.SimulationResult]:
     return diagram, ab.simulate(diagram)
 
 
-def test_every_sheet_is_in_the_report(tmp_path: Path) -> None:
+def test_every_different_sheet_is_in_the_report(tmp_path: Path) -> None:
     write_report(tmp_path, *nested_run())
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert re.findall(r"<summary>(.*?)</summary>", text) == ["axis 1", "axis 3"]
@@ -295,7 +295,7 @@ def test_every_sheet_is_in_the_report(tmp_path: Path) -> None:
     assert not outline(tmp_path / "report.html").mistakes
 
 
-def test_a_report_of_some_rows_of_a_log_says_so(tmp_path: Path) -> None:
+def test_a_report_of_a_thinned_log_states_the_number_of_shown_rows(tmp_path: Path) -> None:
     builder = DiagramBuilder("long", settings=SimulationOptions(stop_time=40.0, sample_time=1e-3))
     builder.add("scope", Scope(), builder.add("wave", SineWave()))
     diagram = builder.build()

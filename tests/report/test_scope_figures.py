@@ -1,4 +1,4 @@
-"""Which signals of a Scope share a panel, and in which unit they are shown."""
+"""Panels of a Scope: grouping of signals by unit, and display units."""
 
 import armblocks as ab
 from armblocks.blocks import Clock, Constant, Integrator, Mux, Saturation, Scope, SineWave, Step
@@ -27,7 +27,7 @@ def test_scalars_of_one_unit_share_a_panel_and_its_prefix() -> None:
     assert headings == ["time/y, late/y, s", "vector/y", "number/y"]
 
 
-def test_a_figure_is_as_wide_as_it_is_asked_to_be() -> None:
+def test_a_figure_has_the_requested_width() -> None:
     model = diagram()
     (figure,) = view_figures(model, ab.simulate(model, stop_time=1.0), 500.0)
     assert figure.picture.width == 500.0

@@ -1,4 +1,4 @@
-"""To File blocks: which files, which rows, in which folder and never elsewhere; spectra in reports."""
+"""To File blocks: file formats, rows, confinement to the folder; spectra in reports."""
 
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ def diagram(**files: ToFile) -> Diagram:
 
 @pytest.mark.parametrize("end", ["csv", "npz", "mat", "parquet"])
 @pytest.mark.parametrize("settings", [{"solver": "rk4", "step": 0.01}, {"solver": "rk45"}])
-def test_each_format_holds_the_recorded_signal_and_is_read_back(
+def test_each_format_contains_the_recorded_signal_and_can_be_read(
     tmp_path: Path, end: str, settings: dict[str, Any]
 ) -> None:
     model = diagram(sink=ToFile(file=f"deep/er/kept.{end}", variable="wave"))
@@ -37,7 +37,7 @@ def test_each_format_holds_the_recorded_signal_and_is_read_back(
     assert table.names == ("wave[0]", "wave[1]")
 
 
-def test_every_third_row_and_of_these_the_last_two(tmp_path: Path) -> None:
+def test_decimation_3_and_a_limit_of_2_rows_write_the_last_two_of_every_third_row(tmp_path: Path) -> None:
     model = diagram(sink=ToFile(decimation=3, limit=2))
     result = ab.simulate(model)
     (path,) = ab.write_files(tmp_path, model, result)
@@ -46,20 +46,20 @@ def test_every_third_row_and_of_these_the_last_two(tmp_path: Path) -> None:
     assert np.array_equal(kept[:, 1:], result["wave/y"][[6, 9]])
 
 
-def test_a_report_has_the_files_and_names_them(tmp_path: Path) -> None:
+def test_a_report_contains_and_lists_the_files(tmp_path: Path) -> None:
     model = diagram(sink=ToFile(file="kept.npz"))
     files = ab.write_report(tmp_path, model, ab.simulate(model), formats=())
     assert tmp_path / "kept.npz" in files.data
     assert "kept.npz" in files.page.read_text()
 
 
-def test_a_run_alone_writes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_without_a_report_writes_no_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     ab.simulate(diagram(sink=ToFile()))
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_file_within_a_subsystem_is_written_too(tmp_path: Path) -> None:
+def test_to_file_blocks_in_subsystems_write_their_files(tmp_path: Path) -> None:
     inner = DiagramBuilder("inner")
     inner.add("sink", ToFile(file="inside.csv"), inner.add("in", Inport()))
     builder = DiagramBuilder("outer", settings=ab.SimulationOptions(stop_time=1.0))
@@ -85,14 +85,14 @@ def test_a_file_within_a_subsystem_is_written_too(tmp_path: Path) -> None:
         "~.\n.csv",
     ],
 )
-def test_paths_that_lead_out_are_refused_by_the_block(file: str) -> None:
+def test_paths_outside_the_folder_are_refused_by_the_block(file: str) -> None:
     with pytest.raises(
         InputError, match=r"ToFile\.file: the file is '[^']*'\. Allowed: a path inside a folder"
     ):
         ToFile(file=file)
 
 
-def test_a_link_that_leads_out_is_refused(tmp_path: Path) -> None:
+def test_a_symbolic_link_out_of_the_folder_is_refused(tmp_path: Path) -> None:
     folder, outside = tmp_path / "folder", tmp_path / "outside"
     folder.mkdir()
     outside.mkdir()
@@ -103,14 +103,14 @@ def test_a_link_that_leads_out_is_refused(tmp_path: Path) -> None:
     assert list(outside.iterdir()) == []
 
 
-def test_a_folder_that_cannot_be_made_is_said(tmp_path: Path) -> None:
+def test_the_error_for_a_folder_that_cannot_be_created_names_it(tmp_path: Path) -> None:
     (tmp_path / "taken").write_text("a file")
     model = diagram(sink=ToFile(file="taken/kept.csv"))
     with pytest.raises(FormatError, match=r"the folder of 'taken/kept\.csv' cannot be made"):
         ab.write_files(tmp_path, model, ab.simulate(model))
 
 
-def test_one_file_for_two_blocks_or_one_of_the_report_is_refused(tmp_path: Path) -> None:
+def test_a_file_name_used_twice_is_refused(tmp_path: Path) -> None:
     model = diagram(one=ToFile(), two=ToFile(file="Simout.csv"))
     result = ab.simulate(model)
     with pytest.raises(DiagramError, match=r"'one' and 'two' write the same file 'Simout\.csv'"):
@@ -131,7 +131,7 @@ def spectra(spectrum: Spectrum) -> Diagram:
 @pytest.mark.parametrize("quantity", ["amplitude", "power density"])
 @pytest.mark.parametrize("decibels", [True, False])
 @pytest.mark.parametrize("logarithmic", [True, False])
-def test_a_spectrum_has_a_figure_in_hertz(quantity: str, decibels: bool, logarithmic: bool) -> None:
+def test_the_figure_of_a_spectrum_is_in_hertz(quantity: str, decibels: bool, logarithmic: bool) -> None:
     model = spectra(Spectrum(quantity=quantity, decibels=decibels, logarithmic=logarithmic))
     (figure,) = view_figures(model, ab.simulate(model), 600.0)
     texts = [mark.text for mark in text_marks(figure.picture)]
@@ -141,7 +141,7 @@ def test_a_spectrum_has_a_figure_in_hertz(quantity: str, decibels: bool, logarit
     assert {"wave/y[0]", "wave/y[1]"} <= set(texts)
 
 
-def test_a_run_that_is_too_short_says_so_in_place_of_its_spectrum(tmp_path: Path) -> None:
+def test_a_too_short_run_shows_a_message_instead_of_its_spectrum(tmp_path: Path) -> None:
     model = spectra(Spectrum(averages=200))
     result = ab.simulate(model)
     (figure,) = view_figures(model, result)
