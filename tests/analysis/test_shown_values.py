@@ -65,8 +65,7 @@ def test_poles_at_zero_are_shown_as_zero_in_any_states_and_units(integrators: in
 
 @pytest.mark.parametrize("small", [1e-3, 1e-6, 1e-12])
 def test_small_poles_of_a_slow_subsystem_are_shown_beside_a_fast_subsystem(small: float) -> None:
-    """1e-12 rad/s is a pole of the slow subsystem, not a rounding error, however fast the other subsystem
-    is."""
+    """1e-12 rad/s is a pole of the slow subsystem and not a rounding error, for any fast subsystem."""
     for seed in SEEDS:
         random = np.random.default_rng(seed)
         slow = small * (random.normal(size=(3, 3)) - 4.0 * np.eye(3))

@@ -153,8 +153,7 @@ def test_an_unsolvable_constraint_with_an_unused_output_is_refused() -> None:
 
 
 def pendulum(constraint: str) -> ab.Diagram:
-    """A point mass on a rod of length 1 that starts horizontal: x'' = -L x, y'' = -L y - g, with a constraint
-    for L."""
+    """A point mass on a rod of length 1 that starts horizontal: x'' = -L x, y'' = -L y - g."""
     builder = ab.DiagramBuilder("rod")
     force = builder.add("L", AlgebraicConstraint())
     x = builder.add("x", SecondOrderIntegrator(initial=1.0))
@@ -168,8 +167,7 @@ def pendulum(constraint: str) -> ab.Diagram:
 
 
 def test_a_rod_is_refused_at_index_3_and_2_and_simulated_at_index_1() -> None:
-    """The constraint on the length has index 3, on the speed along the rod index 2; the one on the
-    acceleration contains L."""
+    """Constraints on the length have index 3, on the speed along the rod index 2, on the acceleration 1."""
     for constraint in ("u1^2 + u2^2 - 1", "u1*u3 + u2*u4"):
         with pytest.raises(
             AlgebraicLoopError,

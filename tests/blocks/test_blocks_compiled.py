@@ -44,8 +44,7 @@ from armblocks.integration.system import compile_system
 
 @pytest.fixture(scope="module")
 def diagram() -> Diagram:
-    """Blocks of each family, fed by waves that cross zero and pass through all table segments and singular
-    poses."""
+    """Blocks of each family with inputs that cross zero and pass table segments and singular poses."""
     random = np.random.default_rng(31)
     b = DiagramBuilder("stateless blocks")
     u = b.add("u", SineWave(amplitude=[2.0, 1.5, 1.0], frequency=[1.0, 3.0, 2.0], phase=[0.1, 1.0, 2.0]))

@@ -1,5 +1,4 @@
-"""Blocks with external reset: sampled blocks compared with recurrences, continuous blocks with closed
-forms."""
+"""Blocks with external reset, compared with recurrences (sampled) and closed forms (continuous)."""
 
 from __future__ import annotations
 
@@ -180,8 +179,7 @@ def test_a_delay_of_vectors_is_reset_to_a_scalar() -> None:
 
 
 def test_a_loop_through_the_state_port_is_not_algebraic() -> None:
-    """A sum that is reset to half of its value. The state port has the value before the reset; y depends on
-    it."""
+    """A sum that is reset to half of its value, which the state port gives; y depends on the reset itself."""
 
     def loop(port: str) -> Diagram:
         builder = DiagramBuilder("d")
@@ -222,8 +220,7 @@ def integral(block: ResettableIntegrator, sources: Mapping[str, Block]) -> Diagr
 @SOLVERS
 @pytest.mark.parametrize("kind", ["level", "level hold"])
 def test_a_level_reset_holds_the_present_initial_value(kind: str, solver: dict[str, Any]) -> None:
-    """y = sin 3t during each pulse (0.5 s to 1.25 s, 2.5 s to 3.25 s …), then y rises from that value with
-    rate 1."""
+    """y = sin 3t in each pulse (0.5 s to 1.25 s, 2.5 s to 3.25 s …); afterwards y rises with rate 1."""
     pulses = PulseGenerator(period=2.0, width=37.5, delay=0.5)
     block = ResettableIntegrator(external_reset=kind, initial_condition_source="external")
     sources = {"u": Constant(value=1.0), "reset": pulses, "initial": SineWave(frequency=3.0)}
@@ -239,8 +236,7 @@ def test_a_level_reset_holds_the_present_initial_value(kind: str, solver: dict[s
 
 @SOLVERS
 def test_level_hold_keeps_the_initial_value_before_the_trigger_falls(solver: dict[str, Any]) -> None:
-    """When the initial value jumps as the trigger falls to 0, level takes the new value, level hold the
-    old."""
+    """Where the initial value jumps as the trigger falls, level takes the new value, level hold the old."""
     pulse = PulseGenerator(period=10.0, width=10.0, amplitude=2.0)
     for kind, kept in (("level", 0.0), ("level hold", 2.0)):
         block = ResettableIntegrator(external_reset=kind, initial_condition_source="external")

@@ -1,5 +1,4 @@
-"""Playback of tables: values and integrals compared with NumPy, with fixed and adaptive steps, short and long
-tables."""
+"""Playback of short and long tables: values and integrals compared with NumPy, fixed and adaptive steps."""
 
 from __future__ import annotations
 

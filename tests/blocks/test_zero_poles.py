@@ -65,8 +65,7 @@ def test_the_realised_chain_has_the_frequency_response_of_the_roots(
 
 
 def test_thirty_close_poles_are_realised_accurately() -> None:
-    """Thirty poles in a narrow band: the coefficients of their polynomial are too inaccurate to recover
-    them."""
+    """Thirty poles in a narrow band, which the rounded coefficients of their polynomial cannot represent."""
     z, p, k = signal.butter(15, [100.0, 110.0], "bandpass", analog=True, output="zpk")
     points = 1j * np.linspace(90.0, 120.0, 31)
     expected = np.array([k * np.prod(s - z) / np.prod(s - p) for s in points])

@@ -32,7 +32,7 @@ def invoke(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Res
 
 @pytest.fixture
 def refused(invoke: Callable[..., Result]) -> Callable[..., str]:
-    """Return a function that calls the command line with bad input, makes the common checks, and returns the
+    """Return a function that calls the command line with bad input, checks the exit, and returns the
     message."""
 
     def call(*arguments: str) -> str:
@@ -47,8 +47,7 @@ def refused(invoke: Callable[..., Result]) -> Callable[..., str]:
 
 @pytest.fixture
 def spawn(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
-    """Return a function that calls the command line in a separate process, from an empty folder, as a
-    terminal does."""
+    """Return a function that calls the command line in a separate process, from an empty folder."""
 
     def call(*arguments: str) -> subprocess.CompletedProcess[str]:
         return subprocess.run(
@@ -67,8 +66,7 @@ def spawn(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
 
 @pytest.fixture
 def write_diagram(tmp_path: Path) -> Callable[..., str]:
-    """Return a function that writes a diagram file from ``{"name": ("Type", {parameters})}`` and connections,
-    and returns its path."""
+    """Return a function that writes a diagram of ``{"name": ("Type", {parameters})}`` and connections."""
 
     def write(
         blocks: Mapping[str, tuple[str, Mapping[str, object]]], *connections: str, **settings: object

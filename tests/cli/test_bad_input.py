@@ -1,5 +1,4 @@
-"""Bad input to the command line: a message that states the error, its place, the allowed values and a fix;
-exit code 2."""
+"""Bad input to the command line: messages with error, place, allowed values and a fix; exit code 2."""
 
 import os
 import signal

@@ -1,5 +1,4 @@
-"""Hand-written diagram files for ``armblocks run``: bad files are refused, good files agree with closed
-forms."""
+"""Hand-written files for ``armblocks run``: bad files are refused, good files agree with closed forms."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""Kernels: results equal to the interpreter's for any number of samples, memory layout and number of
-threads."""
+"""Kernels: results equal to the interpreter's for any number of samples, layout and number of threads."""
 
 import threading
 

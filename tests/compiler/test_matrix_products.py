@@ -35,8 +35,7 @@ def traced(m: int, n: int) -> TracedFunction:
 
 
 def chained(A: np.ndarray, x: np.ndarray, start: np.ndarray | None) -> np.ndarray:
-    """``start + A x`` term by term; without a start value the sum begins with -0, which leaves the first
-    product."""
+    """``start + A x`` term by term; without ``start`` the sum begins with -0, which changes no product."""
     total = np.full(len(A), -0.0) if start is None else start
     for j, factor in enumerate(x):
         total = multiply_add(A[:, j].copy(), np.full(len(A), factor), total)

@@ -32,8 +32,7 @@ SI_UNIT = re.compile(
 
 
 def changed(rule: Parameter, value: object) -> np.ndarray:
-    """Return a slightly changed value of a tunable parameter within its bounds; infinite limits stay
-    infinite."""
+    """Return a slightly changed value within the bounds of a tunable parameter; infinity is not changed."""
     given = np.asarray(value, dtype=np.float64)
     finite = np.where(np.isfinite(given), given, 0.0)
     return np.where(

@@ -35,8 +35,7 @@ from armblocks.diagram import (
 
 
 def loop(names: Mapping[str, str] | None = None, *, inner: str = "law", **blocks: Block) -> Diagram:
-    """A controlled integrator with the controller in a subsystem; ``names`` and ``blocks`` replace names and
-    blocks."""
+    """A controlled integrator with a subsystem; ``names`` and ``blocks`` replace names and blocks."""
     called = {name: name for name in ("wanted", "error", "controller", "plant", "scope")} | dict(names or {})
     builder = DiagramBuilder("loop")
     wanted = builder.add(called["wanted"], blocks.get("wanted", Step(time=0.5)))

@@ -44,8 +44,7 @@ from armblocks.errors import AlgebraicLoopError, DiagramError, InputError, Unkno
 
 
 def loop_in_levels() -> Diagram:
-    """A controlled plant: controller and plant are subsystems, and the controller contains another
-    subsystem."""
+    """A control loop: controller and plant are subsystems, and the controller contains another one."""
     builder = DiagramBuilder("loop")
     wanted = builder.add("wanted", Step(time=0.5, final=2.0))
     with builder.subsystem("controller", wanted) as controller:

@@ -1,5 +1,4 @@
-"""Algebraic loops: linear loops are solved symbolically, nonlinear loops become implicit equations, singular
-loops are refused."""
+"""Algebraic loops: symbolic solution of linear loops, implicit equations, and refused singular loops."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""Values of parameters: checks when a block is constructed, and conversion to values that compare by
-content."""
+"""Values of parameters: checks in the constructor of a block, and conversion to comparable values."""
 
 from __future__ import annotations
 

@@ -14,8 +14,7 @@ from robots_for_tests import evaluate, random_states
 
 
 def scaled(actual: np.ndarray, expected: np.ndarray, tolerance: float) -> None:
-    """Check equality within ``tolerance`` relative to the largest entry, because single entries may
-    cancel."""
+    """Check equality within ``tolerance`` of the largest entry, because single entries may cancel."""
     size = max(1.0, float(np.abs(expected).max(initial=0.0)))
     assert_allclose(actual, expected, rtol=0, atol=tolerance * size)
 

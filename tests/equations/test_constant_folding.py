@@ -1,5 +1,4 @@
-"""Elementary functions of constants are never evaluated by the C library, whatever the origin of the
-constant."""
+"""Elementary functions of constants of any origin are never evaluated by the C library."""
 
 import math
 from collections.abc import Callable
@@ -106,8 +105,7 @@ def test_functions_of_symbols_are_not_changed() -> None:
 
 
 def test_linear_solutions_are_kept_when_constants_are_folded() -> None:
-    """Calls of the linear solver stay calls, even if their arguments or those of other functions are
-    constants."""
+    """Calls of the linear solver stay calls, even if their arguments or other arguments are constants."""
     A, b, u = SX.sym("A", 4), SX.sym("b", 2), SX.sym("u")
     x = linear_solution(casadi.reshape(A, 2, 2), b)
     results = casadi.vertcat(casadi.sin(x[0]) * u, x, casadi.cos(u), casadi.vec(casadi.jacobian(x, b)))

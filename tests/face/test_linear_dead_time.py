@@ -49,8 +49,7 @@ def test_the_frequency_response_with_an_opened_signal_is_that_of_the_open_loop()
 
 
 def test_delays_in_series_and_their_derivative() -> None:
-    """A delay in series with the sum of another delay and a direct path; after a Derivative the response is
-    multiplied by s."""
+    """A delay in series with a delay that has a parallel direct path; a Derivative multiplies by s."""
     builder = ab.DiagramBuilder("row")
     u = builder.add("u", Constant())
     lag = builder.add("lag", FirstOrderLag(), u)

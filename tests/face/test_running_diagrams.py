@@ -84,8 +84,7 @@ def test_every_example_runs_and_has_a_notebook_representation(name: str) -> None
 
 
 def test_a_trajectory_beyond_the_joint_limits_raises_a_warning(paper: ab.Diagram) -> None:
-    """The limit of joint 2 is 90 deg, and 2 rad = 114.6 deg exceeds it; the quintic gives the time at 90
-    deg."""
+    """Joint 2 moves to 2 rad = 114.6 deg; the quintic gives the time at which it passes its limit, 90 deg."""
     with pytest.warns(LimitWarning) as caught:
         ab.simulate(paper, parameters={"jtraj.qf": (3.14, 2.0, 1.57, 0.0)})
     (text,) = (str(warning.message) for warning in caught)

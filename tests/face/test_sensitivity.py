@@ -162,8 +162,7 @@ def inside(*, states: bool = True) -> ab.Diagram:
 
 
 def pushed() -> ab.Diagram:
-    """Backlash that is enabled and reset outside its dead band, followed by a block with an event at the same
-    time."""
+    """Backlash that is enabled and reset outside its dead band, before a block with an event at that time."""
     builder = ab.DiagramBuilder("pushed")
     wave = builder.add("wave", SineWave(frequency=3.0, amplitude=2.0, phase=0.3))
     control = builder.add("control", SineWave(frequency=2.1, bias=0.2, phase=-0.6))

@@ -1,5 +1,4 @@
-"""Native linear equations of a stiff step compared with NumPy: sparse elimination and dense elimination with
-pivoting."""
+"""Native linear equations of a stiff step compared with NumPy: sparse, and dense with pivoting."""
 
 from __future__ import annotations
 
@@ -85,8 +84,7 @@ def test_both_eliminations_agree_with_numpy(n: int, filled: float) -> None:
 @pytest.mark.parametrize("n", [2, 7, 40])
 @pytest.mark.parametrize("spread", [0.0, 3.0])
 def test_the_rate_bound_is_above_every_eigenvalue_and_near_the_largest(n: int, spread: float) -> None:
-    """This also holds for units of states that differ by many powers of ten; eigenvalues do not depend on
-    units."""
+    """Eigenvalues do not depend on the units of the states, which differ here by many powers of ten."""
     random = np.random.default_rng(n)
     for _ in range(10):
         scales = 10.0 ** random.uniform(-spread, spread, n)

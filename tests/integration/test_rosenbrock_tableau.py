@@ -59,8 +59,7 @@ def test_methods_are_l_stable(tableau: RosenbrockTableau) -> None:
 
 @every_method
 def test_stability_function_has_the_order_of_the_exponential(tableau: RosenbrockTableau) -> None:
-    """Independent of the native loop: the error of one step of a linear decay is proportional to h^(order +
-    1)."""
+    """Without the native loop: the error of one step of a linear decay is proportional to h^(order+1)."""
     errors = [abs(stability(tableau, -h) - np.exp(-h)) for h in (0.2, 0.1)]
     assert np.log2(errors[0] / errors[1]) > tableau.order + 0.7
 

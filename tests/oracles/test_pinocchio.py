@@ -11,8 +11,7 @@ from robots_for_tests import LAW_ROBOTS, evaluate, random_states
 
 
 def pinocchio_model(robot: Robot) -> tuple[pin.Model, pin.Data, int, np.ndarray]:
-    """Return the model with rotor inertias as armature, its data, the frame of the tool, and the index of
-    each joint in Pinocchio's vectors."""
+    """Return model, data, tool frame, and the index of each joint; rotor inertias are the armature."""
     model = pin.Model()
     world = pin.SE3(robot.base.matrix)
     links: dict[str | None, tuple[int, pin.SE3]] = {None: (0, world)}

@@ -1,8 +1,9 @@
-"""Clocks, events and implicit equations in plain Python: the second opinion on the native loop.
+"""Clocks, events and implicit equations in plain Python: an independent reference for the native loop.
 
-Written from the description of the semantics, sharing nothing with the code under test: ticks are listed
-beforehand in rational arithmetic, flows come from SciPy's DOP853 at tight tolerances, zeros from a fine grid
-and Brent's method, implicit equations from Brent's method too, functions from CasADi's interpreter.
+The reference follows the description of the semantics and shares no code with the program under test. Ticks
+are listed in advance in rational arithmetic. SciPy's DOP853 with tight tolerances integrates the flow. Zero
+crossings are located on a fine grid and by Brent's method, which also solves implicit equations. CasADi's
+interpreter evaluates the functions.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ NAMES = ("derivative", "signals", "residual", "update", "guards", "reset")
 
 
 class Evaluated:
-    """A function of CasADi whose arguments and results stay in place: CasADi converts arrays slowly."""
+    """A CasADi function with fixed buffers for arguments and results: CasADi converts arrays slowly."""
 
     def __init__(self, function: ca.Function) -> None:
         assert all(function.sparsity_in(k).is_dense() for k in range(function.n_in()))
@@ -42,7 +43,7 @@ class Evaluated:
 
 
 class Reference:
-    """One run of a system from 0; ``signals`` at the samples, ``events`` so far."""
+    """One run of a system from t = 0; ``run`` returns the signals, ``events`` counts the events."""
 
     def __init__(self, system: HybridSystem) -> None:
         self.system = system
@@ -63,7 +64,7 @@ class Reference:
         return self.functions[name](t, x, self.z, w, self.p, *more)
 
     def solve(self, t: float, x: np.ndarray) -> np.ndarray:
-        """The zero of one unknown, between -10 and 10."""
+        """Solve the implicit equation of one unknown between -10 and 10."""
 
         def residual(w: float) -> float:
             return float(self.functions["residual"](t, x, self.z, w, self.p)[0][0])
@@ -71,7 +72,7 @@ class Reference:
         return np.array([brentq(residual, -10.0, 10.0, xtol=1e-14)])
 
     def ticks(self, stop: float) -> list[tuple[float, np.ndarray]]:
-        """All instants with ticks, and which clocks tick there."""
+        """Return all times with ticks, with marks of the clocks that tick."""
         marks: dict[Fraction, np.ndarray] = {}
         for k, clock in enumerate(self.system.clocks):
             period, offset = Fraction(repr(clock.period)), Fraction(repr(clock.offset))
@@ -86,8 +87,8 @@ class Reference:
         now, wanted = np.sign(g), np.array(self.system.guard_directions)
         return np.where((now * self.signs < 0) & (now * wanted >= 0), now, 0.0)
 
-    def settle(self) -> None:
-        """Events at one instant until there are none."""
+    def process_events(self) -> None:
+        """Process the events at the present time until no guard fires."""
         for _ in range(1000):
             g = self.call("guards", self.t, self.x)[0]
             e = self.fired(g)
@@ -101,7 +102,7 @@ class Reference:
         raise AssertionError("events without end")
 
     def flow(self, end: float, samples: np.ndarray, rows: list[np.ndarray]) -> None:
-        """To ``end``, stopping at every event on the way."""
+        """Integrate until ``end`` and stop at every event."""
         while self.t < end:
             start, values = self.t, lambda t, x=self.x: x
             if self.x.size:
@@ -123,18 +124,18 @@ class Reference:
                 self.recorded = instant
             self.t, self.x = reached, np.asarray(values(reached))
             if hit is not None:
-                self.settle()
+                self.process_events()
                 self.record_here(samples, rows)
 
     def record_here(self, samples: np.ndarray, rows: list[np.ndarray]) -> None:
-        """The sample at the instant reached, if there is one that is not recorded yet."""
+        """Record the sample at the present time, if there is one that is not recorded yet."""
         for sample in samples[np.isclose(samples, self.t, rtol=1e-14, atol=0)]:
             if sample > self.recorded:
                 rows.append(self.call("signals", sample, self.x)[0])
                 self.recorded = sample
 
     def first_zero(self, start: float, end: float, values: object) -> float | None:
-        """The far side of the first crossing, or ``None``; sides are noted on the way."""
+        """Return a time just after the first crossing, or ``None``; update the signs of the guards."""
         if not self.signs.size:
             return None
         before = start
@@ -158,7 +159,7 @@ class Reference:
         return None
 
     def run(self, samples: np.ndarray) -> np.ndarray:
-        """Signals at the samples, ``(ny, N)``."""
+        """Return the signals at the samples, ``(ny, N)``."""
         rows: list[np.ndarray] = []
         self.recorded = -1.0
         stop = float(samples[-1])
@@ -170,6 +171,6 @@ class Reference:
             self.flow(instant, samples, rows)
             if marks.any():
                 self.z = self.call("update", self.t, self.x, marks)[0]
-            self.settle()
+            self.process_events()
             self.record_here(samples, rows)
         return np.array(rows).T

@@ -1,4 +1,4 @@
-"""Small hybrid systems written directly as equations, with answers that are known in closed form."""
+"""Small hybrid systems written directly as equations, with solutions in closed form."""
 
 from __future__ import annotations
 
@@ -43,9 +43,9 @@ def hybrid(
     guard: Equation = lambda t, x, z, w, p: column(),
     reset: Callable[..., tuple[SX, SX]] = lambda t, x, z, w, p, e: (x, z),
 ) -> HybridSystem:
-    """All ends flat; ``guards`` are pairs of a block's name and a direction.
+    """Build a system; inputs and outputs are flat, and ``guards`` are pairs of a block name and a direction.
 
-    ``reset`` is asked only where some guard fired: these systems have no modes to settle.
+    ``reset`` is evaluated only if a guard fired: these systems have no modes.
     """
     sizes = {
         "x": len(states),
@@ -66,7 +66,7 @@ def hybrid(
         return ca.densify(ca.jacobian(residual(t, x, z, w, p), w)) if algebraic else SX(0, 0)
 
     def reset_of_events(t: SX, x: SX, z: SX, w: SX, p: SX, e: SX) -> tuple[SX, SX]:
-        """A reset without events, as at the start, leaves everything as it is."""
+        """Return the reset, or the unchanged variables if no guard fired, as at the start."""
         fired = ca.sum1(ca.fabs(e)) > 0
         return tuple(ca.if_else(fired, new, old) for new, old in zip(reset(t, x, z, w, p, e), (x, z)))  # pyright: ignore
 
@@ -110,7 +110,7 @@ def hybrid(
 
 
 def bouncing_ball(restitution: float = 0.7, height: float = 1.0, speed: float = 0.0) -> HybridSystem:
-    """Counts its bounces and keeps the time of the last one. The code is the same for every restitution."""
+    """A ball that counts its bounces and keeps the time of the last one; the restitution is a parameter."""
     return hybrid(
         "bouncing_ball",
         states=("ball/h", "ball/v"),
@@ -129,7 +129,7 @@ def bouncing_ball(restitution: float = 0.7, height: float = 1.0, speed: float = 
 
 
 def sampled_loop(period: float = 0.25) -> HybridSystem:
-    """``x' = -u`` with ``u`` the state held since the last tick: ``x`` goes to ``x (1 - T)`` in a period."""
+    """``x' = -u``, where ``u`` is ``x`` at the last tick: in one period ``x`` changes to ``x (1 - T)``."""
     return hybrid(
         "sampled_loop",
         states=("plant/x",),
@@ -145,7 +145,7 @@ def sampled_loop(period: float = 0.25) -> HybridSystem:
 
 
 def tick_recorder(clocks: Sequence[tuple[float, float]]) -> HybridSystem:
-    """No states: each clock keeps its count of ticks and the time of the last one, all count coincidences."""
+    """A system without states that records the ticks and last time of each clock, and common ticks."""
     n = len(clocks)
     names = [f"clock{k}/{what}" for k in range(n) for what in ("count", "time")] + ["all/count"]
 
@@ -184,7 +184,7 @@ def relay_oscillator(width: float = 0.5) -> HybridSystem:
 
 
 def stick_slip(rate: float = 2.0, static: float = 3.0, sliding: float = 2.0) -> HybridSystem:
-    """A unit mass at rest under a force ``rate t``: breaks away at ``static / rate``, then slides."""
+    """A unit mass at rest under a force ``rate t`` that breaks away at ``static / rate`` and then slides."""
     return hybrid(
         "stick_slip",
         states=("mass/s", "mass/v"),
@@ -201,7 +201,7 @@ def stick_slip(rate: float = 2.0, static: float = 3.0, sliding: float = 2.0) -> 
 
 
 def loop_of_cosine() -> HybridSystem:
-    """``w = cos(w) + x`` with ``x' = -w``: implicit at every evaluation."""
+    """``w = cos(w) + x`` with ``x' = -w``: every evaluation solves the implicit equation."""
     return hybrid(
         "cosine_loop",
         states=("block/x",),

@@ -1,7 +1,8 @@
-"""Runge-Kutta and Rosenbrock integrators in plain Python and NumPy: the second opinion on the native ones.
+"""Runge-Kutta and Rosenbrock integrators in plain Python and NumPy: an independent reference for the native
+ones.
 
-Written from the description in Hairer, Norsett, Wanner I, II.4 to II.6, and II, IV.7, sharing nothing with
-the code under test but the tables.
+Written from the description in Hairer, Norsett, Wanner I, II.4 to II.6, and II, IV.7. Only the tableaux are
+shared with the code under test.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ Field = Callable[[float, np.ndarray], np.ndarray]
 
 
 class Counts:
-    """Accepted and rejected steps, evaluations."""
+    """Numbers of accepted steps, rejected steps and evaluations."""
 
     def __init__(self) -> None:
         self.accepted = self.rejected = self.evaluations = 0
@@ -52,7 +53,7 @@ def error_norm(tableau: Tableau, K: np.ndarray, h: float, scale: np.ndarray) -> 
 
 
 def slopes_of(f: Field, t: float, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Jacobian and time derivative of ``f`` by complex steps, which subtract nothing."""
+    """Jacobian and time derivative of ``f`` by complex steps, which have no cancellation error."""
     tiny = 1e-100
     columns = [np.imag(f(t, x + 1j * tiny * unit)) / tiny for unit in np.eye(x.size)]
     return np.column_stack(columns), np.imag(f(t + 1j * tiny, x)) / tiny
@@ -67,7 +68,7 @@ def rosenbrock_stages(
     h: float,
     K: np.ndarray,
 ) -> np.ndarray:
-    """Fill rows 1 … s of K; gives the new state."""
+    """Compute rows 1 … s of K and return the new state."""
     J, T = jacobian
     matrix = np.eye(x.size) / tableau.gamma - h * J
     for i in range(tableau.stages):
@@ -88,7 +89,7 @@ def defect_norm(
     K: np.ndarray,
     scale: np.ndarray,
 ) -> float:
-    """What the values in the middle of the step lack to satisfy the equation, as an error of the state."""
+    """Return the norm of the defect of the dense output in mid-step, as an error of the state."""
     k = K[1 : tableau.stages + 1]
     polynomials = [np.polynomial.Polynomial([0.0, *row]) for row in tableau.dense]
     middle = x + h * np.array([q(0.5) for q in polynomials]) @ k
@@ -107,7 +108,7 @@ def integrate(
     rtol: float = 1e-6,
     atol: float = 1e-9,
 ) -> tuple[np.ndarray, Counts]:
-    """States at the samples ``(N, n)`` and what it took."""
+    """Return the states at the samples, ``(N, n)``, and the numbers of steps and evaluations."""
     counts = Counts()
     t, x, stop = float(samples[0]), np.array(x0, dtype=float), float(samples[-1])
     rows: list[np.ndarray] = [x.copy()]

@@ -1,4 +1,4 @@
-"""Small systems written directly as equations: what a diagram becomes before it is compiled."""
+"""Small systems written directly as equations, in the form of a traced diagram."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def system(
     breakpoints: Callable[[SX], Sequence[SX | float]] = lambda p: (),
     aliases: Mapping[str, str] | None = None,
 ) -> HybridSystem:
-    """A system of equations over ``t, x, p``; ``initial`` are the numbers of ``x(0)``."""
+    """Build a system from equations in ``t, x, p``; ``initial`` is ``x(0)``."""
     flat = lambda size: (size,)  # noqa: E731
     ends = signature(("t", ()), ("x", flat(states.size)), ("p", flat(parameters.size)))
     p_only = signature(("p", flat(parameters.size)))
@@ -99,7 +99,7 @@ def scalar(
     outputs: Equation = lambda t, x, p: x,
     **more: object,
 ) -> HybridSystem:
-    """One state ``block/x`` and one signal ``block/y``."""
+    """Build a system with one state ``block/x`` and one signal ``block/y``."""
     return system(
         name,
         states=states_of("block/x"),

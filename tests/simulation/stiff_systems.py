@@ -1,4 +1,4 @@
-"""Stiff problems of the literature, written as equations, with plain NumPy copies for independent solvers."""
+"""Stiff problems of the literature, written as equations, with NumPy versions for independent solvers."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from small_systems import states_of, system
 from armblocks.equations import HybridSystem, signature
 
 ROBERTSON_END = np.array([0.2083340149701255e-7, 0.8333360770334713e-13, 0.9999999791665050])
-"""At 1e11 s: Bari test set for initial value problems, reference solution."""
+"""Reference solution at 1e11 s from the Bari test set for initial value problems."""
 VAN_DER_POL_END = np.array([1.706167732170469, -0.8928097010248125e-3])
-"""At 2000 s with mu = 1000: the same."""
+"""Reference solution at 2000 s with mu = 1000 from the same test set."""
 
 
 def robertson() -> HybridSystem:
-    """Three reactions with rates from 0.04 to 3e7 1/s."""
+    """Robertson's problem: three reactions with rates from 0.04 to 3e7 1/s."""
 
     def rates(t: SX, y: SX, p: SX) -> SX:
         slow, fast, back = 0.04 * y[0], 3e7 * y[1] ** 2, 1e4 * y[1] * y[2]
@@ -34,7 +34,7 @@ def robertson() -> HybridSystem:
 
 
 def robertson_dae() -> HybridSystem:
-    """The third substance from the conservation law ``a + b + w = 1``, as an implicit equation of index 1."""
+    """Robertson's problem with the conservation law ``a + b + w = 1`` as an implicit equation of index 1."""
     return hybrid(
         "robertson_dae",
         states=("a/x", "b/x"),
@@ -51,7 +51,7 @@ def robertson_dae() -> HybridSystem:
 
 
 def van_der_pol(mu: float) -> HybridSystem:
-    """Relaxation oscillations: long stiff stretches and jumps between them."""
+    """Relaxation oscillations: long stiff phases with fast transitions between them."""
     return system(
         "van_der_pol",
         states=states_of("mass/x", "mass/v"),
@@ -93,7 +93,7 @@ KINETICS = {
 
 
 def kinetics(name: str) -> HybridSystem:
-    """One of :data:`KINETICS`."""
+    """Build one of :data:`KINETICS`."""
     rates, start, _ = KINETICS[name]
     return system(
         name,
@@ -106,9 +106,10 @@ def kinetics(name: str) -> HybridSystem:
 
 
 def heat(n: int) -> tuple[HybridSystem, np.ndarray, float]:
-    """A rod with cold ends as ``n`` states; its first mode, ``(n,)``, and the rate at which this decays, 1/s.
+    """Return a rod with cold ends as ``n`` states, its first mode, ``(n,)``, and the decay rate of the mode,
+    1/s.
 
-    The mode is an eigenvector of the differences as well, so that the states are known exactly.
+    The mode is also an eigenvector of the finite differences, so that the states are known exactly.
     """
     h = 1.0 / (n + 1)
     mode = np.sin(np.pi * h * np.arange(1, n + 1))
@@ -129,9 +130,11 @@ def heat(n: int) -> tuple[HybridSystem, np.ndarray, float]:
 
 
 def pendulum() -> HybridSystem:
-    """A unit mass on a unit rod in Cartesian coordinates: index 1, the rod's force from the acceleration.
+    """A unit mass on a unit rod in Cartesian coordinates, of index 1: the acceleration determines the rod
+    force.
 
-    ``x'' = -w x``, ``y'' = -w y - g`` and twice differentiated ``x^2 + y^2 = 1``; horizontal at rest.
+    ``x'' = -w x``, ``y'' = -w y - g`` and ``x^2 + y^2 = 1``, differentiated twice; it starts horizontal, at
+    rest.
     """
     g = 9.81
     return hybrid(
@@ -148,7 +151,7 @@ def pendulum() -> HybridSystem:
 
 
 def ball_on_fast_plate(rate: float = 1e4) -> HybridSystem:
-    """A bouncing ball whose height is measured through a lag of ``rate`` 1/s, held by a sampler."""
+    """A bouncing ball; its height is measured through a lag of ``rate`` 1/s and a sample-and-hold."""
     return hybrid(
         "fast_plate",
         states=("ball/h", "ball/v", "lag/x"),

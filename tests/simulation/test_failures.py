@@ -25,8 +25,8 @@ def partial(error: pytest.ExceptionInfo[SimulationError]) -> SimulationResult:
     return result
 
 
-def test_blow_up_is_reported_where_it_happens() -> None:
-    """x' = x^2 from 1 is 1 / (1 - t): it leaves every bound at 1 s."""
+def test_unbounded_growth_is_reported_with_its_time() -> None:
+    """x' = x^2 with x(0) = 1 has the solution 1 / (1 - t), with a pole at 1 s."""
     with pytest.raises(SimulationError, match=r"the step became as small as the rounding") as error:
         simulate(
             compile_system(scalar("blow_up", lambda t, x, p: x * x, 1.0)), SimulationOptions(stop_time=2.0)
@@ -35,14 +35,14 @@ def test_blow_up_is_reported_where_it_happens() -> None:
     assert "'block/x'" in text
     assert "grow without bound" in text
     kept = partial(error)
-    assert kept.time[-1] == pytest.approx(1.0, abs=2e-3)  # the last sample instant before 1 s
+    assert kept.time[-1] == pytest.approx(1.0, abs=2e-3)  # the last sample before 1 s
     time = float(text.split("rounding of the time at ")[1].split(" s")[0])
     assert time == pytest.approx(1.0, abs=1e-3)
     np.testing.assert_allclose(kept["block/y"][:-1], 1 / (1 - kept.time[:-1]), rtol=1e-3)
 
 
 def test_the_state_with_the_largest_error_is_named() -> None:
-    """Two quiet states and one that blows up."""
+    """Two decaying states and one that grows without bound."""
     states = states_of("a/x", "b/x", "c/x")
     quiet = system(
         "three",
@@ -57,7 +57,7 @@ def test_the_state_with_the_largest_error_is_named() -> None:
 
 
 def chain(stop_at: float = 1.0) -> object:
-    """A root of a ramp that turns negative, used twice after it: the first culprit is the root."""
+    """The square root of a ramp that becomes negative, and two blocks after it; the root is the cause."""
 
     def signals(t: SX, x: SX, p: SX) -> SX:
         root = ca.sqrt(stop_at - t)
@@ -83,7 +83,7 @@ def test_the_first_signal_that_is_not_finite_is_named_with_the_time(solver: str)
     assert partial(error).time[-1] == pytest.approx(1.0, abs=4e-3)
 
 
-def test_without_states_the_first_bad_instant_and_signal_are_named() -> None:
+def test_without_states_the_first_signal_that_is_not_finite_is_named_with_the_time() -> None:
     bad = system(
         "direct",
         signals=signature(("clock/y", ()), ("log/y", (2,)), ("after/y", ())),
@@ -104,20 +104,20 @@ def test_without_states_the_first_bad_instant_and_signal_are_named() -> None:
         simulate(compile_system(later), options)
 
 
-def test_large_finite_signals_are_not_mistaken_for_bad_ones() -> None:
-    """The quick check squares; squares of 1e200 overflow, the numbers themselves are fine."""
+def test_large_finite_signals_are_accepted() -> None:
+    """The fast check squares the signals: squares of 1e200 overflow although the signals are finite."""
     large = system("large", signals=signature(("big/y", ())), outputs=lambda t, x, p: 1e200 * (1 + t))
     result = simulate(compile_system(large), SimulationOptions(stop_time=1.0))
     assert result["big/y"][-1] == 2e200
 
 
-def test_a_derivative_that_is_not_finite_while_all_signals_are_names_the_state() -> None:
+def test_a_derivative_that_is_not_finite_is_reported_with_its_state() -> None:
     hidden = scalar("hidden", lambda t, x, p: ca.log(0.5 - t) + 0 * x, 0.0)
     with pytest.raises(SimulationError, match=r"derivative of state 'block/x' is not finite at 0\.5"):
         simulate(compile_system(hidden), SimulationOptions(stop_time=1.0))
 
 
-def test_a_bad_start_is_named() -> None:
+def test_an_initial_value_that_is_not_finite_is_named() -> None:
     at_start = scalar("start", lambda t, x, p: 1 / x, 0.0)
     with pytest.raises(SimulationError, match=r"derivative of state 'block/x' is not finite at 0 s") as error:
         simulate(compile_system(at_start), SimulationOptions(stop_time=1.0))
@@ -127,8 +127,8 @@ def test_a_bad_start_is_named() -> None:
         simulate(compile_system(infinite), SimulationOptions(stop_time=1.0))
 
 
-def test_stiffness_is_hinted_at_and_its_absence_is_not() -> None:
-    """x' = -1e6 (x - cos t): an explicit method takes steps of 3.3e-6 s, whatever the tolerance."""
+def test_the_message_suggests_a_stiff_solver_only_for_a_stiff_system() -> None:
+    """x' = -1e6 (x - cos t): an explicit method takes steps of 3.3e-6 s for any tolerance."""
     stiff = compile_system(scalar("stiff", lambda t, x, p: -1e6 * (x - ca.cos(t)), 1.0))
     result = simulate(stiff, SimulationOptions(stop_time=0.2, solver="rk45"))
     assert result.run.complete
@@ -136,7 +136,7 @@ def test_stiffness_is_hinted_at_and_its_absence_is_not() -> None:
     assert "solver='rodas5p' is suitable for such systems" in result.run.message
     assert "1e+06 1/s" in result.run.message
     np.testing.assert_allclose(result["block/y"], np.cos(result.time), atol=1e-5)
-    # As many steps, but for accuracy: nothing to say.
+    # As many steps because of accuracy: no suggestion.
     busy = simulate(OSCILLATOR, SimulationOptions(stop_time=200.0, max_step=0.005, solver="rk45"))
     assert busy.run.steps >= 40_000
     assert busy.run.message == ""
@@ -171,12 +171,12 @@ def test_stiffness_is_hinted_at_and_its_absence_is_not() -> None:
         ({"atol": -1.0}, r"atol is -1\.0"),
     ],
 )
-def test_options_that_cannot_be_run_are_refused(options: dict[str, object], message: str) -> None:
+def test_invalid_options_are_refused(options: dict[str, object], message: str) -> None:
     with pytest.raises(InputError, match=message):
         simulate(OSCILLATOR, SimulationOptions(**options))  # pyright: ignore
 
 
-def test_an_unknown_solver_is_refused_even_where_none_is_needed() -> None:
+def test_an_unknown_solver_is_refused_even_if_none_is_needed() -> None:
     still = compile_system(system("still", signals=signature(("a/y", ())), outputs=lambda t, x, p: t))
     with pytest.raises(UnknownNameError, match=r"no solver named 'ode45s'.*did you mean 'ode45'"):
         simulate(still, SimulationOptions(solver="ode45s"))
@@ -192,16 +192,14 @@ def test_an_unknown_solver_is_refused_even_where_none_is_needed() -> None:
         (np.array([np.inf]), InputError, r"parameter 'mass.omega' is \[inf\]"),
     ],
 )
-def test_parameters_that_cannot_be_run_are_refused(
-    parameters: object, kind: type[Exception], message: str
-) -> None:
+def test_invalid_parameters_are_refused(parameters: object, kind: type[Exception], message: str) -> None:
     with pytest.raises(kind, match=message):
         simulate(OSCILLATOR, SimulationOptions(), parameters)  # pyright: ignore
 
 
 @pytest.mark.parametrize("solver", ["rk23", "rk45", "dop853", "rodas5p"])
 @pytest.mark.parametrize("rtol", [1e-3, 1e-6])
-def test_a_crawl_is_seen_at_any_order_and_tolerance(solver: str, rtol: float) -> None:
+def test_extremely_short_steps_are_detected_at_any_order_and_tolerance(solver: str, rtol: float) -> None:
     jumping = compile_system(scalar("friction", lambda t, x, p: -1 + 2 * (x < 0), 1.0))
     options = SimulationOptions(stop_time=1e9, sample_time=1e8, solver=solver, rtol=rtol, atol=1e-6)
     with pytest.raises(SimulationError, match=r"the run takes extremely short steps at \d+\.\d+ s: "):
@@ -210,8 +208,8 @@ def test_a_crawl_is_seen_at_any_order_and_tolerance(solver: str, rtol: float) ->
 
 @pytest.mark.parametrize("solver", ["rk23", "rk45", "dop853"])
 @pytest.mark.parametrize("rtol", [1e-3, 1e-6])
-def test_an_oscillator_that_is_held_to_its_tolerance_does_not_crawl(solver: str, rtol: float) -> None:
-    """Driven, so that no method damps it away; 1e9 s are still to come after these steps."""
+def test_a_driven_system_with_tight_tolerance_is_not_reported_as_too_slow(solver: str, rtol: float) -> None:
+    """The input never decays, so that the steps stay short; 1e9 s remain after these steps."""
     driven = compile_system(scalar("driven", lambda t, x, p: ca.cos(t) - x, 0.0))
     options = SimulationOptions(stop_time=1e9, sample_time=1e8, solver=solver, rtol=rtol, atol=1e-6)
     run = Simulation(driven, options)
@@ -221,7 +219,7 @@ def test_an_oscillator_that_is_held_to_its_tolerance_does_not_crawl(solver: str,
 
 @pytest.mark.parametrize(("solver", "most"), [("rk45", 200_000), ("dop853", 200_000), ("rodas5p", 50_000)])
 def test_a_run_with_extremely_short_steps_is_ended(solver: str, most: int) -> None:
-    """x' = -1 + 2 (x < 0): from 1 s on, steps answer one another, and 1000 s would take 1e10."""
+    """x' = -1 + 2 (x < 0): after 1 s the sign of x' alternates; 1000 s would take 1e10 steps."""
     jumping = compile_system(scalar("friction", lambda t, x, p: -1 + 2 * (x < 0), 1.0))
     with pytest.raises(SimulationError, match=r"the run takes extremely short steps at 1\.\d+ s: ") as error:
         simulate(jumping, SimulationOptions(stop_time=1000.0, solver=solver))
@@ -236,8 +234,8 @@ def test_a_run_with_extremely_short_steps_is_ended(solver: str, most: int) -> No
 
 
 @pytest.mark.parametrize("solver", ["rk23", "rk45"])
-def test_many_good_steps_do_not_crawl(solver: str) -> None:
-    """Steps of some hundredths of 1e9 s: more than 1e8 to come, each for a good reason."""
+def test_many_regular_steps_are_not_reported_as_too_slow(solver: str) -> None:
+    """Steps of some hundredths of a second, bounded by accuracy; more than 1e8 remain until 1e9 s."""
     options = SimulationOptions(stop_time=1e9, solver=solver, sample_time=1e7, rtol=1e-6)
     run = Simulation(OSCILLATOR, options)
     run.advance(steps=400_000)
@@ -245,14 +243,14 @@ def test_many_good_steps_do_not_crawl(solver: str) -> None:
     assert run.time > (20_000.0 if solver == "rk45" else 2_000.0)
 
 
-def test_a_blow_up_leaves_no_warning_of_numpy() -> None:
-    """The hint about stiffness looks at a state near the largest double and says nothing."""
+def test_unbounded_growth_raises_no_numpy_warning() -> None:
+    """The check for stiffness evaluates a state near the largest double without a warning."""
     options = SimulationOptions(stop_time=1e6, solver="rk45", sample_time=1e5, rtol=0.1)
     with pytest.raises(SimulationError, match="not finite"):
         simulate(OSCILLATOR, options)
 
 
-def test_steps_without_number_are_refused() -> None:
+def test_too_many_fixed_steps_are_refused() -> None:
     with pytest.raises(
         InputError, match=r"step is 1e-12 s, and the stop time 1 s: 1e\+12 steps.*is it in seconds"
     ):

@@ -1,4 +1,4 @@
-"""The native hybrid loop against a second opinion that shares no code with it."""
+"""The native hybrid loop compared with an independent reference."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from armblocks.simulation import simulate
 
 
 def thermostat_with_controller() -> HybridSystem:
-    """A bit of everything: two clocks with an offset, a relay, a reset of a state, an implicit equation."""
+    """A system with two clocks, one with an offset, a relay, a state reset and an implicit equation."""
     return hybrid(
         "everything",
         states=("plant/x", "plant/v", "timer/s"),
@@ -58,7 +58,7 @@ def thermostat_with_controller() -> HybridSystem:
         (thermostat_with_controller(), 3.0, 7),
     ],
 )
-def test_whole_runs_agree(system: HybridSystem, stop: float, events: int) -> None:
+def test_runs_agree_with_the_reference(system: HybridSystem, stop: float, events: int) -> None:
     compiled, reference = compile_system(system), Reference(system)
     expected: np.ndarray | None = None
     for solver, step in (("dop853", None), ("rk45", None), ("rk5", 0.002)):
@@ -68,6 +68,6 @@ def test_whole_runs_agree(system: HybridSystem, stop: float, events: int) -> Non
         result = simulate(compiled, options)
         if expected is None:
             expected = reference.run(result.time)
-        # Both sides hold 1e-11 in a step, and events in sequence magnify that. No event is at a sample.
+        # Both have an error of 1e-11 per step, which successive events amplify. No event is at a sample.
         np.testing.assert_allclose(result.signals, expected, rtol=0, atol=2e-9)
         assert result.run.events == reference.events == events

@@ -1,4 +1,4 @@
-"""Clocks, events and implicit equations in whole runs, against closed forms."""
+"""Clocks, events and implicit equations in runs, compared with closed forms."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ def run(
     return simulate(compile_system(system), options)
 
 
-# The ball: t1 = sqrt(2 h / g), then gaps 2 e^k v1 / g; all of them end at t1 + 2 e v1 / (g (1 - e)).
+# The ball: t1 = sqrt(2 h / g), then intervals 2 e^k v1 / g, whose sum ends at t1 + 2 e v1 / (g (1 - e)).
 
 
 @pytest.mark.parametrize(("solver", "step"), SOLVERS)
-def test_a_ball_bounces_at_the_known_instants(solver: str, step: float | None) -> None:
+def test_a_ball_bounces_at_the_known_times(solver: str, step: float | None) -> None:
     result = run(bouncing_ball(), 1.6, 1e-3, solver=solver, step=step)
     times = np.unique(result["ball/last"])[1:]
     np.testing.assert_allclose(
@@ -46,7 +46,7 @@ def test_a_ball_bounces_at_the_known_instants(solver: str, step: float | None) -
     assert result["ball/h"].min() > -1e-14
 
 
-def test_a_ball_that_is_thrown_upwards() -> None:
+def test_a_ball_thrown_upwards_bounces_at_the_known_times() -> None:
     result = run(bouncing_ball(0.8, 10.0, 15.0), 10.0, 1e-2)
     times = np.unique(result["ball/last"])[1:]
     np.testing.assert_allclose(
@@ -56,8 +56,10 @@ def test_a_ball_that_is_thrown_upwards() -> None:
 
 @pytest.mark.parametrize(("solver", "step"), SOLVERS)
 @pytest.mark.parametrize("restitution", [0.1, 0.5, 0.7, 0.9])
-def test_a_ball_never_falls_through_the_floor(restitution: float, solver: str, step: float | None) -> None:
-    """Infinitely many bounces in finite time end in a message, for loose tolerances and long steps too."""
+def test_infinitely_many_bounces_end_the_run_with_an_error(
+    restitution: float, solver: str, step: float | None
+) -> None:
+    """The ball stays above the floor until the error, also with loose tolerances and long steps."""
     first = np.sqrt(2 / 9.81)
     zeno = first + 2 * restitution * first / (1 - restitution)
     with pytest.raises(SimulationError, match="block 'ball' causes events without end at") as raised:
@@ -69,7 +71,7 @@ def test_a_ball_never_falls_through_the_floor(restitution: float, solver: str, s
     assert partial["ball/h"].min() > -1e-9
 
 
-def test_chattering_is_named() -> None:
+def test_chattering_is_reported_with_its_block() -> None:
     """``x' = -sign(x)`` without hysteresis: the relay switches forever at x = 0."""
     system = hybrid(
         "chatter",
@@ -88,7 +90,7 @@ def test_chattering_is_named() -> None:
         run(system, 2.0)
 
 
-def test_events_that_cause_one_another_at_one_instant_end_in_a_message() -> None:
+def test_two_guards_of_one_state_that_fire_together_are_processed_once() -> None:
     system = hybrid(
         "flip",
         discrete=("flip/a",),
@@ -101,25 +103,25 @@ def test_events_that_cause_one_another_at_one_instant_end_in_a_message() -> None
         guard=lambda t, x, z, w, p: column(z[0], z[0]),
         reset=lambda t, x, z, w, p, e: (x, ca.if_else(e[0] != 0, -z, -z)),
     )
-    # Both fire together, flip the sign and take it; a third guard is not needed to end this at once.
+    # Both guards fire at the tick and the reset restores the sign, so that no further event follows.
     assert run(system, 1.0, 0.25)["flip/a"].tolist() == [1.0, 1.0, 1.0, 1.0, 1.0]
 
 
-def test_a_relay_oscillates_with_its_known_period() -> None:
+def test_a_relay_oscillates_with_the_known_period() -> None:
     result = run(relay_oscillator(), 10.0, 0.25)
     t = result.time
     np.testing.assert_allclose(result["plant/x"], 0.5 - np.abs((t + 0.5) % 2 - 1), atol=1e-12)
     assert result.run.events == 10
-    # Right-continuous: at the instant at which it switches the relay shows its new side.
+    # Signals are right-continuous: at the switching time the relay has its new value.
     assert result["relay/y"][[0, 1, 2, 3]].tolist() == [-1.0, -1.0, 1.0, 1.0]
 
 
-def test_a_mass_breaks_away_at_the_known_instant_and_was_at_true_rest_before() -> None:
+def test_a_mass_is_exactly_at_rest_until_it_breaks_away_at_the_known_time() -> None:
     result = run(stick_slip(), 3.0, 0.25)
     assert result["mass/last"][-1] == pytest.approx(1.5, rel=1e-15)
     resting = result.time < 1.5
     assert not result["mass/v"][resting].any()
-    slid = result.time[-1] - 1.5  # F - mu N = 2 t - 2 = 1 + 2 s after the break-away
+    slid = result.time[-1] - 1.5  # F - mu N = 2 t - 2 = 1 + 2 s, with the time s after the break-away
     assert result["mass/v"][-1] == pytest.approx(slid + slid**2, abs=1e-12)
 
 
@@ -127,15 +129,15 @@ def test_a_mass_breaks_away_at_the_known_instant_and_was_at_true_rest_before() -
 
 
 @pytest.mark.parametrize(("solver", "step"), SOLVERS)
-def test_a_sampled_loop_follows_its_recursion(solver: str, step: float | None) -> None:
+def test_a_sampled_loop_agrees_with_its_recursion(solver: str, step: float | None) -> None:
     result = run(sampled_loop(0.25), 5.0, 0.25, solver=solver, step=step)
     np.testing.assert_allclose(result["plant/x"], 0.75 ** np.arange(21), rtol=1e-13)
     assert result["hold/y"].tolist() == result["plant/x"].tolist()
     assert result.run.ticks == 21
 
 
-def test_a_held_input_with_a_decay_follows_its_exponential() -> None:
-    """``x' = -x`` looked at every T: ``x_k = exp(-k T)``, held in between."""
+def test_sampled_values_of_a_decay_agree_with_its_exponential() -> None:
+    """``x' = -x`` sampled with period T: ``x_k = exp(-k T)``, held between ticks."""
     system = hybrid(
         "decay",
         states=("plant/x",),
@@ -154,7 +156,7 @@ def test_a_held_input_with_a_decay_follows_its_exponential() -> None:
     np.testing.assert_allclose(result["hold/y"], expected, atol=1e-9)
 
 
-def test_a_million_ticks_are_where_they_are_computed() -> None:
+def test_the_times_of_a_million_ticks_have_no_accumulated_rounding_error() -> None:
     result = run(tick_recorder([(0.1, 0.0)]), 1e5, 1000.0)
     assert result.run.ticks == 1_000_001
     assert abs(result["clock0/time"][-1] - 1e5) <= np.spacing(1e5)
@@ -171,7 +173,7 @@ def test_a_million_ticks_are_where_they_are_computed() -> None:
         ([(0.001, 0.0), (0.001, 0.0005)], 1.0, 0),
     ],
 )
-def test_ticks_of_two_clocks_coincide_where_they_should(
+def test_common_ticks_of_two_clocks_coincide_despite_rounding(
     clocks: list[tuple[float, float]], stop: float, together: int
 ) -> None:
     result = run(tick_recorder(clocks), stop, stop)
@@ -182,8 +184,8 @@ def test_ticks_of_two_clocks_coincide_where_they_should(
         assert result[f"clock{k}/time"][-1] == pytest.approx((count - 1) * period + offset, rel=4e-16)
 
 
-def test_a_tick_at_a_breakpoint_sees_the_new_value() -> None:
-    """The step is at 0.3, the third tick of 0.1 s at 3 * 0.1 > 0.3, that of 0.7 s at 3 * 0.7 < 2.1."""
+def test_a_tick_at_a_breakpoint_samples_the_new_value() -> None:
+    """The jump is at 0.3 s or 2.1 s; the third ticks are rounded to 3 * 0.1 > 0.3 and 3 * 0.7 < 2.1."""
     for period, instant in ((0.1, 0.3), (0.7, 2.1)):
         system = hybrid(
             "sampled_step",
@@ -202,7 +204,7 @@ def test_a_tick_at_a_breakpoint_sees_the_new_value() -> None:
         assert y.tolist() == [0.0, 0.0, 0.0, 1.0, 1.0]
 
 
-def test_a_tick_that_moves_a_guard_fires_it_at_the_same_instant() -> None:
+def test_a_guard_whose_sign_changes_at_a_tick_fires_at_that_time() -> None:
     system = hybrid(
         "tick_then_event",
         discrete=("count/n", "edge/t"),
@@ -220,7 +222,7 @@ def test_a_tick_that_moves_a_guard_fires_it_at_the_same_instant() -> None:
     assert result["edge/t"].tolist() == [-1.0, -1.0, -1.0, 1.5, 1.5]
 
 
-def test_a_guard_of_time_alone_is_located_without_states() -> None:
+def test_a_guard_that_depends_only_on_time_is_located_without_states() -> None:
     system = hybrid(
         "timer",
         discrete=("timer/t",),
@@ -238,13 +240,13 @@ def test_a_guard_of_time_alone_is_located_without_states() -> None:
 # Implicit equations.
 
 
-def test_a_loop_is_solved_at_every_evaluation() -> None:
+def test_an_implicit_equation_is_solved_at_every_evaluation() -> None:
     result = run(loop_of_cosine(), 2.0, 0.5)
     np.testing.assert_allclose(result["loop/u"], 0.7390851332151607, rtol=0, atol=2e-16)
 
 
 def test_a_system_of_nonlinear_loops_with_pivoting() -> None:
-    """``w1 w2 = 1 + t``, ``w1 + w2 = 3 + t``, and a third one that needs its row exchanged."""
+    """``w1 w2 = 1 + t``, ``w1 + w2 = 3 + t``, and a third equation that needs a row exchange."""
     system = hybrid(
         "three",
         states=("plant/x",),
@@ -264,7 +266,7 @@ def test_a_system_of_nonlinear_loops_with_pivoting() -> None:
 
 
 @pytest.mark.parametrize("shift", [1.0, 0.0])
-def test_a_loop_without_solution_or_with_infinitely_many_is_named(shift: float) -> None:
+def test_an_implicit_equation_without_a_unique_solution_is_reported(shift: float) -> None:
     system = hybrid(
         "endless",
         states=("plant/x",),
@@ -280,10 +282,10 @@ def test_a_loop_without_solution_or_with_infinitely_many_is_named(shift: float) 
         run(system, 1.0)
 
 
-# The engine.
+# The integration loop.
 
 
-def test_chunks_of_steps_change_no_bit_and_fixed_steps_land_on_ticks() -> None:
+def test_pauses_do_not_change_the_bits_and_fixed_steps_end_at_ticks() -> None:
     compiled = compile_system(sampled_loop(0.03))
     outcomes = []
     for chunk in (1, 7, 10**6):
@@ -294,12 +296,13 @@ def test_chunks_of_steps_change_no_bit_and_fixed_steps_land_on_ticks() -> None:
             pass
         outcomes.append((begun.states.tobytes(), begun.reals.tobytes(), begun.accepted))
     assert outcomes[0] == outcomes[1] == outcomes[2]
-    assert (
-        outcomes[0][2] == 34 + 20 - 6 - 1
-    )  # ticks and grid instants, six of them common; the start is no step
+    # 34 ticks and 20 grid times, six of them common; the start is not a step
+    assert outcomes[0][2] == 34 + 20 - 6 - 1
 
 
-def test_a_recalled_hybrid_system_runs_the_same(tmp_path: object, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_hybrid_system_loaded_from_the_cache_gives_the_same_run(
+    tmp_path: object, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("ARMBLOCKS_CACHE_DIR", str(tmp_path))
     options = SimulationOptions(stop_time=1.5, sample_time=0.01)
     first = simulate(recall_system("ball", bouncing_ball), options)
@@ -311,7 +314,7 @@ def test_a_recalled_hybrid_system_runs_the_same(tmp_path: object, monkeypatch: p
     assert first.signals.tobytes() == again.signals.tobytes()
 
 
-def test_a_discrete_variable_that_does_not_start_at_a_number_is_named() -> None:
+def test_an_initial_discrete_value_that_is_not_finite_is_named() -> None:
     system = hybrid(
         "bad",
         discrete=("hold/y",),

@@ -1,4 +1,4 @@
-"""Results: access by name, tables, files, and what a notebook shows."""
+"""Results: access by name, tables, files, and the notebook representation."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def result() -> SimulationResult:
     return simulate(compile_system(arm), SimulationOptions(stop_time=2.0, sample_time=0.1))
 
 
-def test_signals_have_their_shapes_and_are_views(result: SimulationResult) -> None:
+def test_signals_have_their_shapes_and_share_the_memory_of_the_result(result: SimulationResult) -> None:
     t = result.time
     assert result["clock/y"].shape == (21,)
     assert result["rne/tau"].shape == (21, 2)
@@ -55,7 +55,7 @@ def test_signals_have_their_shapes_and_are_views(result: SimulationResult) -> No
         assert np.shares_memory(result[name], result.signals)
 
 
-def test_blocks_with_one_output_and_input_ports_are_names_too(result: SimulationResult) -> None:
+def test_signals_are_found_by_block_name_and_by_input_port(result: SimulationResult) -> None:
     np.testing.assert_array_equal(result["clock"], result.time)
     np.testing.assert_array_equal(result["scope/u"], result["rne/tau"])
     assert "scope/u" in result
@@ -64,27 +64,27 @@ def test_blocks_with_one_output_and_input_ports_are_names_too(result: Simulation
     assert result.resolve("rne") == "rne/tau"
 
 
-def test_an_unknown_signal_says_the_nearest(result: SimulationResult) -> None:
+def test_an_unknown_signal_is_refused_with_the_nearest_name(result: SimulationResult) -> None:
     with pytest.raises(
         UnknownNameError, match=r"arm: there is no signal named 'rne/tua'.*did you mean 'rne/tau'"
     ):
         result["rne/tua"]
 
 
-def test_names_units_and_parameters_are_kept(result: SimulationResult) -> None:
+def test_a_result_has_names_units_and_parameters(result: SimulationResult) -> None:
     assert result.names == ("clock/y", "rne/tau", "fkine/T", "poses/T")
     assert result.units["rne/tau"] == "N m"
     assert result.parameters["rne.load"] == 1 / 3
 
 
-def test_results_and_reports_do_not_change(result: SimulationResult) -> None:
+def test_results_and_reports_are_immutable(result: SimulationResult) -> None:
     with pytest.raises(dataclasses.FrozenInstanceError):
         result.name = "other"  # pyright: ignore
     with pytest.raises(dataclasses.FrozenInstanceError):
         result.run.complete = False  # pyright: ignore
 
 
-def test_dataframe_has_a_column_a_scalar(result: SimulationResult) -> None:
+def test_a_dataframe_has_one_column_per_scalar(result: SimulationResult) -> None:
     frame = result.to_dataframe()
     assert frame.index.name == "time"
     assert list(frame.columns[:5]) == ["clock/y", "rne/tau[0]", "rne/tau[1]", "fkine/T[0,0]", "fkine/T[0,1]"]
@@ -99,14 +99,14 @@ def incomplete(result: SimulationResult) -> SimulationResult:
     return dataclasses.replace(result, run=run)
 
 
-def test_csv_gives_back_every_bit(result: SimulationResult, tmp_path: Path) -> None:
+def test_a_csv_file_keeps_every_bit(result: SimulationResult, tmp_path: Path) -> None:
     result.save(tmp_path / "run.csv")
     frame = pd.read_csv(tmp_path / "run.csv", index_col="time")
     assert frame.index.to_numpy().tobytes() == result.time.tobytes()
     assert np.ascontiguousarray(frame.to_numpy().T).tobytes() == result.signals.tobytes()
 
 
-def test_parquet_gives_back_every_bit_and_how_the_run_went(result: SimulationResult, tmp_path: Path) -> None:
+def test_a_parquet_file_keeps_every_bit_and_the_run_report(result: SimulationResult, tmp_path: Path) -> None:
     incomplete(result).save(tmp_path / "run.parquet")
     table = pq.read_table(str(tmp_path / "run.parquet"))
     assert table.column_names[0] == "time"
@@ -120,7 +120,7 @@ def test_parquet_gives_back_every_bit_and_how_the_run_went(result: SimulationRes
     assert description["parameters"] == {"rne.load": 1 / 3}
 
 
-def test_npz_gives_back_every_signal_in_its_shape(result: SimulationResult, tmp_path: Path) -> None:
+def test_an_npz_file_keeps_every_signal_with_its_shape(result: SimulationResult, tmp_path: Path) -> None:
     incomplete(result).save(str(tmp_path / "run.npz"))
     with np.load(tmp_path / "run.npz", allow_pickle=False) as data:
         assert data["time"].tobytes() == result.time.tobytes()
@@ -129,7 +129,7 @@ def test_npz_gives_back_every_signal_in_its_shape(result: SimulationResult, tmp_
         assert json.loads(str(data["run"]))["run"]["complete"] is False
 
 
-def test_mat_has_a_structure_a_block(result: SimulationResult, tmp_path: Path) -> None:
+def test_a_mat_file_has_one_structure_per_block(result: SimulationResult, tmp_path: Path) -> None:
     incomplete(result).save(tmp_path / "run.mat")
     data = loadmat(tmp_path / "run.mat", squeeze_me=True, struct_as_record=False)
     np.testing.assert_array_equal(data["time"], result.time)
@@ -155,7 +155,7 @@ def named(*names: str) -> SimulationResult:
     )
 
 
-def test_names_that_matlab_cannot_have_are_changed_and_listed(tmp_path: Path) -> None:
+def test_names_that_are_invalid_in_matlab_are_changed_and_listed(tmp_path: Path) -> None:
     result = named("my block/out 1", "my_block/out_1", "1st/y", "time/y", "arm/ü")
     result.save(tmp_path / "run.mat")
     data = loadmat(tmp_path / "run.mat", squeeze_me=True, struct_as_record=False)
@@ -168,14 +168,14 @@ def test_names_that_matlab_cannot_have_are_changed_and_listed(tmp_path: Path) ->
     np.testing.assert_array_equal(data["time"], result.time)
 
 
-def test_another_suffix_is_refused(result: SimulationResult, tmp_path: Path) -> None:
+def test_an_unknown_suffix_is_refused(result: SimulationResult, tmp_path: Path) -> None:
     with pytest.raises(UnknownNameError, match=r"no file type named '\.parq'.*did you mean '\.parquet'"):
         result.save(tmp_path / "run.parq")
     with pytest.raises(UnknownNameError, match=r"no file type named 'run'.*\.csv, \.mat, \.npz, \.parquet"):
         result.save(tmp_path / "run")
 
 
-def test_a_place_that_cannot_be_written_is_refused_and_nothing_is_left(
+def test_a_failed_save_is_reported_and_leaves_no_new_file(
     result: SimulationResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with pytest.raises(FormatError, match=r"the folder .*missing' does not exist.*create the folder"):
@@ -203,7 +203,7 @@ def test_files_have_ordinary_permissions(result: SimulationResult, tmp_path: Pat
     assert stat.S_IMODE((tmp_path / "run.csv").stat().st_mode) == 0o644
 
 
-def test_repr_says_how_it_went_and_what_there_is(result: SimulationResult) -> None:
+def test_the_text_representation_lists_run_and_signals(result: SimulationResult) -> None:
     text = repr(result)
     assert "arm: 21 instants to 2 s, 4 signals, no solver needed" in text
     assert re.search(r"rne/tau +2 +N m", text)
@@ -216,7 +216,7 @@ def drawings(html: str) -> list[ElementTree.Element]:
     return [ElementTree.parse(io.StringIO(svg)).getroot() for svg in re.findall(r"<svg.*?</svg>", html, re.S)]
 
 
-def test_notebook_view_draws_every_signal_and_says_it_in_words(result: SimulationResult) -> None:
+def test_the_notebook_view_draws_every_signal_with_a_text_description(result: SimulationResult) -> None:
     html = result._repr_html_()
     pictures = drawings(html)
     assert [picture.attrib["aria-label"].split(":")[0] for picture in pictures] == [
@@ -227,13 +227,13 @@ def test_notebook_view_draws_every_signal_and_says_it_in_words(result: Simulatio
     ]
     assert pictures[0].attrib["role"] == "img"
     assert len(pictures[1].findall("polyline")) == 2
-    assert re.search(r"<i [^>]*>0</i> <i [^>]*>1</i>", html)  # which trace is which component
+    assert re.search(r"<i [^>]*>0</i> <i [^>]*>1</i>", html)  # the legend of the components
     assert "Incomplete" not in html
-    assert "http" not in html  # nothing is fetched
+    assert "http" not in html  # no external resources
     assert "Incomplete" in incomplete(result)._repr_html_()
 
 
-def test_notebook_view_escapes_names_and_stays_small() -> None:
+def test_the_notebook_view_escapes_names_and_is_limited_in_size() -> None:
     hostile = "<script>alert(1)</script>/\"y'"
     result = dataclasses.replace(named(hostile), name="<b>&")
     html = result._repr_html_()
@@ -248,7 +248,7 @@ def test_notebook_view_escapes_names_and_stays_small() -> None:
     assert len(long._repr_html_()) < 10_000
 
 
-def test_notebook_view_of_constants_wide_signals_and_nothing() -> None:
+def test_the_notebook_view_of_constant_wide_and_empty_signals() -> None:
     ticks = dataclasses.replace(named("a/y"), signals=np.array([[-1e-7, 0.0, 12_345.0]]))
     assert drawings(ticks._repr_html_())[0].attrib["aria-label"] == "a/y: from −1e−7 to 12300"
     flat = dataclasses.replace(named("a/y"), signals=np.zeros((1, 3)))

@@ -1,4 +1,4 @@
-"""The automatic choice goes back to the explicit method where a system is stiff no longer."""
+"""The automatic solver returns to the explicit method when a system is no longer stiff."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from armblocks.simulation import RunState, SimulationResult, simulate
 
 
 def lag_and_oscillator(rate: ca.SX, t: ca.SX, x: ca.SX) -> ca.SX:
-    """``sin t`` held by a lag of that rate (1/s), beside an oscillator of 10 rad/s."""
+    """A lag of the given rate (1/s) that follows ``sin t``, beside an oscillator of 10 rad/s."""
     return ca.vertcat(ca.cos(t) - rate * (x[0] - ca.sin(t)), x[2], -100.0 * x[1])
 
 
 def fading() -> HybridSystem:
-    """The lag is fast until 5 s and slow from about 8 s on."""
+    """A lag that is fast until 5 s and slow after about 8 s."""
     return system(
         "fading",
         states=states_of("lag/x", "wave/x", "wave/v"),
@@ -33,7 +33,7 @@ def fading() -> HybridSystem:
 
 
 def recurring() -> HybridSystem:
-    """The lag is fast for 31 s and slow for 31 s, again and again."""
+    """A lag that alternates between fast and slow every 31 s."""
     return system(
         "recurring",
         states=states_of("lag/x", "wave/x", "wave/v"),
@@ -53,7 +53,7 @@ def run(solver: str, stop: float = STOP, state: RunState | None = None) -> Simul
     return simulate(FADING, options, initial_state=state)
 
 
-def test_the_explicit_method_comes_back_and_the_report_says_both_changes() -> None:
+def test_the_solver_returns_to_the_explicit_method_and_reports_both_changes() -> None:
     result = run("auto")
     assert result.run.solver == "rk45, then rodas5p, then rk45"
     assert "because the system is stiff" in result.run.reason
@@ -62,7 +62,7 @@ def test_the_explicit_method_comes_back_and_the_report_says_both_changes() -> No
     assert 6.0 < back < 20.0
     t = result.time
     exact = np.column_stack([np.sin(t), np.cos(10 * t), -10 * np.sin(10 * t)])
-    # The oscillator's error grows with its 160 turns, under any method.
+    # The error of the oscillator grows over its 160 radians of phase with every method.
     np.testing.assert_allclose(result["y"], exact, atol=2e-4)
     assert result.run.evaluations < 0.6 * run("rk45").run.evaluations
 
@@ -83,8 +83,8 @@ def test_an_interrupted_run_returns_at_the_same_step(cuts: list[float], tmp_path
     assert rest.signals[:, np.isin(rest.time, whole.time)].tobytes() == whole.signals[:, same].tobytes()
 
 
-def test_a_system_that_is_stiff_now_and_then_does_not_go_to_and_fro() -> None:
-    """Each return makes the next one four times as late: their number grows with the logarithm only."""
+def test_a_repeatedly_stiff_system_changes_the_method_only_a_few_times() -> None:
+    """Each return quadruples the delay before the next one: their number grows logarithmically."""
     options = SimulationOptions(stop_time=1000.0, sample_time=10.0, rtol=1e-6, atol=1e-9)
     compiled = compile_system(recurring())
     result = simulate(compiled, options)
@@ -100,6 +100,6 @@ def test_a_system_that_is_stiff_now_and_then_does_not_go_to_and_fro() -> None:
     [(robertson(), 1e11), (van_der_pol(1000.0), 2000.0)],
     ids=["robertson", "van der Pol"],
 )
-def test_problems_that_stay_stiff_change_once(problem: HybridSystem, stop: float) -> None:
+def test_the_method_changes_once_for_problems_that_stay_stiff(problem: HybridSystem, stop: float) -> None:
     result = simulate(compile_system(problem), SimulationOptions(stop_time=stop, rtol=1e-6, atol=1e-12))
     assert result.run.solver == "rk45, then rodas5p"

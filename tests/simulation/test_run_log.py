@@ -1,4 +1,4 @@
-"""Runs with a log file: equal values, constant memory, no lost samples."""
+"""Runs with a log file: equal values, bounded memory, no lost samples."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ SYSTEMS = {
 
 
 def read(path: Path) -> tuple[list[str], np.ndarray]:
-    """Names and columns of a log."""
+    """Return names and columns of a log."""
     if path.suffix == ".parquet":
         table = pq.read_table(str(path))
         columns = [table.column(name).to_numpy() for name in table.column_names]  # pyright: ignore
@@ -51,7 +51,7 @@ def logged(
 
 @pytest.fixture
 def small_windows(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Windows of a few instants, so that short runs have many and steps have more than one."""
+    """Set windows of a few samples, so that short runs have many windows and a step may span several."""
     monkeypatch.setattr("armblocks.simulation.run_log.window_rows", lambda width: 7)
 
 
@@ -59,7 +59,7 @@ def small_windows(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(("solver", "step"), [("rk45", None), ("rk4", 0.013), ("rodas5p", None)])
 @pytest.mark.parametrize("name", list(SYSTEMS))
 @pytest.mark.usefixtures("small_windows")
-def test_a_log_holds_the_bits_of_a_run_in_memory(
+def test_a_log_equals_the_run_in_memory_bit_for_bit(
     name: str, solver: str, step: float | None, suffix: str, tmp_path: Path
 ) -> None:
     options = SimulationOptions(stop_time=4.0, sample_time=0.01, solver=solver, step=step)
@@ -73,13 +73,13 @@ def test_a_log_holds_the_bits_of_a_run_in_memory(
     assert result.run.steps == whole.run.steps and result.run.complete
     assert result.final_state is not None and whole.final_state is not None
     assert result.final_state.states.tobytes() == whole.final_state.states.tobytes()
-    # What stays in memory are rows of the whole.
+    # The samples kept in memory are a subset of all samples.
     places = np.searchsorted(whole.time, result.time)
     assert result.signals.tobytes() == whole.signals[:, places].tobytes()
     assert result.states.tobytes() == whole.states[places].tobytes()
 
 
-def test_a_view_keeps_the_extremes_and_stays_small() -> None:
+def test_a_view_keeps_the_extremes_and_is_limited_in_size() -> None:
     rng = np.random.default_rng(3)
     table = rng.normal(size=(5, 300_000))
     view = View(table.shape[1], watched=[1, 2, 4])
@@ -90,19 +90,19 @@ def test_a_view_keeps_the_extremes_and_stays_small() -> None:
     assert np.isin(kept[0], table[0]).all()
     for row in (1, 2, 4):
         assert kept[row].min() == table[row].min() and kept[row].max() == table[row].max()
-    # Every stretch of the table has its own extremes in it.
+    # The view has the extremes of every interval of the table.
     length = 300_000 * 7 // run_log.VIEW_ROWS
     stretches = table[2, : 300_000 // length * length].reshape(-1, length)
     assert np.isin(stretches.max(axis=1), kept[2]).all()
 
 
-def test_a_short_run_is_kept_whole(tmp_path: Path) -> None:
+def test_a_short_logged_run_is_also_kept_in_memory_completely(tmp_path: Path) -> None:
     options = SimulationOptions(stop_time=4.0)
     result = logged(SYSTEMS["relay"], tmp_path / "log.parquet", options)
     assert result.signals.tobytes() == simulate(SYSTEMS["relay"], options).signals.tobytes()
 
 
-def test_signals_are_chosen_by_name_and_the_file_says_how_the_run_went(tmp_path: Path) -> None:
+def test_a_log_has_the_chosen_signals_and_the_run_report(tmp_path: Path) -> None:
     path = tmp_path / "log.parquet"
     result = logged(SYSTEMS["van_der_pol"], path, SimulationOptions(stop_time=2.0), ("pid/u", "position"))
     names, _ = read(path)
@@ -113,7 +113,7 @@ def test_signals_are_chosen_by_name_and_the_file_says_how_the_run_went(tmp_path:
 
 
 @pytest.mark.usefixtures("small_windows")
-def test_parameters_changed_amid_a_logged_run_are_in_the_log(tmp_path: Path) -> None:
+def test_a_log_reflects_a_parameter_change_during_the_run(tmp_path: Path) -> None:
     system = compile_system(oscillator())
     options = SimulationOptions(stop_time=3.0, sample_time=0.01)
 
@@ -132,10 +132,10 @@ def test_parameters_changed_amid_a_logged_run_are_in_the_log(tmp_path: Path) -> 
 
 @pytest.mark.usefixtures("small_windows")
 @pytest.mark.parametrize("moment", ["before", "after"])
-def test_an_interruption_loses_nothing_and_the_run_can_go_on(
+def test_an_interrupted_logged_run_can_continue_without_lost_samples(
     moment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Ctrl-C in the very middle of a chunk, before or after its window was taken over."""
+    """Ctrl-C during an integration call, before or after the call transferred its window."""
     options = SimulationOptions(stop_time=4.0, sample_time=0.01)
     whole = simulate(SYSTEMS["relay"], options)
     calls = [0]
@@ -167,7 +167,7 @@ def test_an_interruption_loses_nothing_and_the_run_can_go_on(
 
 
 @pytest.mark.usefixtures("small_windows")
-def test_a_run_that_fails_leaves_a_complete_file_up_to_there(tmp_path: Path) -> None:
+def test_the_log_of_a_failed_run_has_all_samples_before_the_failure(tmp_path: Path) -> None:
     options = SimulationOptions(stop_time=4.0, sample_time=0.01)
     system = compile_system(scalar("blow_up", lambda t, x, p: x * x, 1.0))
     with pytest.raises(SimulationError) as caught:
@@ -180,7 +180,7 @@ def test_a_run_that_fails_leaves_a_complete_file_up_to_there(tmp_path: Path) -> 
 
 
 @pytest.mark.usefixtures("small_windows")
-def test_a_signal_that_is_not_finite_ends_the_log_before_it(tmp_path: Path) -> None:
+def test_the_log_ends_before_a_signal_that_is_not_finite(tmp_path: Path) -> None:
     system = compile_system(
         small_system("pole", signals=signature(("pole/y", ())), outputs=lambda t, x, p: 1 / (t - 2.0))
     )
@@ -190,7 +190,7 @@ def test_a_signal_that_is_not_finite_ends_the_log_before_it(tmp_path: Path) -> N
     assert columns[0][-1] == 1.875
 
 
-def test_bad_logs_are_refused_before_the_run(tmp_path: Path) -> None:
+def test_invalid_log_requests_are_refused_before_the_run(tmp_path: Path) -> None:
     options = SimulationOptions()
     with pytest.raises(UnknownNameError, match=r"no log file type named '.npz'"):
         logged(SYSTEMS["relay"], tmp_path / "log.npz", options)
@@ -201,7 +201,7 @@ def test_bad_logs_are_refused_before_the_run(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_log_may_be_larger_than_memory_allows_without_one(tmp_path: Path) -> None:
+def test_a_logged_run_may_have_more_samples_than_fit_in_memory(tmp_path: Path) -> None:
     options = SimulationOptions(stop_time=1e6, sample_time=1e-4)
     with pytest.raises(InputError, match="or log the run to a file"):
         Simulation(SYSTEMS["source"], options)
@@ -212,7 +212,9 @@ def test_a_log_may_be_larger_than_memory_allows_without_one(tmp_path: Path) -> N
     assert result.log is not None and 100_001 <= result.log.rows < 200_000
 
 
-def test_a_disk_that_is_full_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_ends_the_logged_run_with_an_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def full(self: object, table: object) -> None:
         raise OSError(28, "No space left on device")
 

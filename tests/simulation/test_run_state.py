@@ -1,4 +1,4 @@
-"""Continued runs equal uninterrupted runs exactly."""
+"""Saved states: continued runs equal uninterrupted runs exactly."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from armblocks.simulation import RunState, simulate
 
 
 def event_right_after_the_start() -> Diagram:
-    """A mass is pushed until its height, at first 0, is above 0: then a subsystem takes the push away."""
+    """A mass is accelerated from height 0; once the height is positive, a subsystem sets the force to 0."""
     inside = DiagramBuilder("inside")
     inside.add("push", Outport(port=1, initial=1.0), inside.add("none", Constant(value=0.0)))
     builder = DiagramBuilder("pushed")
@@ -50,7 +50,7 @@ SYSTEMS = {
     ("solver", "step"), [("rk45", None), ("dop853", None), ("rk4", 0.013), ("rodas5p", None), ("ros5", 0.013)]
 )
 @pytest.mark.parametrize("name", list(SYSTEMS))
-def test_an_interrupted_run_gives_the_bits_of_an_uninterrupted_one(
+def test_an_interrupted_run_equals_an_uninterrupted_one_bit_for_bit(
     name: str, solver: str, step: float | None, tmp_path: Path
 ) -> None:
     system = SYSTEMS[name]
@@ -77,8 +77,8 @@ def test_an_interrupted_run_gives_the_bits_of_an_uninterrupted_one(
         assert rest.final_state.states.tobytes() == whole.final_state.states.tobytes()
 
 
-def test_a_run_goes_on_from_the_end_of_a_step_that_rounding_puts_beside_the_stop_time() -> None:
-    """Steps of 0.1 s end at 0.9999999999999999 s and the like: each is one instant with a record."""
+def test_a_run_continues_from_a_step_whose_end_is_rounded_beside_the_stop_time() -> None:
+    """Steps of 0.1 s end at times such as 0.9999999999999999 s, which count as the time of a sample."""
     builder = DiagramBuilder("falling")
     push = builder.add("push", Constant())
     builder.add("mass", SecondOrderIntegrator(), push)
@@ -100,7 +100,7 @@ def first_second(system: CompiledSystem = SYSTEMS["sampled"], **more: object) ->
     return state
 
 
-def test_a_state_holds_the_values_at_the_end() -> None:
+def test_a_state_has_the_values_at_the_end_of_the_run() -> None:
     state = first_second()
     assert state.time == 1.0
     assert state.names == (("plant/x",), ("hold/y",), ())
@@ -108,7 +108,7 @@ def test_a_state_holds_the_values_at_the_end() -> None:
     assert state.states[0] == pytest.approx(0.7**3 * (1 - 0.1))
 
 
-def test_other_settings_start_anew_from_the_values() -> None:
+def test_a_run_with_other_settings_restarts_from_the_values() -> None:
     state = first_second()
     result = simulate(
         SYSTEMS["sampled"], SimulationOptions(stop_time=2.0, solver="dop853"), initial_state=state
@@ -118,13 +118,13 @@ def test_other_settings_start_anew_from_the_values() -> None:
     assert result["plant/x"][-1] == pytest.approx(0.7**6 * (1 - 0.2), rel=1e-12)
 
 
-def test_states_can_be_set() -> None:
+def test_the_values_of_a_state_can_be_changed() -> None:
     state = dataclasses.replace(first_second(), states=np.array([5.0]), checkpoint=None)
     result = simulate(SYSTEMS["sampled"], SimulationOptions(stop_time=1.1), initial_state=state)
     assert result["plant/x"][0] == 5.0
 
 
-def test_a_state_of_another_diagram_is_refused() -> None:
+def test_a_state_of_another_diagram_or_with_nan_is_refused() -> None:
     with pytest.raises(InputError, match="does not fit: 'hold/y' is only in one of them"):
         simulate(SYSTEMS["relay"], SimulationOptions(stop_time=2.0), initial_state=first_second())
     bad = dataclasses.replace(first_second(), states=np.array([np.nan]))
@@ -132,19 +132,19 @@ def test_a_state_of_another_diagram_is_refused() -> None:
         simulate(SYSTEMS["sampled"], SimulationOptions(stop_time=2.0), initial_state=bad)
 
 
-def test_a_run_cannot_go_on_backwards() -> None:
+def test_a_stop_time_before_the_time_of_the_state_is_refused() -> None:
     with pytest.raises(InputError, match=r"stop_time is 0\.5 s, and the run goes on from 1 s"):
         simulate(SYSTEMS["sampled"], SimulationOptions(stop_time=0.5), initial_state=first_second())
 
 
 @pytest.mark.parametrize("content", [b"", b"PK", b"not a state at all", b"\x93NUMPY"])
-def test_another_file_is_refused(content: bytes, tmp_path: Path) -> None:
+def test_a_file_that_is_not_a_state_is_refused(content: bytes, tmp_path: Path) -> None:
     (tmp_path / "state").write_bytes(content)
     with pytest.raises(FormatError, match="this file holds no state of a run"):
         RunState.load(tmp_path / "state")
 
 
-def test_changed_parameters_start_anew() -> None:
+def test_a_run_with_changed_parameters_restarts_from_the_values() -> None:
     system = compile_system(oscillator())
     state = first_second(system)
     result = simulate(system, SimulationOptions(stop_time=2.0), {"mass.omega": 3.0}, initial_state=state)

@@ -1,4 +1,4 @@
-"""Whole runs: against closed forms, SciPy and published numbers; choices, chunks, Ctrl-C and progress."""
+"""Runs compared with closed forms, SciPy and published numbers; choice of solver, Ctrl-C and progress."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ VAN_DER_POL = compile_system(van_der_pol_pid())
 
 
 def pendulum() -> CompiledSystem:
-    """A01 of the IFToMM benchmark: 1 kg on a massless rod of 1 m, let go horizontally; angle from down."""
+    """IFToMM benchmark A01: 1 kg on a massless rod of 1 m, released horizontally; angle 0 is downwards."""
     return compile_system(
         system(
             "pendulum",
@@ -44,14 +44,15 @@ def pendulum() -> CompiledSystem:
     )
 
 
-def test_oscillator_follows_its_closed_form_at_every_sample() -> None:
+def test_an_oscillator_agrees_with_its_closed_form_at_every_sample() -> None:
     result = simulate(OSCILLATOR, SimulationOptions(stop_time=20.0, rtol=1e-10, atol=1e-12))
     assert result.time.shape == (1001,)
-    np.testing.assert_allclose(result["mass/x"], np.cos(2 * result.time), atol=2e-8)  # 100 rtol over 6 turns
+    # 100 rtol after 6 periods
+    np.testing.assert_allclose(result["mass/x"], np.cos(2 * result.time), atol=2e-8)
     np.testing.assert_allclose(result["mass/v"], -2 * np.sin(2 * result.time), atol=4e-8)
 
 
-def test_pendulum_reaches_the_published_states() -> None:
+def test_a_pendulum_reaches_the_published_states() -> None:
     """Reference values to 15 digits at 1, 2, 5 and 10 s."""
     published = {
         1.0: (0.98629175113187532, -0.16501085312554117, 0.29690551591631582, 1.7746436411126556),
@@ -69,7 +70,7 @@ def test_pendulum_reaches_the_published_states() -> None:
     assert np.ptp(result["pendulum/energy"]) < 1e-10
 
 
-def test_pendulum_has_its_period_and_keeps_its_energy() -> None:
+def test_a_pendulum_has_the_exact_period_and_constant_energy() -> None:
     period = 4 * ellipk(0.5) / np.sqrt(9.81)
     options = SimulationOptions(stop_time=period, rtol=1e-12, atol=1e-12)
     result = simulate(pendulum(), options)
@@ -78,8 +79,8 @@ def test_pendulum_has_its_period_and_keeps_its_energy() -> None:
 
 
 @pytest.mark.parametrize(("solver", "method"), [("rk45", "RK45"), ("rk23", "RK23"), ("dop853", "DOP853")])
-def test_van_der_pol_takes_the_steps_of_scipy(solver: str, method: str) -> None:
-    """Same accepted steps, same evaluations, same end: ratios of speed are then like for like."""
+def test_steps_and_evaluations_of_van_der_pol_equal_those_of_scipy(solver: str, method: str) -> None:
+    """With equal steps, evaluations and results, the benchmarks compare the speed of the same computation."""
 
     def f(t: float, x: np.ndarray) -> list[float]:
         e = np.sin(2 * np.pi * 0.1 * t) - x[0]
@@ -96,16 +97,16 @@ def test_van_der_pol_takes_the_steps_of_scipy(solver: str, method: str) -> None:
         assert result["position"][-1] == pytest.approx(-0.106502307, abs=1e-9)
 
 
-def test_signals_between_steps_have_the_accuracy_of_the_steps() -> None:
+def test_dense_output_has_the_accuracy_of_the_steps() -> None:
     options = SimulationOptions(stop_time=10.0, rtol=1e-8, atol=1e-10)
     fine = simulate(OSCILLATOR, options)
     error = np.abs(fine["mass/x"] - np.cos(2 * fine.time))
-    assert fine.run.steps < 300 < fine.time.size  # most samples lie between steps
+    assert fine.run.steps < 300 < fine.time.size  # most samples are between steps
     assert error.max() < 5e-7
 
 
 def jumping() -> CompiledSystem:
-    """A step source of height 1 at 0.35 s, and its integral."""
+    """A step source with a jump of 1 at 0.35 s, and its integral."""
 
     def step(t: SX, p: SX) -> SX:
         return ca.if_else(t < p, SX(0), SX(1))
@@ -126,8 +127,8 @@ def jumping() -> CompiledSystem:
 
 
 @pytest.mark.parametrize("solver", ["euler", "rk4", "rk45", "dop853"])
-def test_a_jump_is_met_exactly_and_its_new_value_holds_at_its_instant(solver: str) -> None:
-    """Integral of a step: exact for every method, as no step crosses the jump."""
+def test_steps_end_at_a_jump_and_the_new_value_holds_at_its_time(solver: str) -> None:
+    """The integral of a step is exact for every method because no integrator step crosses the jump."""
     result = simulate(jumping(), SimulationOptions(stop_time=1.0, solver=solver, sample_time=0.05))
     np.testing.assert_allclose(result["integrator/y"], np.maximum(result.time - 0.35, 0), atol=1e-15)
     assert result["step/y"].tolist() == (result.time >= 0.35).astype(float).tolist()
@@ -154,7 +155,7 @@ def test_a_system_without_states_is_evaluated_directly() -> None:
     np.testing.assert_allclose(result["pose/T"][:, 0, 1], -np.sin(result.time), atol=1e-15)
 
 
-def test_the_choice_of_solver_and_its_reason_are_told() -> None:
+def test_the_run_report_has_the_solver_and_the_reason_of_its_choice() -> None:
     automatic = simulate(OSCILLATOR, SimulationOptions(stop_time=1.0)).run
     assert automatic.solver == "rk45"
     assert "auto" in automatic.reason
@@ -167,7 +168,7 @@ def test_the_choice_of_solver_and_its_reason_are_told() -> None:
     assert asked.real_time_factor == pytest.approx(1.0 / asked.wall_time)
 
 
-def test_stop_time_zero_gives_one_row() -> None:
+def test_stop_time_zero_gives_one_sample() -> None:
     for solver in ("rk45", "rk4"):
         result = simulate(OSCILLATOR, SimulationOptions(stop_time=0.0, solver=solver))
         assert result.time.tolist() == [0.0]
@@ -180,7 +181,7 @@ def test_max_step_bounds_every_step() -> None:
     assert result.run.steps >= 1000
 
 
-def test_parameters_change_a_run_and_are_kept_with_it() -> None:
+def test_parameters_change_a_run_and_are_part_of_the_result() -> None:
     options = SimulationOptions(stop_time=3.0, rtol=1e-9, atol=1e-12)
     fast = simulate(OSCILLATOR, options, {"mass.omega": 5.0})
     flat = simulate(OSCILLATOR, options, np.array([5.0]))
@@ -190,7 +191,7 @@ def test_parameters_change_a_run_and_are_kept_with_it() -> None:
     assert OSCILLATOR.parameter_values.tolist() == [2.0]
 
 
-def test_progress_is_told_up_to_the_end() -> None:
+def test_progress_is_reported_until_the_end() -> None:
     told: list[tuple[float, float, float]] = []
     result = simulate(
         OSCILLATOR,
@@ -205,7 +206,7 @@ def test_progress_is_told_up_to_the_end() -> None:
     assert len(told) <= 2 + result.run.wall_time * 17
 
 
-def test_ctrl_c_keeps_what_is_there_and_marks_it() -> None:
+def test_ctrl_c_returns_the_computed_samples_marked_as_incomplete() -> None:
     def interrupt(time: float, fraction: float, factor: float) -> None:
         raise KeyboardInterrupt
 
@@ -222,7 +223,7 @@ def test_ctrl_c_keeps_what_is_there_and_marks_it() -> None:
 
 
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="POSIX timers")
-def test_a_signal_from_outside_ends_a_long_native_run_soon() -> None:
+def test_a_unix_signal_ends_a_long_native_run_promptly() -> None:
     def interrupt(number: int, frame: object) -> None:
         raise KeyboardInterrupt
 
@@ -231,13 +232,13 @@ def test_a_signal_from_outside_ends_a_long_native_run_soon() -> None:
         OSCILLATOR.integrator(find_tableau("rk4"))
         used = time.process_time()
         signal.setitimer(signal.ITIMER_REAL, 0.15)
-        options = SimulationOptions(stop_time=1e6, solver="rk4", step=1e-4, sample_time=1.0)  # minutes
+        options = SimulationOptions(stop_time=1e6, solver="rk4", step=1e-4, sample_time=1.0)  # takes minutes
         result = simulate(OSCILLATOR, options)
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, previous)
     assert not result.run.complete
-    assert time.process_time() - used < 5.0  # of minutes that the whole run takes
+    assert time.process_time() - used < 5.0  # the whole run takes minutes
 
 
 def test_runs_repeat_bit_for_bit() -> None:
@@ -247,8 +248,8 @@ def test_runs_repeat_bit_for_bit() -> None:
     assert run().signals.tobytes() == run().signals.tobytes()
 
 
-def test_sample_instants_do_not_accumulate_rounding() -> None:
-    """After a million samples of 0.1 s the time is 1e5 s within one rounding."""
+def test_sample_times_have_no_accumulated_rounding_error() -> None:
+    """After a million samples of 0.1 s the time is 1e5 s up to one rounding error."""
     still = compile_system(scalar("still", lambda t, x, p: SX(0) * x, 1.0))
     options = SimulationOptions(stop_time=1e5, solver="euler", step=0.1, sample_time=0.1)
     result = simulate(still, options)

@@ -29,7 +29,7 @@ def source_only() -> HybridSystem:
 
 
 def stepped_lag() -> HybridSystem:
-    """``x' = 1 - x`` from a time on that is a parameter, ``x' = -x`` before it."""
+    """``x' = 1 - x`` after a time that is a parameter, ``x' = -x`` before it."""
     return scalar(
         "lag",
         lambda t, x, p: ca.if_else(t >= p[0], 1.0, 0.0) - x,
@@ -57,7 +57,7 @@ def options(stop: float = 4.0, solver: str = "rk45", step: float | None = None) 
 
 
 def same_run(one: SimulationResult, other: SimulationResult) -> None:
-    """The same bits in all that a run gives, but for how long it took."""
+    """Check that all results of two runs are equal bit for bit, except for the wall time."""
     assert one.time.tobytes() == other.time.tobytes()
     assert one.signals.tobytes() == other.signals.tobytes()
     timeless = [
@@ -72,7 +72,7 @@ def same_run(one: SimulationResult, other: SimulationResult) -> None:
 
 @pytest.mark.parametrize(("solver", "step"), SOLVERS)
 @pytest.mark.parametrize("name", list(SYSTEMS))
-def test_a_run_in_pieces_gives_the_bits_of_a_run_in_one_go(
+def test_a_run_with_pauses_equals_a_run_without_bit_for_bit(
     name: str, solver: str, step: float | None
 ) -> None:
     system = SYSTEMS[name]
@@ -92,7 +92,7 @@ def test_a_run_in_pieces_gives_the_bits_of_a_run_in_one_go(
 
 
 @pytest.mark.parametrize("name", list(SYSTEMS))
-def test_what_is_streamed_is_what_is_recorded(name: str) -> None:
+def test_streamed_samples_equal_the_recorded_samples(name: str) -> None:
     run = Simulation(SYSTEMS[name], options())
     seen, times, signals = 0, [], []
     while not run.finished:
@@ -112,7 +112,7 @@ def test_what_is_streamed_is_what_is_recorded(name: str) -> None:
 
 @pytest.mark.parametrize("exactly", [False, True])
 @pytest.mark.parametrize(("solver", "step"), SOLVERS)
-def test_a_changed_parameter_joins_two_runs_by_their_state(
+def test_a_run_with_a_changed_parameter_equals_two_runs_joined_by_their_state(
     solver: str, step: float | None, exactly: bool
 ) -> None:
     system, settings = compile_system(oscillator()), options(solver=solver, step=step)
@@ -127,7 +127,7 @@ def test_a_changed_parameter_joins_two_runs_by_their_state(
     run.advance()
     joined = run.result()
     rest = simulate(system, settings, parameters=change, initial_state=state)
-    # The run that goes on records the instant of its start beside the common grid.
+    # The continued run also records its start time, besides the common grid.
     assert joined.time[recorded:].tobytes() == rest.time[1:].tobytes()
     assert joined.signals[:, recorded:].tobytes() == rest.signals[:, 1:].tobytes()
     first = simulate(system, options(stop=1.23, solver=solver, step=step))
@@ -138,8 +138,8 @@ def test_a_changed_parameter_joins_two_runs_by_their_state(
     assert joined.parameters[names[0]] == 3.0
 
 
-def test_breakpoints_follow_a_changed_parameter() -> None:
-    # x' = (t >= p) - x: the jump is met exactly although it was moved while the run was paused.
+def test_breakpoints_depend_on_a_changed_parameter() -> None:
+    # x' = (t >= p) - x: a step ends at the jump although it was moved while the run was paused.
     system = compile_system(stepped_lag())
     run = Simulation(system, SimulationOptions(stop_time=3.0, sample_time=0.01, rtol=1e-10, atol=1e-12))
     run.advance(0.7, exactly=True)
@@ -148,10 +148,10 @@ def test_breakpoints_follow_a_changed_parameter() -> None:
     result = run.result()
     after = np.maximum(0.0, result.time - 2.25)
     np.testing.assert_allclose(result["block/y"], 1.0 - np.exp(-after), atol=1e-9)
-    assert run.result().run.rejected <= 2  # a jump that is not met costs many
+    assert run.result().run.rejected <= 2  # a jump within a step causes many rejected steps
 
 
-def test_a_change_before_the_first_step_is_as_if_said_at_the_start() -> None:
+def test_a_parameter_change_before_the_first_step_equals_one_at_the_start() -> None:
     system = compile_system(oscillator())
     name = system.parameters.names[0]
     run = Simulation(system, options())
@@ -161,7 +161,7 @@ def test_a_change_before_the_first_step_is_as_if_said_at_the_start() -> None:
     assert run.result().parameter_changes == ()
 
 
-def test_signals_without_states_follow_a_changed_parameter() -> None:
+def test_signals_without_states_depend_on_a_changed_parameter() -> None:
     system = SYSTEMS["source"]
     name = system.parameters.names[0]
     run = Simulation(system, options())
@@ -176,7 +176,7 @@ def test_signals_without_states_follow_a_changed_parameter() -> None:
     np.testing.assert_array_equal(mixed.signals[:, ~early], after.signals[:, ~early])
 
 
-def test_a_run_that_has_ended_takes_no_parameters() -> None:
+def test_a_parameter_change_after_the_end_is_refused() -> None:
     system = compile_system(oscillator())
     run = Simulation(system, options())
     with pytest.raises(UnknownNameError):
@@ -189,7 +189,7 @@ def test_a_run_that_has_ended_takes_no_parameters() -> None:
     assert caught.value.fix == "begin another run with the new values"
 
 
-def test_a_stopped_run_keeps_what_it_has_and_goes_no_further() -> None:
+def test_a_stopped_run_keeps_its_samples_and_does_not_continue() -> None:
     run = Simulation(SYSTEMS["relay"], options())
     run.advance(1.0)
     run.stop("enough seen")
@@ -200,7 +200,7 @@ def test_a_stopped_run_keeps_what_it_has_and_goes_no_further() -> None:
     assert not result.run.complete and result.run.message == "enough seen"
 
 
-def test_a_failed_run_says_so_each_time() -> None:
+def test_a_failed_run_raises_the_same_error_each_time() -> None:
     run = Simulation(compile_system(scalar("blow_up", lambda t, x, p: x * x, 1.0)), options())
     with pytest.raises(SimulationError) as first:
         run.advance()
@@ -211,7 +211,7 @@ def test_a_failed_run_says_so_each_time() -> None:
     assert isinstance(first.value.partial, SimulationResult)
 
 
-def test_many_single_steps_do_not_make_the_next_piece_of_the_run_long() -> None:
+def test_many_single_steps_do_not_lengthen_the_next_timed_advance() -> None:
     run = Simulation(SYSTEMS["van_der_pol"], options(1e4, "rk4", 1e-3))
     for _ in range(1100):
         run.advance(steps=1)

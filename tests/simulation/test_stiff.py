@@ -37,12 +37,12 @@ STIFF_LAG = compile_system(scalar("lag", lambda t, x, p: -1e6 * (x - ca.cos(t)),
 
 @pytest.mark.parametrize(("rtol", "error"), [(1e-4, 1e-4), (1e-6, 2e-6), (1e-9, 2e-9)])
 def test_robertson_to_1e11_seconds(rtol: float, error: float) -> None:
-    """About the digits that were asked for, in a few hundred steps over 11 decades."""
+    """The accuracy is near the tolerance, with at most 1500 steps over 11 decades of time."""
     options = SimulationOptions(stop_time=1e11, solver="rodas5p", rtol=rtol, atol=rtol * 1e-8)
     result = simulate(ROBERTSON, options)
     np.testing.assert_allclose(result["y"][-1], ROBERTSON_END, rtol=error)
     assert result.run.steps < 1500
-    # Sums of the three are kept by the equations, and so by every Rosenbrock method.
+    # The equations conserve the sum of the three substances, and so does every Rosenbrock method.
     np.testing.assert_allclose(result["y"].sum(axis=1), 1.0, rtol=1e-12)
 
 
@@ -52,7 +52,7 @@ def test_robertson_with_the_conservation_law_as_an_implicit_equation() -> None:
     found = np.array([result[name][-1] for name in "abc"])
     np.testing.assert_allclose(found, ROBERTSON_END, rtol=1e-5)
     total = result["a"] + result["b"] + result["c"]
-    np.testing.assert_allclose(total, 1.0, rtol=1e-15)  # solved at every instant, not drifting
+    np.testing.assert_allclose(total, 1.0, rtol=1e-15)  # solved at every sample, without drift
 
 
 @pytest.mark.parametrize(("rtol", "error"), [(1e-4, 1e-3), (1e-6, 1e-6), (1e-9, 1e-9)])
@@ -63,14 +63,14 @@ def test_van_der_pol_with_mu_1000(rtol: float, error: float) -> None:
 
 
 @pytest.mark.parametrize("name", list(KINETICS))
-def test_chemical_kinetics_against_radau(name: str) -> None:
-    """SciPy's Radau at 1e-9 shares nothing with these methods: it keeps a thousandth of what is allowed."""
+def test_chemical_kinetics_agree_with_radau(name: str) -> None:
+    """SciPy's Radau at 1e-9 is an independent method; its error is a thousandth of the allowed difference."""
     rates, start, stop = KINETICS[name]
     system = compile_system(kinetics(name))
     expected = solve_ivp(
         lambda t, y: rates(y), (0, stop), start, method="Radau", rtol=1e-9, atol=1e-14, dense_output=True
     ).sol
-    # Order 2 keeps fewer digits along the oscillator's steep fronts.
+    # The method of order 2 is less accurate at the steep fronts of the oscillator.
     for solver, rtol, allowed in (("rodas5p", 1e-8, 2e-6), ("ros23", 1e-6, 5e-3)):
         result = simulate(system, SimulationOptions(stop_time=stop, solver=solver, rtol=rtol, atol=1e-12))
         time = result.time[::100]
@@ -78,7 +78,7 @@ def test_chemical_kinetics_against_radau(name: str) -> None:
 
 
 def test_heat_in_a_rod_of_500_states() -> None:
-    """Fastest rate 1e6 1/s: few steps, each of work in proportion to the states."""
+    """The fastest rate is 1e6 1/s: few steps, each with work proportional to the number of states."""
     rod, mode, rate = heat(500)
     compiled = compile_system(rod)
     result = simulate(compiled, SimulationOptions(stop_time=0.3, solver="rodas5p", rtol=1e-8, atol=1e-12))
@@ -87,28 +87,28 @@ def test_heat_in_a_rod_of_500_states() -> None:
     assert result.run.steps < 100
     space = compiled.integrator(RODAS5P).space
     assert space is not None and space.plan is not None
-    assert space.plan.filled == 500 + 2 * 499  # nothing fills in
+    assert space.plan.filled == 500 + 2 * 499  # no fill-in
 
 
-def test_pendulum_of_index_1_keeps_its_period() -> None:
-    """The values at 10 s follow from elliptic functions; the rod is kept by its force alone."""
+def test_a_pendulum_of_index_1_reaches_the_exact_state() -> None:
+    """Elliptic functions give the values at 10 s; only the rod force keeps the length of the rod."""
     result = simulate(
         compile_system(pendulum()),
         SimulationOptions(stop_time=10.0, solver="rodas5p", rtol=1e-10, atol=1e-12),
     )
     expected = [-0.27508746257611686, -0.96141920509912506, 4.1755981009517288, -1.1947490545604753]
     found = [result[name][-1] for name in ("x", "y", "vx", "vy")]
-    np.testing.assert_allclose(found, expected, atol=1e-6)  # 4 revolutions at 1e-10 a step
+    np.testing.assert_allclose(found, expected, atol=1e-6)  # 10 s with a tolerance of 1e-10 per step
     np.testing.assert_allclose(result["x"] ** 2 + result["y"] ** 2, 1.0, atol=1e-7)
 
 
-def test_an_implicit_loop_is_solved_at_every_stage() -> None:
+def test_an_implicit_equation_is_solved_at_every_stage() -> None:
     result = simulate(compile_system(loop_of_cosine()), SimulationOptions(stop_time=1.0, solver="rodas5p"))
     np.testing.assert_allclose(result["loop/u"], 0.7390851332151607, rtol=1e-14)
 
 
-def test_a_loop_that_becomes_singular_is_named() -> None:
-    """``w^2 = x`` with ``x = 1 - t``: at 1 s both solutions meet and there is none after it."""
+def test_an_implicit_equation_that_becomes_singular_is_reported() -> None:
+    """``w^2 = x`` with ``x = 1 - t``: at 1 s the two solutions coincide, and later there is none."""
     ending = hybrid(
         "ending",
         states=("tank/x",),
@@ -128,8 +128,8 @@ def test_a_loop_that_becomes_singular_is_named() -> None:
 
 
 @pytest.mark.parametrize("solver", ["rodas5p", "ros23"])
-def test_events_and_ticks_are_those_of_the_explicit_methods(solver: str) -> None:
-    """Bounces at their known times, samples of a lag of 1e-4 s that follows the ball."""
+def test_events_and_ticks_are_at_the_known_times_with_stiff_methods(solver: str) -> None:
+    """A ball with known bounce times, and samples of a lag of 1e-4 s that follows its height."""
     impacts = [0.451523640985731, 1.08365673836575, 1.52614990653177]
     system = compile_system(ball_on_fast_plate())
     options = SimulationOptions(stop_time=1.6, solver=solver, sample_time=0.01, rtol=1e-9, atol=1e-11)
@@ -138,42 +138,42 @@ def test_events_and_ticks_are_those_of_the_explicit_methods(solver: str) -> None
     assert result.run.events == 3
     last = np.unique(result["last"])
     np.testing.assert_allclose(last[1:], impacts, atol=1e-9)
-    # Far from a bounce the lag is behind by v / rate.
+    # Far from a bounce the lag has the error v / rate.
     at = np.searchsorted(result.time, 0.3 - 1e-9)
     behind = result["h"][at] - result["v"][at] / 1e4
     assert result["lag"][at] == pytest.approx(behind, abs=1e-6)
     assert result["hold"][at] == result["lag"][at]
 
 
-# The linearised input of implicit Euler misses h^2 / 2 of the cosine.
+# Implicit Euler linearises its input, with an error of h^2 / 2 for the cosine.
 @pytest.mark.parametrize(("solver", "error"), [("ros5", 2e-6), ("implicit_euler", 5.1e-5)])
-def test_fixed_steps_far_beyond_the_stability_of_explicit_methods(solver: str, error: float) -> None:
-    """Steps of 0.01 s for a lag of 1e-6 s: it follows its input, to the order of the method."""
+def test_fixed_steps_far_above_the_stability_limit_of_explicit_methods(solver: str, error: float) -> None:
+    """Steps of 0.01 s for a lag of 1e-6 s: the output equals the input up to the order of the method."""
     result = simulate(STIFF_LAG, SimulationOptions(stop_time=2.0, solver=solver, step=0.01))
     assert result.run.steps == 200
     np.testing.assert_allclose(result["block/y"], np.cos(result.time), atol=error)
 
 
-def test_an_infinite_slope_of_the_derivative_is_survived() -> None:
-    """``x' = 1 - sqrt(x)`` from 0, with an infinite Jacobian; ``t = -2 (s + log(1 - s))``, s the root."""
+def test_an_initially_infinite_jacobian_does_not_end_the_run() -> None:
+    """``x' = 1 - sqrt(x)`` from 0, where the Jacobian is infinite; ``t = -2 (s + log(1 - s))``, s² = x."""
     tank = compile_system(scalar("tank", lambda t, x, p: 1.0 - ca.sqrt(x), 0.0))
     result = simulate(tank, SimulationOptions(stop_time=3.0, solver="rodas5p", rtol=1e-8, atol=1e-12))
     s = np.sqrt(result["block/y"])
     np.testing.assert_allclose(-2.0 * (s + np.log1p(-s)), result.time, atol=1e-5)
 
 
-def test_auto_goes_over_to_the_stiff_method_and_says_so() -> None:
+def test_auto_changes_to_the_stiff_method_and_reports_it() -> None:
     result = simulate(STIFF_LAG, SimulationOptions(stop_time=10.0))
     assert result.run.solver == "rk45, then rodas5p"
     assert result.run.reason.startswith("auto: Dormand-Prince 5(4) until 0.0")
     assert "then Rodas5P 5(4), because the system is stiff" in result.run.reason
     assert result.run.message == ""
-    assert result.run.steps < 10_000  # it would be three millions
+    assert result.run.steps < 10_000  # the explicit method needs three million
     np.testing.assert_allclose(result["block/y"], np.cos(result.time), atol=1e-5)
 
 
-def test_auto_stays_explicit_where_accuracy_bounds_the_steps() -> None:
-    """The longest step does here: many steps, none of them at the border of stability."""
+def test_auto_stays_explicit_if_stability_does_not_limit_the_steps() -> None:
+    """Here ``max_step`` limits the steps: many steps, none at the limit of stability."""
     quiet = compile_system(scalar("quiet", lambda t, x, p: ca.cos(t) - x, 0.0))
     result = simulate(quiet, SimulationOptions(stop_time=100.0, max_step=0.01))
     assert result.run.steps >= 10_000
@@ -183,7 +183,7 @@ def test_auto_stays_explicit_where_accuracy_bounds_the_steps() -> None:
 
 @pytest.mark.parametrize("cuts", [[0.001], [0.03, 0.5], [0.02, 0.3, 0.6]])
 def test_an_interrupted_automatic_run_gives_the_same_bits(cuts: list[float], tmp_path: Path) -> None:
-    """Cut before the change of the method, after it, and both."""
+    """Interruptions before the change of the method, after it, and both."""
 
     def options(stop: float) -> SimulationOptions:
         return SimulationOptions(stop_time=stop, sample_time=0.0005)
@@ -206,8 +206,8 @@ def test_an_interrupted_automatic_run_gives_the_same_bits(cuts: list[float], tmp
     assert rest.signals[:, np.isin(rest.time, whole.time)].tobytes() == whole.signals[:, same].tobytes()
 
 
-def test_chunks_of_steps_do_not_move_the_change_of_method() -> None:
-    """However often the loop is looked after, it pauses at the same step."""
+def test_pauses_between_steps_do_not_move_the_change_of_the_method() -> None:
+    """The loop requests the other method at the same step for any number of steps per call."""
     native = STIFF_LAG.integrator(RK45)
     times = []
     for chunk in (10**6, 777, 1000):
@@ -220,7 +220,7 @@ def test_chunks_of_steps_do_not_move_the_change_of_method() -> None:
     assert times[0] == times[1] == times[2]
 
 
-def test_blow_up_under_a_stiff_method_is_reported_where_it_happens() -> None:
+def test_unbounded_growth_with_a_stiff_method_is_reported_with_its_time() -> None:
     blow_up = compile_system(scalar("blow_up", lambda t, x, p: x * x, 1.0))
     with pytest.raises(SimulationError, match="the step became as small as the rounding") as error:
         simulate(blow_up, SimulationOptions(stop_time=2.0, solver="rodas5p"))
@@ -230,7 +230,7 @@ def test_blow_up_under_a_stiff_method_is_reported_where_it_happens() -> None:
     assert time == pytest.approx(1.0, abs=1e-3)
 
 
-def test_a_root_of_a_negative_number_is_named_under_a_stiff_method() -> None:
+def test_a_root_of_a_negative_number_is_reported_with_a_stiff_method() -> None:
     falling = compile_system(scalar("falling", lambda t, x, p: -ca.sqrt(1.0 - t) - 1e3 * x, 1.0))
     with pytest.raises(SimulationError, match="the derivative of state 'block/x' is not finite at 1"):
         simulate(falling, SimulationOptions(stop_time=2.0, solver="rodas5p"))

@@ -1,4 +1,4 @@
-"""Contract of every integrator table: order of the steps, order between them, agreement with NumPy, names."""
+"""Contract of every integrator tableau: orders of steps and dense output, agreement with NumPy, names."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from armblocks.simulation.tableaux import DEFAULT, TABLEAUX, find_tableau
 every_tableau = pytest.mark.parametrize("tableau", TABLEAUX, ids=[t.name for t in TABLEAUX])
 
 # x' = 2 t x log y, y' = -2 t y log x: x = exp(sin t^2), y = exp(cos t^2). Hairer, Norsett, Wanner I, II.4,
-# exercise: nonlinear in everything, so no error term is zero by chance.
+# exercise: nonlinear in t, x and y, so that no error term vanishes.
 PROBLEM = compile_system(
     system(
         "logarithms",
@@ -39,9 +39,9 @@ def exact(t: np.ndarray) -> np.ndarray:
 
 
 def fixed_step_errors(tableau: Tableau, steps: int) -> tuple[float, float]:
-    """Largest error at the ends of ``steps`` steps over 2 s, and at three instants inside each."""
+    """Return the largest error at the ends of ``steps`` steps over 2 s, and at three times inside each."""
     fixed = tableau
-    if tableau.adaptive:  # the same table, its error estimate left out
+    if tableau.adaptive:  # the same tableau without its error estimate
         fixed = replace(tableau, error=None, error_order=0)
         if isinstance(fixed, ButcherTableau):
             fixed = replace(fixed, stretched_error=None)
@@ -58,8 +58,8 @@ def fixed_step_errors(tableau: Tableau, steps: int) -> tuple[float, float]:
 
 
 @every_tableau
-def test_halving_the_step_shows_the_order(tableau: Tableau) -> None:
-    # Steps for which the error is well above rounding and small enough for the leading term to rule.
+def test_half_the_step_reduces_the_error_according_to_the_order(tableau: Tableau) -> None:
+    # Steps for which the error is well above rounding and dominated by its leading term.
     steps = {1: 400, 2: 200, 3: 100, 4: 60, 5: 80, 8: 16}[tableau.order]
     coarse, fine = fixed_step_errors(tableau, steps), fixed_step_errors(tableau, 2 * steps)
     assert np.log2(coarse[0] / fine[0]) > tableau.order - 0.3
@@ -67,8 +67,8 @@ def test_halving_the_step_shows_the_order(tableau: Tableau) -> None:
 
 
 @every_tableau
-def test_native_loop_agrees_with_plain_numpy(tableau: Tableau) -> None:
-    """Same step counts, evaluations and numbers up to rounding, with breakpoints and dense output."""
+def test_the_native_loop_agrees_with_the_numpy_integrator(tableau: Tableau) -> None:
+    """Equal steps, evaluations and values up to rounding, with breakpoints and dense output."""
     compiled = compile_system(van_der_pol_pid())
     p = np.empty(0)
 
@@ -90,11 +90,12 @@ def test_native_loop_agrees_with_plain_numpy(tableau: Tableau) -> None:
         counts.rejected,
         counts.evaluations,
     )
-    np.testing.assert_allclose(run.states, expected, rtol=1e-10, atol=1e-11)  # rounding, grown over 6 s
+    # rounding errors, amplified over 6 s
+    np.testing.assert_allclose(run.states, expected, rtol=1e-10, atol=1e-11)
 
 
 @every_tableau
-def test_every_table_says_where_it_is_from(tableau: Tableau) -> None:
+def test_every_tableau_has_a_source(tableau: Tableau) -> None:
     assert tableau.title
     assert len(tableau.source) > 15
     if isinstance(tableau, ButcherTableau):
@@ -116,12 +117,12 @@ def test_names_and_aliases_are_unique_and_found_in_any_case() -> None:
     assert DEFAULT.name == "rk45"
 
 
-def test_unknown_solver_says_the_nearest() -> None:
+def test_an_unknown_solver_is_refused_with_the_nearest_name() -> None:
     with pytest.raises(UnknownNameError, match=r"no solver named 'rk455'.*did you mean 'rk45'"):
         find_tableau("rk455")
 
 
-def test_stability_intervals_are_the_published_ones() -> None:
+def test_stability_intervals_agree_with_the_published_ones() -> None:
     """Hairer, Wanner II, IV.2, table 2.1: 2.51 for order 3, 2.785 for RK4, 3.3 for Dormand-Prince."""
     published = {"euler": 2.0, "heun": 2.0, "rk3": 2.51, "rk4": 2.785, "rk45": 3.3}
     for name, value in published.items():
