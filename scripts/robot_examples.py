@@ -97,18 +97,18 @@ def puma560_multirate() -> Diagram:
     builder.add("Tracking error", Scope(), lag)
     builder.add("Currents", Scope(), motors["i"])
     builder.add("Voltages", Scope(), current)
-    builder.place(position, 200, 150, width=130)
+    builder.place(position, 200, 161, width=130)
     for name, x, y in (
         ("path", 40, 160),
-        ("1 kHz", 400, 180),
-        ("to current", 520, 180),
+        ("1 kHz", 400, 190),
+        ("to current", 520, 189),
         ("current error", 660, 180),
-        ("current loop", 780, 180),
-        ("motors", 960, 180),
+        ("current loop", 780, 172),
+        ("motors", 960, 184),
         ("arm", 1140, 200),
-        ("plot", 1340, 180),
+        ("plot", 1340, 179),
         ("position error", 1340, 60),
-        ("Tracking error", 1480, 60),
+        ("Tracking error", 1480, 47),
         ("Currents", 1140, 80),
         ("Voltages", 960, 60),
     ):
@@ -137,12 +137,12 @@ def dc_motor_sampled_pid() -> Diagram:
     builder.add("Voltage", Scope(), voltage)
     for name, x, y in (
         ("wanted speed", 40, 160),
-        ("error", 180, 165),
-        ("controller", 300, 155),
+        ("error", 180, 168),
+        ("controller", 300, 160),
         ("load", 300, 280),
-        ("motor", 500, 165),
+        ("motor", 500, 163),
         ("both", 720, 50),
-        ("Speed", 840, 40),
+        ("Speed", 840, 44),
         ("Current", 720, 150),
         ("Voltage", 500, 40),
     ):
@@ -178,19 +178,19 @@ def puma560_payload_drop() -> Diagram:
     builder.add("Joint angles", Scope(), arm["q"])
     builder.add("Joint torques", Scope(), held)
     builder.add("Tool path", XYGraph(), tool["x"], tool["z"])
-    builder.place(control, 200, 150, width=130)
+    builder.place(control, 200, 161, width=130)
     for name, x, y in (
         ("path", 40, 160),
         ("1 kHz", 420, 190),
         ("payload", 420, 300),
-        ("arm", 600, 200),
+        ("arm", 600, 188),
         ("error", 820, 60),
-        ("Tracking error", 980, 60),
+        ("Tracking error", 980, 47),
         ("Joint angles", 980, 150),
         ("plot", 820, 320),
         ("fkine", 820, 240),
-        ("tool", 980, 240),
-        ("Tool path", 1140, 240),
+        ("tool", 980, 238),
+        ("Tool path", 1140, 234),
         ("Joint torques", 600, 60),
     ):
         builder.place(name, x, y)
@@ -262,13 +262,13 @@ def kr180_pick_and_place() -> Diagram:
         ("released", 40, 400),
         ("payload", 180, 350),
         ("no force", 180, 260),
-        ("rne", 340, 220),
+        ("rne", 340, 209),
         ("Joint torques", 560, 250),
         ("Joint angles", 340, 20),
         ("Joint speeds", 340, 110),
         ("plot", 560, 20),
-        ("fkine", 560, 130),
-        ("T2xyz", 720, 130),
+        ("fkine", 560, 139),
+        ("T2xyz", 720, 137),
         ("Seen from above", 880, 90),
         ("Height over y", 880, 200),
     ):

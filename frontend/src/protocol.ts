@@ -145,7 +145,7 @@ export interface Place {
 /**
  * A wire between two ports, written ``block/port``.
  *
- * ``bends``: the corners of a route drawn by the user, see :func:`armblocks.drawing.wire_routing.bent`.
+ * ``bends``: the corners of a route drawn by the user, see :func:`armblocks.drawing.wires.bent`.
  */
 export interface Wire {
   source: string;

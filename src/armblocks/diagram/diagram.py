@@ -87,7 +87,7 @@ class Diagram:
 
     ``blocks`` is sorted by name and ``connections`` by ends, so that equal diagrams compare equal. ``layout``
     may name only some blocks, and ``bends`` only some connections: those with a user-drawn route, see
-    :func:`armblocks.drawing.wire_routing.bent`; ``notes`` are annotations by name. ``mask`` has the
+    :func:`armblocks.drawing.wires.bent`; ``notes`` are annotations by name. ``mask`` has the
     parameters that it declares (see :mod:`armblocks.diagram.mask`) and ``mask_values`` their values (by
     default the default values). Block parameters that are formulas have the values computed from these.
     ``link`` names the entry of a library file from which the diagram comes, ``servos.json#JointServo``, or is

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import IntEnum
 
 from armblocks.diagram import (
     Block,
@@ -36,16 +35,17 @@ from armblocks.drawing.face_marks import Room
 from armblocks.drawing.rates import Rates
 from armblocks.drawing.sink_faces import Trend
 from armblocks.drawing.structure_faces import control_ports
-from armblocks.drawing.wire_routing import Net, Obstacle, Point, RoutedNet, WireEnd, route
+from armblocks.drawing.wire_marks import WireKind, arrow_head, label_marks, rounded, wire_marks
+from armblocks.drawing.wire_routing import route
+from armblocks.drawing.wires import Net, Obstacle, RoutedNet, WireEnd
 from armblocks.errors import DiagramError, UnknownNameError
-from armblocks.pictures.picture import Curve, Disc, Group, Mark, Picture, Polyline, Text, moved, turned
+from armblocks.pictures.picture import Curve, Group, Mark, Picture, Polyline, Text, moved, turned
 from armblocks.pictures.style import Theme, Tone
 from armblocks.pictures.svg import svg_file
 from armblocks.pictures.text_width import shorten, text_width
 from armblocks.simulation.result import SimulationResult
 
 _MARGIN = 22.0
-_ROUNDING = 5.0
 NOTE_SIZE = 12.0
 NOTE_LINE = 17.0
 """px: type size and line height of notes."""
@@ -77,7 +77,7 @@ def diagram_picture(
     for (source, _), net in zip(wires.items(), routed):
         kind = carried.kind(PortRef(path + source.block, source.port))
         _, tone = clocks.mark(path + source.block) or ("", Tone.WIRE)
-        marks += _wire(net, kind, _wire_title(source, wires[source]), tone)
+        marks += wire_marks(net, kind, _wire_title(source, wires[source]), tone)
     for name, box in placed.items():
         trend = _trend(path + name, carried.views.get(path + name), result)
         block = _block(box, trend)
@@ -85,6 +85,8 @@ def diagram_picture(
             place = box.x + box.width, box.y - 4
             block.append(Text(*place, mark[0], NAME_SIZE - 1.5, mark[1], "end", bold=True))
         marks.append(Group(tuple(block), title=_block_title(name, box)))
+    for (source, _), wire_net, net in zip(wires.items(), nets, routed):
+        marks += label_marks(wire_net, net, wire_label(level, source))
     marks += _notes(level)
     left, top, right, bottom = _extent(placed, routed, level)
     picture = Picture(
@@ -124,9 +126,9 @@ def block_picture(block: Block) -> Picture:
         reach = -_STUB if enters else _STUB
         port, outside = (spot.x, spot.y), (spot.x + reach * spot.dx, spot.y + reach * spot.dy)
         path = (outside, port) if enters else (port, outside)
-        marks.append(Curve(_rounded(path), stroke=Tone.WIRE, width=1.2))
+        marks.append(Curve(rounded(path), stroke=Tone.WIRE, width=1.2))
         if enters:
-            marks.append(_arrow_head(path))
+            marks.append(arrow_head(path))
     marks += [mark for mark in _block(box, None) if not isinstance(mark, Text) or mark.text]
     above, below = (any(spot.dy == way for spot in box.inputs) for way in (1, -1))
     picture = Picture(
@@ -161,6 +163,11 @@ def wire_nets(diagram: Diagram, placed: dict[str, Box]) -> tuple[list[Net], dict
 def _end(spots: tuple[PortSpot, ...], port: str) -> WireEnd:
     spot = next(spot for spot in spots if spot.name == port)
     return WireEnd(spot.x, spot.y, spot.dx, spot.dy)
+
+
+def wire_label(diagram: Diagram, source: PortRef) -> str:
+    """What stands at both ends of a wire without a line: the block, and its port where it has several."""
+    return source.block if len(diagram.blocks[source.block].output_ports()) == 1 else str(source)
 
 
 def obstacle(box: Box) -> Obstacle:
@@ -296,15 +303,6 @@ def _signs(box: Box) -> list[Mark]:
     return marks
 
 
-class WireKind(IntEnum):
-    """The content of a line."""
-
-    SCALAR = 0
-    VECTOR = 1
-    MATRIX = 2
-    BUS = 3
-
-
 @dataclass(frozen=True, eq=False)
 class _Carried:
     """The sheets of a diagram, and the known contents of their lines."""
@@ -330,60 +328,6 @@ class _Carried:
         if isinstance(carried, Bus):
             return WireKind.BUS
         return WireKind(min(len(self.outputs.get(carried.block, {}).get(carried.port, ())), 2))
-
-
-def _wire(net: RoutedNet, kind: WireKind, title: str, tone: Tone) -> list[Mark]:
-    """A scalar is a thin line, a vector a heavy one, a matrix a double one, a bus three lines."""
-    marks: list[Mark] = []
-    weight = (1.2, 2.3, 3.8, 5.4)[kind]
-    lines = [_rounded(_shortened(path, 5.0)) for path in net.paths]
-    marks += [Curve(line, stroke=tone, width=weight) for line in lines]
-    if kind is WireKind.MATRIX:
-        marks += [Curve(line, stroke=Tone.SURFACE, width=1.5) for line in lines]
-    if kind is WireKind.BUS:
-        marks += [Curve(line, stroke=Tone.SURFACE, width=3.2) for line in lines]
-        marks += [Curve(line, stroke=tone, width=1.0) for line in lines]
-    marks += [_arrow_head(path, tone) for path in net.paths]
-    marks += [Disc(x, y, 2.6 + 0.3 * kind, fill=tone) for x, y in net.dots]
-    return [Group(tuple(marks), title=title)]
-
-
-def _shortened(path: tuple[Point, ...], by: float) -> tuple[Point, ...]:
-    """The path without its last px, which the arrow's head covers."""
-    (ax, ay), (bx, by_) = path[-2], path[-1]
-    length = abs(bx - ax) + abs(by_ - ay)
-    share = max(length - by, 0.0) / length if length else 0.0
-    return (*path[:-1], (ax + (bx - ax) * share, ay + (by_ - ay) * share))
-
-
-def _rounded(path: tuple[Point, ...]) -> tuple[tuple[str | float, ...], ...]:
-    """Straight pieces with small round corners."""
-    commands: list[tuple[str | float, ...]] = [("M", *path[0])]
-    for before, corner, after in zip(path, path[1:], path[2:]):
-        radius = min(_ROUNDING, _distance(before, corner) / 2, _distance(corner, after) / 2)
-        commands.append(("L", *_towards(corner, before, radius)))
-        commands.append(("Q", *corner, *_towards(corner, after, radius)))
-    commands.append(("L", *path[-1]))
-    return tuple(commands)
-
-
-def _distance(a: Point, b: Point) -> float:
-    return abs(a[0] - b[0]) + abs(a[1] - b[1])
-
-
-def _towards(a: Point, b: Point, length: float) -> Point:
-    total = _distance(a, b)
-    share = length / total if total else 0.0
-    return a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share
-
-
-def _arrow_head(path: tuple[Point, ...], tone: Tone = Tone.WIRE) -> Mark:
-    (ax, ay), (bx, by) = path[-2], path[-1]
-    length = _distance((ax, ay), (bx, by)) or 1.0
-    dx, dy = (bx - ax) / length, (by - ay) / length
-    back = (bx - 8 * dx, by - 8 * dy)
-    corners = [(bx, by), (back[0] - 3.7 * dy, back[1] + 3.7 * dx), (back[0] + 3.7 * dy, back[1] - 3.7 * dx)]
-    return Polyline(corners, stroke=None, fill=tone, closed=True)
 
 
 def _notes(diagram: Diagram) -> list[Mark]:

@@ -79,9 +79,9 @@ def boxes(diagram: Diagram) -> dict[str, Box]:
     drawn = drawn_blocks(diagram)
     if not diagram.layout or set(diagram.layout) < set(diagram.blocks):
         sized = {name: sized_box(name, block) for name, block in drawn.items()}
-        return _turned(diagram, _straightened(diagram, layered(diagram, sized)))
+        return with_turned_sums(diagram, _straightened(diagram, layered(diagram, sized)))
     placed = {name: standing_box(name, block, diagram.layout[name]) for name, block in drawn.items()}
-    return _turned(diagram, _straightened(diagram, placed))
+    return with_turned_sums(diagram, placed)
 
 
 def drawn_blocks(diagram: Diagram) -> Mapping[str, Block]:
@@ -167,7 +167,7 @@ def _apart(a: Box, b: Box) -> bool:
     )
 
 
-def _turned(diagram: Diagram, placed: dict[str, Box]) -> dict[str, Box]:
+def with_turned_sums(diagram: Diagram, placed: Mapping[str, Box]) -> dict[str, Box]:
     """Round sums take each wire on the side that it comes from; the signs go with the ports."""
     turned = dict(placed)
     for name, box in placed.items():

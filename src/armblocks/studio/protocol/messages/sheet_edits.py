@@ -45,7 +45,7 @@ class NewBlock(Message):
 class Wire(Message):
     """A wire between two ports, written ``block/port``.
 
-    ``bends``: the corners of a route drawn by the user, see :func:`armblocks.drawing.wire_routing.bent`.
+    ``bends``: the corners of a route drawn by the user, see :func:`armblocks.drawing.wires.bent`.
     """
 
     source: str

@@ -1,0 +1,116 @@
+"""How wires are drawn: lines with round corners, arrow heads, dots, and labels where there is no line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import IntEnum
+
+from armblocks.drawing.wire_search import Point
+from armblocks.drawing.wires import Net, RoutedNet, WireEnd
+from armblocks.pictures.picture import Curve, Disc, Group, Mark, Polyline, Text
+from armblocks.pictures.style import Tone
+from armblocks.pictures.text_width import text_width
+
+_ROUNDING = 5.0
+LABEL_SIZE = 9.0
+LABEL_STUB = 8.0
+"""px: type size of the labels of wires without a line, and the dashed stub between port and label."""
+_LABEL_HEIGHT = 13.0
+
+
+class WireKind(IntEnum):
+    """The content of a line."""
+
+    SCALAR = 0
+    VECTOR = 1
+    MATRIX = 2
+    BUS = 3
+
+
+def wire_marks(net: RoutedNet, kind: WireKind, title: str, tone: Tone) -> list[Mark]:
+    """A scalar is a thin line, a vector a heavy one, a matrix a double one, a bus three lines."""
+    marks: list[Mark] = []
+    weight = (1.2, 2.3, 3.8, 5.4)[kind]
+    lines = [rounded(_shortened(path, 5.0), net.dots) for path in net.paths if path]
+    marks += [Curve(line, stroke=tone, width=weight) for line in lines]
+    if kind is WireKind.MATRIX:
+        marks += [Curve(line, stroke=Tone.SURFACE, width=1.5) for line in lines]
+    if kind is WireKind.BUS:
+        marks += [Curve(line, stroke=Tone.SURFACE, width=3.2) for line in lines]
+        marks += [Curve(line, stroke=tone, width=1.0) for line in lines]
+    marks += [arrow_head(path, tone) for path in net.paths if path]
+    marks += [Disc(x, y, 2.6 + 0.3 * kind, fill=tone) for x, y in net.dots]
+    return [Group(tuple(marks), title=title)]
+
+
+def _shortened(path: tuple[Point, ...], by: float) -> tuple[Point, ...]:
+    """The path without its last px, which the arrow's head covers."""
+    (ax, ay), (bx, by_) = path[-2], path[-1]
+    length = abs(bx - ax) + abs(by_ - ay)
+    share = max(length - by, 0.0) / length if length else 0.0
+    return (*path[:-1], (ax + (bx - ax) * share, ay + (by_ - ay) * share))
+
+
+def rounded(path: tuple[Point, ...], dots: Sequence[Point] = ()) -> tuple[tuple[str | float, ...], ...]:
+    """The commands of straight pieces with small round corners, which are sharp where there are dots."""
+    commands: list[tuple[str | float, ...]] = [("M", *path[0])]
+    for before, corner, after in zip(path, path[1:], path[2:]):
+        if corner in dots:
+            commands.append(("L", *corner))
+            continue
+        radius = min(_ROUNDING, _distance(before, corner) / 2, _distance(corner, after) / 2)
+        commands.append(("L", *_towards(corner, before, radius)))
+        commands.append(("Q", *corner, *_towards(corner, after, radius)))
+    commands.append(("L", *path[-1]))
+    return tuple(commands)
+
+
+def _distance(a: Point, b: Point) -> float:
+    return abs(a[0] - b[0]) + abs(a[1] - b[1])
+
+
+def _towards(a: Point, b: Point, length: float) -> Point:
+    total = _distance(a, b)
+    share = length / total if total else 0.0
+    return a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share
+
+
+def arrow_head(path: tuple[Point, ...], tone: Tone = Tone.WIRE) -> Mark:
+    """The arrow head at the end of a path."""
+    (ax, ay), (bx, by) = path[-2], path[-1]
+    length = _distance((ax, ay), (bx, by)) or 1.0
+    dx, dy = (bx - ax) / length, (by - ay) / length
+    back = (bx - 8 * dx, by - 8 * dy)
+    corners = [(bx, by), (back[0] - 3.7 * dy, back[1] + 3.7 * dx), (back[0] + 3.7 * dy, back[1] - 3.7 * dx)]
+    return Polyline(corners, stroke=None, fill=tone, closed=True)
+
+
+def label_marks(net: Net, routed: RoutedNet, name: str, tone: Tone = Tone.WIRE) -> list[Mark]:
+    """The labels at the ends of wires that have no line: what both ends say is connected."""
+    ends = [end for end, path in zip(net.targets, routed.paths) if not path]
+    if not ends:
+        return []
+    return [
+        *_label(net.source, 1, name, tone),
+        *(mark for end in ends for mark in _label(end, -1, name, tone)),
+    ]
+
+
+def _label(end: WireEnd, way: int, name: str, tone: Tone) -> Sequence[Mark]:
+    """A dashed stub and a frame with the name; ``way`` is 1 at a source and -1 at a target."""
+    dx, dy = way * end.dx, way * end.dy
+    x, y = end.x + LABEL_STUB * dx, end.y + LABEL_STUB * dy
+    width = text_width(name, LABEL_SIZE) + 8
+    left = x - width / 2 + dx * width / 2
+    top = y - _LABEL_HEIGHT / 2 + dy * _LABEL_HEIGHT / 2
+    frame = [
+        (left, top),
+        (left + width, top),
+        (left + width, top + _LABEL_HEIGHT),
+        (left, top + _LABEL_HEIGHT),
+    ]
+    return (
+        Polyline([(end.x, end.y), (x, y)], stroke=tone, width=1.2, dash=(2.5, 2.0), sharp=True),
+        Polyline(frame, stroke=tone, width=1.0, dash=(3.0, 2.0), fill=Tone.SURFACE, closed=True),
+        Text(left + width / 2, top + 9.7, name, LABEL_SIZE, Tone.INK, "middle"),
+    )

@@ -1,0 +1,188 @@
+"""The lines of one net among those that are laid: user-drawn ways first, then the nearest target."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from armblocks.drawing.wire_room import LEVELS, Extent, Level, Room, sorted_ends
+from armblocks.drawing.wire_search import Floats, Point
+from armblocks.drawing.wires import Net, RoutedNet, WireEnd, bent, corners
+
+_EXAMINED = 12.0
+"""px around a line on which its legality depends."""
+
+
+@dataclass(frozen=True)
+class LaidNet:
+    """A routed net, its straight pieces (n, 4), and the area that its route depends on."""
+
+    net: Net
+    routed: RoutedNet
+    pieces: Floats
+    examined: Extent
+
+
+class NetRouter:
+    """Lays one net, target by target."""
+
+    def __init__(self, room: Room, net: Net, number: int) -> None:
+        self._room = room
+        self._net = net
+        self._number = number
+        self._tree: list[tuple[Point, Point]] = []
+        self._dots: list[Point] = []
+        self._examined: Extent = (np.inf, np.inf, -np.inf, -np.inf)
+
+    def laid(self) -> LaidNet:
+        """The routes to all targets: user-drawn ones first, then the nearest."""
+        net = self._net
+        paths: dict[int, tuple[Point, ...]] = {}
+        for k, (target, bends) in enumerate(zip(net.targets, net.bends)):
+            if (drawn := bent(net.source, bends, target)) and (path := self._kept(drawn, target)):
+                paths[k] = path
+        origin = net.source
+
+        def nearness(k: int) -> tuple[float, int]:
+            return abs(net.targets[k].x - origin.x) + abs(net.targets[k].y - origin.y), k
+
+        for k in sorted(set(range(len(net.targets))) - set(paths), key=nearness):
+            paths[k] = self._found(net.targets[k])
+        routed = RoutedNet(tuple(paths[k] for k in range(len(net.targets))), tuple(sorted(self._dots)))
+        pieces = sorted_ends(np.array([(*a, *b) for a, b in self._tree]).reshape(-1, 4))
+        return LaidNet(net, routed, pieces, self._examined)
+
+    def _found(self, target: WireEnd) -> tuple[Point, ...]:
+        for level in LEVELS:
+            path = self._at_level(target, level)
+            if path:
+                self._add(path)
+                return path
+        return ()
+
+    def _at_level(self, target: WireEnd, level: Level) -> tuple[Point, ...]:
+        source, end = self._net.source, (target.x, target.y)
+        if not self._tree and _faces(source, target):
+            line = (source.x, source.y, target.x, target.y)
+            extent = _around(line, _EXAMINED + level.clearance)
+            self._examine(extent)
+            ports = [((source.x, source.y), (source.dx, source.dy)), (end, (-target.dx, -target.dy))]
+            if self._room.around(extent, self._number).is_free(line, level, ports):
+                return (source.x, source.y), end
+        start, goal = _ahead(source, level.stub), _behind(target, level.stub)
+        points = [start, goal, (source.x, source.y), end, *(point for piece in self._tree for point in piece)]
+        extent = _around(_hull(points), level.window)
+        self._examine(extent)
+        surroundings = self._room.around(extent, self._number)
+        if not surroundings.is_legal((*goal, *end), level, port=end, out=(-target.dx, -target.dy)):
+            return ()
+        found: list[Point]
+        if self._tree:
+            found = surroundings.branch(self._tree, self._ports(), self._dots, goal, target, level)
+        else:
+            port = (source.x, source.y)
+            if not surroundings.is_legal((*port, *start), level, port=port, out=(source.dx, source.dy)):
+                return ()
+            found = surroundings.way(source, start, goal, target, level)
+            if found:
+                found.insert(0, port)
+        return corners([*found, end]) if found else ()
+
+    def _ports(self) -> list[Point]:
+        return [(end.x, end.y) for end in (self._net.source, *self._net.targets)]
+
+    def _kept(self, path: tuple[Point, ...], target: WireEnd) -> tuple[Point, ...]:
+        """A user-drawn path from where it leaves the tree, as long as it is legal; else nothing."""
+        extent = _around(_hull(path), _EXAMINED)
+        self._examine(extent)
+        source, level = self._net.source, LEVELS[-1]
+        if not (_runs(path[0], path[1], source) and _runs(path[-2], path[-1], target)):
+            return ()
+        if _touches_itself(path):
+            return ()
+        surroundings = self._room.around(extent, self._number)
+        for k, (a, b) in enumerate(pairwise(path)):
+            ends: list[tuple[Point, tuple[int, int]]] = []
+            if k == 0:
+                ends.append((path[0], (source.dx, source.dy)))
+            if k == len(path) - 2:
+                ends.append((path[-1], (-target.dx, -target.dy)))
+            if not surroundings.is_legal_between((*a, *b), level, ends):
+                return ()
+        path = self._leaving(path)
+        if len(path) < 2 or (self._tree and not surroundings.may_turn(path[0], level)):
+            return ()
+        self._add(path)
+        return path
+
+    def _leaving(self, path: tuple[Point, ...]) -> tuple[Point, ...]:
+        """The part of a path after it last touches the tree."""
+        for k in range(len(path) - 2, -1, -1):
+            touched = [point for piece in self._tree for point in _contacts((path[k], path[k + 1]), piece)]
+            if touched:
+                last = min(touched, key=lambda point: _distance(point, path[k + 1]))
+                return corners([last, *path[k + 1 :]])
+        return path
+
+    def _add(self, path: tuple[Point, ...]) -> None:
+        if self._tree:
+            self._dots.append(path[0])
+        self._tree += pairwise(path)
+
+    def _examine(self, extent: Extent) -> None:
+        a, b = self._examined, extent
+        self._examined = min(a[0], b[0]), min(a[1], b[1]), max(a[2], b[2]), max(a[3], b[3])
+
+
+def _faces(source: WireEnd, target: WireEnd) -> bool:
+    """Whether a straight line leads from a source into a target."""
+    if (source.dx, source.dy) != (target.dx, target.dy):
+        return False
+    along = (target.x - source.x) * source.dx + (target.y - source.y) * source.dy
+    across = (target.x - source.x) * source.dy + (target.y - source.y) * source.dx
+    return across == 0 and along >= 2 * LEVELS[-1].gap
+
+
+def _runs(a: Point, b: Point, end: WireEnd) -> bool:
+    """Whether a piece runs in the direction of the signal at an end, for as far as a stub."""
+    return (b[0] - a[0]) * end.dx + (b[1] - a[1]) * end.dy >= LEVELS[-1].stub
+
+
+def _touches_itself(path: Sequence[Point]) -> bool:
+    pieces = list(pairwise(path))
+    return any(_contacts(pieces[i], pieces[j]) for j in range(len(pieces)) for i in range(j - 1))
+
+
+def _contacts(one: tuple[Point, Point], other: tuple[Point, Point]) -> list[Point]:
+    """The ends of what two pieces, each level or upright, have in common."""
+    (ax, ay), (bx, by) = one
+    (cx, cy), (dx, dy) = other
+    left, right = max(min(ax, bx), min(cx, dx)), min(max(ax, bx), max(cx, dx))
+    top, bottom = max(min(ay, by), min(cy, dy)), min(max(ay, by), max(cy, dy))
+    return [(left, top), (right, bottom)] if left <= right and top <= bottom else []
+
+
+def _distance(a: Point, b: Point) -> float:
+    return abs(a[0] - b[0]) + abs(a[1] - b[1])
+
+
+def _ahead(end: WireEnd, stub: float) -> Point:
+    """Where a wire that leaves a port is free to turn."""
+    return end.x + stub * end.dx, end.y + stub * end.dy
+
+
+def _behind(end: WireEnd, stub: float) -> Point:
+    """Where a wire that enters a port has its last corner."""
+    return end.x - stub * end.dx, end.y - stub * end.dy
+
+
+def _hull(points: Iterable[Point]) -> Extent:
+    xs, ys = zip(*points)
+    return min(xs), min(ys), max(xs), max(ys)
+
+
+def _around(extent: Extent, margin: float) -> Extent:
+    return extent[0] - margin, extent[1] - margin, extent[2] + margin, extent[3] + margin

@@ -1,0 +1,376 @@
+"""Where a wire may run: what blocks and the lines of other nets leave free, and what each way costs.
+
+Hard rules keep a drawing unambiguous: a distance to blocks, and a distance between a line and the corners,
+ports, dots and parallel lines of other nets. They come in levels, from comfortable to tight; the tightest is
+what a reader can still tell apart. Costs make a drawing pleasant: short, few bends, few crossings, off names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol, TypeAlias
+
+import numpy as np
+
+from armblocks.drawing.wire_search import (
+    BEND,
+    BLOCKED,
+    Floats,
+    Grid,
+    Point,
+    Truths,
+    grid_lines,
+    painted,
+)
+
+Extent: TypeAlias = tuple[float, float, float, float]
+Piece: TypeAlias = tuple[Point, Point]
+
+RESERVED = 5.0
+"""px directly before a port that belong to its net alone."""
+_CROSSING = 26.0
+_BRANCH = 20.0
+_NEAR = 9.5
+_NEAR_PRICE = 2.0
+_LABEL_PRICE = 9.0
+_BLOCK_MARGIN = 18.0
+_BLOCK_MARGIN_PRICE = 0.25
+_APPROACH = 46.0
+_APPROACH_PRICE = 4.0
+"""px before a port that other nets use only where there is no better place, and the price per px there."""
+_MIDDLE_PRICE = 1 / 16
+_ON_EDGE = 1e-6
+
+
+@dataclass(frozen=True)
+class Level:
+    """Distances in px: stub of a wire at its port, to blocks, to other nets, and where lines may run."""
+
+    stub: float
+    clearance: float
+    gap: float
+    block_lanes: tuple[float, ...]
+    wire_lane: float
+    apart: float
+    """Minimum distance of the lines of the grid."""
+    window: float
+    """How far around the ends of a wire it may run."""
+    detour: float
+    """How much longer than the best conceivable way a way may be: further around may be a better one."""
+
+    def most(self, least: float) -> float:
+        """What a way may cost of which the best conceivable one costs ``least``."""
+        return least + 40.0 + self.detour * (least + 200.0)
+
+
+LEVELS = (
+    Level(13.0, 8.0, 7.5, (13.0, 23.0), 10.0, 4.0, 12.0, 0.0),
+    Level(13.0, 8.0, 7.5, (13.0, 23.0), 10.0, 4.0, 70.0, 1.0),
+    Level(13.0, 8.0, 7.5, (13.0, 23.0), 10.0, 4.0, 260.0, np.inf),
+    Level(9.0, 6.0, 5.0, (8.0, 15.0), 7.0, 2.0, 260.0, np.inf),
+    Level(5.0, 4.0, 4.0, (5.0, 11.0), 5.0, 2.0, 260.0, np.inf),
+)
+
+
+class End(Protocol):
+    """A port, and the direction of the signal there."""
+
+    @property
+    def x(self) -> float: ...
+    @property
+    def y(self) -> float: ...
+    @property
+    def dx(self) -> int: ...
+    @property
+    def dy(self) -> int: ...
+
+
+def meet(a: Extent, b: Extent) -> bool:
+    """Whether two areas have a point in common."""
+    return a[0] <= b[2] and b[0] <= a[2] and a[1] <= b[3] and b[1] <= a[3]
+
+
+def extents(pieces: Floats, *, at_ports: bool = False) -> list[Extent]:
+    """The areas around straight pieces in which they matter to other nets; ``at_ports``: directly before."""
+    x0, y0, x1, y1 = _wider(pieces, _APPROACH if at_ports else _NEAR).T.tolist()
+    return list(zip(x0, y0, x1, y1))
+
+
+def sorted_ends(pieces: Floats) -> Floats:
+    """Straight pieces (n, 4) from their upper left end to their lower right end."""
+    return np.hstack([np.minimum(pieces[:, :2], pieces[:, 2:]), np.maximum(pieces[:, :2], pieces[:, 2:])])
+
+
+class Room:
+    """The blocks of a sheet, and the lines that are laid."""
+
+    def __init__(self, sides: Sequence[Sequence[float]]) -> None:
+        found = np.array(sides, dtype=np.float64).reshape(-1, 8)
+        self._blocks, self._names = found[:, :4], found[:, 4:]
+        low = np.minimum(self._blocks[:, :2], self._names[:, :2]) - _BLOCK_MARGIN
+        high = np.maximum(self._blocks[:, 2:], self._names[:, 2:]) + _BLOCK_MARGIN
+        self._extents = np.hstack([low, high])
+        self._pieces = np.empty((0, 4))
+        self._owners = np.empty(0, dtype=np.int64)
+        self._count = 0
+
+    def extent(self, k: int) -> Extent:
+        """The area around a block in which it matters to wires."""
+        x0, y0, x1, y1 = self._extents[k].tolist()
+        return x0, y0, x1, y1
+
+    def reserve(self, ends: Sequence[tuple[Floats, int]]) -> None:
+        """Take all lines away, and keep the places before the ports of every net free for it."""
+        self._pieces = np.vstack([np.empty((0, 4)), *(pieces for pieces, _ in ends)])
+        owners = [number for pieces, number in ends for _ in range(len(pieces))]
+        self._owners = np.array(owners, dtype=np.int64)
+        self._approaches = self._count = len(self._pieces)
+
+    def lay(self, pieces: Floats, number: int) -> None:
+        """Add the pieces (n, 4) of a net, see :func:`sorted_ends`."""
+        begin, end = self._count, self._count + len(pieces)
+        while end > len(self._pieces):  # twice as much room as before
+            self._pieces = np.vstack([self._pieces, np.empty_like(self._pieces)])
+            self._owners = np.hstack([self._owners, np.empty_like(self._owners)])
+        self._pieces[begin:end] = pieces
+        self._owners[begin:end] = number
+        self._count = end
+
+    def around(self, extent: Extent, number: int) -> Surroundings:
+        """What stands and lies in an area that is not of one net."""
+        pieces = self._pieces[: self._count]
+        foreign = _inside(pieces, extent, _NEAR) & (self._owners[: self._count] != number)
+        blocks = _inside(self._extents, extent, 0.0)
+        ahead = _inside(pieces[: self._approaches], extent, _APPROACH)
+        ahead &= self._owners[: self._approaches] != number
+        return Surroundings(
+            extent,
+            self._blocks[blocks],
+            self._names[blocks],
+            pieces[foreign],
+            pieces[: self._approaches][ahead],
+        )
+
+
+def _inside(areas: Floats, extent: Extent, margin: float) -> Truths:
+    return (
+        (areas[:, 0] <= extent[2] + margin)
+        & (areas[:, 2] >= extent[0] - margin)
+        & (areas[:, 1] <= extent[3] + margin)
+        & (areas[:, 3] >= extent[1] - margin)
+    )
+
+
+def _wider(areas: Floats, margin: float) -> Floats:
+    return areas + np.array([-margin, -margin, margin, margin])
+
+
+def _meets(areas: Floats, line: Floats) -> bool:
+    """Whether a straight line from its upper left end to its lower right end enters one of open areas."""
+    return bool(
+        np.any(
+            (areas[:, 0] < line[2])
+            & (areas[:, 2] > line[0])
+            & (areas[:, 1] < line[3])
+            & (areas[:, 3] > line[1])
+        )
+    )
+
+
+def _sorted_line(line: Sequence[float]) -> Floats:
+    x0, y0, x1, y1 = line
+    return np.array([min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1)])
+
+
+class Surroundings:
+    """The blocks and foreign lines in an area, and the ways of one net through it."""
+
+    def __init__(self, extent: Extent, blocks: Floats, names: Floats, pieces: Floats, ends: Floats) -> None:
+        self._extent = extent
+        self._blocks = blocks
+        self._names = names
+        self._pieces = pieces
+        level = pieces[:, 1] == pieces[:, 3]
+        self._level, self._upright = pieces[level], pieces[~level]
+        self._ends = ends
+        self._corners = np.vstack([pieces[:, [0, 1, 0, 1]], pieces[:, [2, 3, 2, 3]]])
+
+    def is_legal(self, line: Sequence[float], level: Level, *, port: Point, out: tuple[int, int]) -> bool:
+        """Whether a stub may lie at a port, which has its block behind it."""
+        return self.is_legal_between(line, level, [(port, out)])
+
+    def is_legal_between(
+        self, line: Sequence[float], level: Level, ports: Sequence[tuple[Point, tuple[int, int]]]
+    ) -> bool:
+        """Whether a straight piece may lie, of which some ends are ports with their blocks behind them."""
+        piece = _sorted_line(line)
+        blocks = self._blocks
+        for port, out in ports:
+            blocks = blocks[~_owns(blocks, port, out)]
+        along = self._level if line[1] == line[3] else self._upright
+        if _meets(_wider(blocks, level.clearance), piece) or _meets(_wider(along, level.gap), piece):
+            return False
+        if _meets(_wider(self._corners, level.gap), piece):
+            return False
+        return self.may_turn((line[0], line[1]), level) and self.may_turn((line[2], line[3]), level)
+
+    def is_free(
+        self, line: Sequence[float], level: Level, ports: Sequence[tuple[Point, tuple[int, int]]]
+    ) -> bool:
+        """Whether a straight line may lie and meets nothing, so that no other way is better."""
+        piece = _sorted_line(line)
+        if _meets(_wider(self._names, 3.0), piece) or _meets(_wider(self._pieces, _NEAR), piece):
+            return False
+        return self.is_legal_between(line, level, ports)
+
+    def may_turn(self, point: Point, level: Level) -> bool:
+        """Whether a corner or a dot may be at a point."""
+        return not _meets(_wider(self._pieces, level.gap), np.array([*point, *point]))
+
+    def way(self, source: End, start: Point, goal: Point, target: End, level: Level) -> list[Point]:
+        """The corners of the best way from the end of a source's stub to that of a target's."""
+        own: list[Piece] = [((source.x, source.y), start), (goal, (target.x, target.y))]
+        grid = self._grid(own, [], level, (start, goal) if source.dx else None)
+        begins = np.full(grid.turn.shape, np.inf)
+        begins[grid.node(start)] = 0.0
+        nowhere = np.full(grid.turn.shape, np.inf)
+        rightwards, downwards = (begins, nowhere) if source.dx else (nowhere, begins)
+        most = level.most(_least(source, start, goal, target))
+        return grid.cheapest(rightwards, downwards, grid.node(goal), most, flat=target.dx != 0)
+
+    def branch(
+        self,
+        tree: Sequence[Piece],
+        closed: Sequence[Point],
+        dots: Sequence[Point],
+        goal: Point,
+        target: End,
+        level: Level,
+    ) -> list[Point]:
+        """The corners of the best way from the lines of the net itself to the end of a target's stub.
+
+        No way begins at one of the ``dots``, or near one of the ``closed`` points.
+        """
+        grid = self._grid([(goal, (target.x, target.y))], tree, level, None)
+        begins = np.full(grid.turn.shape, np.inf)
+        for (ax, ay), (bx, by) in tree:
+            rows = (grid.ys >= min(ay, by)) & (grid.ys <= max(ay, by))
+            columns = (grid.xs >= min(ax, bx)) & (grid.xs <= max(ax, bx))
+            begins[np.ix_(rows, columns)] = _BRANCH
+        begins[~grid.turn] = np.inf
+        for x, y in closed:
+            begins[self._distances(grid, x, y) < level.stub] = np.inf
+        for x, y in {point for piece in tree for point in piece}:
+            away = self._distances(grid, x, y)
+            begins[(away < level.gap) & (away > 0.0)] = np.inf
+        for dot in dots:
+            begins[grid.node(dot)] = np.inf
+        away = self._distances(grid, *goal)[np.isfinite(begins)]
+        most = level.most(_BRANCH + float(np.min(away, initial=np.inf)))
+        return grid.cheapest(begins, begins, grid.node(goal), most, flat=target.dx != 0)
+
+    @staticmethod
+    def _distances(grid: Grid, x: float, y: float) -> Floats:
+        return np.abs(grid.ys - y)[:, None] + np.abs(grid.xs - x)[None, :]
+
+    # -- the grid --------------------------------------------------------------------------------------------
+
+    def _grid(
+        self, stubs: Sequence[Piece], tree: Sequence[Piece], level: Level, middle: tuple[Point, Point] | None
+    ) -> Grid:
+        """The grid of an area; the ways of the net avoid its own ``stubs``, and begin on its ``tree``."""
+        xs, ys = self._lines([*stubs, *tree], level, middle)
+        own = np.array([_sorted_line((*a, *b)) for a, b in (*stubs, *tree)]).reshape(-1, 4)
+        solid = np.array([_sorted_line((*a, *b)) for a, b in stubs]).reshape(-1, 4)
+        flat = own[:, 1] == own[:, 3]
+        prices, turned = [0, 2, 1, 3], [1, 3, 0, 2]
+        right, down = (
+            self._edges(order, lines, across, own[along], solid, level)
+            for order, lines, across, along in ((prices, xs, ys, flat), (turned, ys, xs, ~flat))
+        )
+        if middle is not None:
+            (ax, _), (bx, _) = middle
+            half = max(abs(bx - ax) / 2, 1.0)
+            off = np.minimum(np.abs(xs - (ax + bx) / 2) / half, 1.0)
+            down += np.diff(ys)[:, None] * (off * _MIDDLE_PRICE)
+        near = _wider(self._pieces, level.gap)
+        rows = (ys[:, None] > near[:, 1]) & (ys[:, None] < near[:, 3])
+        columns = (xs > near[:, 0, None]) & (xs < near[:, 2, None])
+        turn = rows.astype(np.float64) @ columns.astype(np.float64) == 0.0
+        return Grid(xs, ys, right, down, turn)
+
+    def _lines(
+        self, own: Sequence[Piece], level: Level, middle: tuple[Point, Point] | None
+    ) -> tuple[Floats, Floats]:
+        x0, y0, x1, y1 = self._extent
+        exact_x = [x for piece in own for x, _ in piece]
+        exact_y = [y for piece in own for _, y in piece]
+        lanes = np.array(level.block_lanes)[:, None]
+        tops = np.minimum(self._blocks[:, 1], self._names[:, 1])
+        bottoms = np.maximum(self._blocks[:, 3], self._names[:, 3])
+        below = lanes - 5.0 if level is not LEVELS[-1] else lanes
+        wanted_x = [self._blocks[:, 0] - lanes, self._blocks[:, 2] + lanes]
+        wanted_y = [tops - lanes, bottoms + below]
+        if level is LEVELS[-1]:
+            wanted_y += [self._blocks[:, 1] - lanes, self._blocks[:, 3] + lanes]
+        for pieces, wanted, k in ((self._upright, wanted_x, 0), (self._level, wanted_y, 1)):
+            wanted += [pieces[:, k] - level.wire_lane, pieces[:, k] + level.wire_lane]
+        if middle is not None:
+            wanted_x.append(np.array([round((middle[0][0] + middle[1][0]) / 2)]))
+        found_x = np.concatenate([part.ravel() for part in wanted_x])
+        found_y = np.concatenate([part.ravel() for part in wanted_y])
+        return (
+            grid_lines(exact_x, found_x[(found_x >= x0) & (found_x <= x1)].tolist(), level.apart),
+            grid_lines(exact_y, found_y[(found_y >= y0) & (found_y <= y1)].tolist(), level.apart),
+        )
+
+    def _edges(
+        self, order: list[int], line: Floats, levels: Floats, own: Floats, solid: Floats, level: Level
+    ) -> Floats:
+        """Costs of the edges along parallel lines: ``order`` takes rectangles to along and across them."""
+        begin, _, low, high = order
+        along = self._level if begin == 0 else self._upright
+        across = self._upright if begin == 0 else self._level
+        ends = self._ends[self._ends[:, low] == self._ends[:, high]]
+        areas = (
+            (_wider(self._blocks, level.clearance), BLOCKED, 0.0),
+            (_wider(along, level.gap), BLOCKED, 0.0),
+            (_wider(self._corners, level.gap), BLOCKED, 0.0),
+            (_thicker(own, level.gap, low), BLOCKED, 0.0),
+            (_thicker(solid, _ON_EDGE, begin), BLOCKED, 0.0),
+            (_thicker(across, _ON_EDGE, begin, 0.0), _CROSSING, 0.0),
+            (_wider(self._blocks, _BLOCK_MARGIN), 0.0, _BLOCK_MARGIN_PRICE),
+            (_wider(self._names, 3.0), 0.0, _LABEL_PRICE),
+            (_wider(along, _NEAR), 0.0, _NEAR_PRICE),
+            (_thicker(_thicker(ends, _APPROACH, begin), 6.0, low), 0.0, _APPROACH_PRICE),
+        )
+        weights = np.repeat([area[1:] for area in areas], [len(area[0]) for area in areas], axis=0)
+        rectangles = np.vstack([area[0] for area in areas])[:, order]
+        fixed, price = painted(rectangles, weights, line, levels)
+        return np.diff(line)[:, None] * (1.0 + price) + fixed
+
+
+def _thicker(areas: Floats, margin: float, axis: int, other: float | None = None) -> Floats:
+    """Areas wider along one axis: by ``margin`` below, and as much, or ``other``, above."""
+    found = areas.copy()
+    found[:, axis] -= margin
+    found[:, axis + 2] += margin if other is None else other
+    return found
+
+
+def _least(source: End, start: Point, goal: Point, target: End) -> float:
+    """What a way costs at least, whatever is there."""
+    across, down = abs(goal[0] - start[0]), abs(goal[1] - start[1])
+    if (source.dx != 0) != (target.dx != 0):
+        return across + down + BEND
+    return across + down + (2 * BEND if (down if source.dx else across) else 0.0)
+
+
+def _owns(blocks: Floats, port: Point, out: tuple[int, int]) -> Truths:
+    """The block of a port: the one whose side the port is on. None where blocks lie on each other there."""
+    (x, y), (dx, dy) = port, out
+    edge = blocks[:, (0 if dx < 0 else 2) if dx else (1 if dy < 0 else 3)]
+    beside = (blocks[:, 1] <= y) & (y <= blocks[:, 3]) if dx else (blocks[:, 0] <= x) & (x <= blocks[:, 2])
+    found = beside & (np.abs(edge - (x if dx else y)) < _ON_EDGE)
+    return found if np.count_nonzero(found) == 1 else np.zeros(len(blocks), dtype=np.bool_)

@@ -1,0 +1,156 @@
+"""The cheapest way of a wire over a grid of horizontal and vertical lines.
+
+The grid has lines through every place where a wire may turn: beside blocks and beside other wires (Hanan
+1966 shows that such a grid contains a shortest rectilinear tree). The search counts bends: sweep *k* finds,
+for all nodes at once, the cheapest way that arrives with *k* bends. A sweep is a running minimum along every
+grid line, so its time depends on the size of the grid alone and not on what stands in the way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats: TypeAlias = NDArray[np.float64]
+Truths: TypeAlias = NDArray[np.bool_]
+Point: TypeAlias = tuple[float, float]
+Node: TypeAlias = tuple[int, int]
+
+BEND = 34.0
+"""px of detour that one bend is worth."""
+BLOCKED = 1e6
+"""Cost of an edge that no wire may use. Ways that cost more than half of it do not exist."""
+_MOST_BENDS = 14
+
+
+def grid_lines(exact: Sequence[float], wanted: Sequence[float], apart: float) -> Floats:
+    """All ``exact`` coordinates, and those of ``wanted`` that are ``apart`` from the others, in order."""
+    kept = sorted(set(exact))
+    found, k = list(kept), 0
+    last = -np.inf
+    for value in sorted(set(wanted)):
+        while k < len(kept) and kept[k] < value:
+            k += 1
+        near_exact = (k < len(kept) and kept[k] - value < apart) or (k > 0 and value - kept[k - 1] < apart)
+        if near_exact or value - last < apart:
+            continue
+        found.append(value)
+        last = value
+    return np.array(sorted(found))
+
+
+def painted(rectangles: Floats, weights: Floats, line: Floats, levels: Floats) -> Floats:
+    """The sum of the weights of the open rectangles that each edge of parallel grid lines meets.
+
+    ``rectangles`` (n, 4): begin, end along the lines, begin, end across them. ``weights`` (n, kinds) are
+    dyadic, so sums are exact. ``line`` has the coordinates of the nodes along each line, ``levels`` where the
+    lines are. Gives (kinds, edges, lines): weights are put on the corners of the rectangles, and sums along
+    both directions fill them.
+    """
+    first = np.maximum(np.searchsorted(line, rectangles[:, 0], "right") - 1, 0)
+    last = np.maximum(np.searchsorted(line, rectangles[:, 1], "left"), first)
+    top = np.searchsorted(levels, rectangles[:, 2], "right")
+    bottom = np.maximum(np.searchsorted(levels, rectangles[:, 3], "left"), top)
+    width = len(levels) + 1
+    size = (len(line) + 1) * width
+    corners = np.concatenate(
+        [first * width + top, first * width + bottom, last * width + top, last * width + bottom]
+    )
+    found = [
+        np.bincount(corners, np.concatenate([weight, -weight, -weight, weight]), size) for weight in weights.T
+    ]
+    sums = np.array(found, dtype=np.float64).reshape(-1, len(line) + 1, width)
+    return np.cumsum(np.cumsum(sums, axis=1), axis=2)[:, : len(line) - 1, : len(levels)]
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Grid lines, the cost of every edge, and where a wire may turn.
+
+    ``right`` (columns - 1, rows) and ``down`` (rows - 1, columns): costs of edges. ``turn``: rows, columns.
+    """
+
+    xs: Floats
+    ys: Floats
+    right: Floats
+    down: Floats
+    turn: Truths
+
+    def node(self, point: Point) -> Node:
+        """Row and column of a point, which is on a line of each direction."""
+        return int(np.searchsorted(self.ys, point[1])), int(np.searchsorted(self.xs, point[0]))
+
+    def cheapest(
+        self, rightwards: Floats, downwards: Floats, goal: Node, most: float, *, flat: bool
+    ) -> list[Point]:
+        """The corners of the cheapest way to a goal; empty if there is none, or it costs more than ``most``.
+
+        ``rightwards`` and ``downwards`` (rows, columns): what it costs to begin at a node along its row or
+        along its column, infinite elsewhere. ``flat``: the way arrives along the row of the goal.
+        """
+        left = np.abs(self.ys - self.ys[goal[0]])[:, None] + np.abs(self.xs - self.xs[goal[1]])
+        rows, columns = _Sweeps(self.right, self.turn.T, left.T), _Sweeps(self.down, self.turn, left)
+        arriving, place = (rows, goal[::-1]) if flat else (columns, goal)
+        fresh = rows.sweep(rightwards.T), columns.sweep(downwards)
+        best, bends = min(most, BLOCKED / 2), -1
+        for k in range(_MOST_BENDS):
+            if (cost := float(arriving.costs[k][place])) < best:
+                best, bends = cost, k
+            if best <= min(rows.bound, columns.bound) + BEND:
+                break
+            fresh = rows.bend(fresh[1]), columns.bend(fresh[0])
+        return self._way((rows, columns), bends, goal, 0 if flat else 1) if bends >= 0 else []
+
+    def _way(self, sides: tuple[_Sweeps, _Sweeps], bends: int, goal: Node, arrival: int) -> list[Point]:
+        row, column, side = *goal, arrival
+        points = [(float(self.xs[column]), float(self.ys[row]))]
+        for k in range(bends, -1, -1):
+            if side == 0:
+                column = sides[0].origin(k, row, column)
+            else:
+                row = sides[1].origin(k, column, row)
+            points.append((float(self.xs[column]), float(self.ys[row])))
+            side = 1 - side
+        return points[::-1]
+
+
+class _Sweeps:
+    """The sweeps along the rows of a grid, or along its columns. Arrays are (places along, lines)."""
+
+    def __init__(self, edges: Floats, turn: Truths, left: Floats) -> None:
+        self._along = np.zeros((edges.shape[0] + 1, edges.shape[1]))
+        np.cumsum(edges, axis=0, out=self._along[1:])
+        self._turning = np.where(turn, BEND, np.inf)
+        self._left = left
+        self._best = np.full(self._along.shape, BLOCKED / 2)
+        self._begins: list[Floats] = []
+        self.costs: list[Floats] = []
+        """Cost of arriving at each node with each number of bends."""
+        self.bound = np.inf
+        """No way that goes on from the latest sweep costs less, bends to come apart."""
+
+    def sweep(self, begins: Floats) -> Floats:
+        """Sweep from nodes where a way may begin; gives the costs where they are lower than ever."""
+        forwards = np.minimum.accumulate(begins - self._along, axis=0)
+        forwards += self._along
+        costs = np.minimum.accumulate((begins + self._along)[::-1], axis=0)[::-1] - self._along
+        np.minimum(costs, forwards, out=costs)
+        self._begins.append(begins)
+        self.costs.append(costs)
+        fresh = np.where(costs < self._best, costs, np.inf)
+        np.minimum(self._best, costs, out=self._best)
+        self.bound = float(np.min(fresh + self._left))
+        return fresh
+
+    def bend(self, across: Floats) -> Floats:
+        """Sweep from nodes that were reached across, at these costs, and where the way may turn."""
+        return self.sweep(across.T + self._turning)
+
+    def origin(self, k: int, line: int, place: int) -> int:
+        """Where the way that arrives with ``k`` bends at a place of a line has begun to run along it."""
+        along = self._along[:, line]
+        return int(np.argmin(self._begins[k][:, line] + np.abs(along - along[place])))

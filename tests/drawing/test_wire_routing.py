@@ -1,0 +1,231 @@
+"""The lines of a sheet: what a reader infers from them is the model, whatever stands where."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import pytest
+from wire_reader import AmbiguousError, Block, Drawing, Port, read
+
+from armblocks.drawing.wire_routing import Routing, route
+from armblocks.drawing.wires import Net, Obstacle, RoutedNet, WireEnd, bent
+
+Path = tuple[tuple[float, float], ...]
+SIDES = {"left": (-1, 0), "right": (1, 0), "top": (0, -1), "bottom": (0, 1)}
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A block with its inputs on one side and its outputs on another."""
+
+    x: float
+    y: float
+    width: float
+    height: float
+    inputs: int
+    outputs: int
+    input_side: str
+    output_side: str
+
+    def spot(self, side: str, k: int, count: int) -> tuple[float, float]:
+        """Where one of the ports of a side is."""
+        share = (k + 0.5) / count
+        if side in ("left", "right"):
+            return self.x + (self.width if side == "right" else 0.0), self.y + self.height * share
+        return self.x + self.width * share, self.y + (self.height if side == "bottom" else 0.0)
+
+
+@dataclass(frozen=True)
+class SheetModel:
+    """Blocks by name, the output that drives each input, and drawn ways by input."""
+
+    blocks: Mapping[str, Placed]
+    drivers: Mapping[tuple[str, int], tuple[str, int]]
+    bends: Mapping[tuple[str, int], tuple[float, ...]]
+
+    def ports(self) -> dict[str, Port]:
+        """All ports, also those without wires."""
+        found: dict[str, Port] = {}
+        for name, block in self.blocks.items():
+            for k in range(block.inputs):
+                place = block.spot(block.input_side, k, block.inputs)
+                found[f"{name}/u{k}"] = Port(name, *place, SIDES[block.input_side], False)
+            for k in range(block.outputs):
+                place = block.spot(block.output_side, k, block.outputs)
+                found[f"{name}/y{k}"] = Port(name, *place, SIDES[block.output_side], True)
+        return found
+
+    def nets(self) -> tuple[dict[str, Net], dict[str, list[str]]]:
+        """The nets by source, and their targets."""
+        ports, targets = self.ports(), dict[str, list[str]]()
+        bends: dict[str, list[tuple[float, ...]]] = {}
+        for (block, k), (driver, j) in self.drivers.items():
+            targets.setdefault(f"{driver}/y{j}", []).append(f"{block}/u{k}")
+            bends.setdefault(f"{driver}/y{j}", []).append(self.bends.get((block, k), ()))
+
+        def end(port: Port) -> WireEnd:
+            way = 1 if port.is_output else -1
+            return WireEnd(port.x, port.y, way * port.out[0], way * port.out[1])
+
+        nets = {
+            source: Net(end(ports[source]), tuple(end(ports[t]) for t in driven), tuple(bends[source]))
+            for source, driven in targets.items()
+        }
+        return nets, targets
+
+    def obstacles(self) -> dict[str, Obstacle]:
+        """The blocks as the router sees them."""
+        return {
+            name: Obstacle(b.x, b.y, b.width, b.height, (b.x - 5, b.y + b.height + 2, b.width + 10, 16))
+            for name, b in self.blocks.items()
+        }
+
+
+def drawing(model: SheetModel, routed: Mapping[str, RoutedNet]) -> Drawing:
+    """What is seen of a model."""
+    _, targets = model.nets()
+    labels: dict[str, str] = {}
+    for source, net in routed.items():
+        for target, path in zip(targets[source], net.paths):
+            if not path:
+                labels[source] = labels[target] = source
+    return Drawing(
+        blocks={name: Block(b.x, b.y, b.width, b.height) for name, b in model.blocks.items()},
+        ports=model.ports(),
+        lines=[path for net in routed.values() for path in net.paths if path],
+        dots=[dot for net in routed.values() for dot in net.dots],
+        labels=labels,
+    )
+
+
+def expect_truth(model: SheetModel, routed: Mapping[str, RoutedNet]) -> None:
+    wanted = {f"{b}/u{k}": f"{d}/y{j}" for (b, k), (d, j) in model.drivers.items()}
+    assert read(drawing(model, routed)) == wanted
+
+
+def random_model(draw: random.Random) -> SheetModel:
+    """A sheet as users make them, and worse: dense, turned, overlapping, with fans and drawn ways."""
+    kind = draw.choice(["grid", "dense", "anywhere", "fan", "facing"])
+    blocks: dict[str, Placed] = {}
+    for k in range(draw.randint(2, 14)):
+        width, height = draw.choice([30, 45, 60, 90]), draw.choice([30, 40, 60, 84])
+        sides = draw.choice(
+            [("left", "right")] * 5 + [("right", "left"), ("top", "bottom"), ("bottom", "top")]
+        )
+        if draw.random() < 0.1:
+            sides = draw.choice(["left", "top", "bottom"]), "right"
+        pitch, row = {"dense": (105, 75), "facing": (100, 60)}.get(kind, (170, 120))
+        x, y = (k % 4) * pitch + draw.randint(0, 30), (k // 4) * row + draw.randint(0, 20)
+        if kind == "anywhere":
+            x, y = draw.randint(0, 450), draw.randint(0, 300)
+        if kind == "facing":
+            width, x = 90 + draw.randint(0, 9), (k % 4) * pitch
+        blocks[f"b{k}"] = Placed(x, y, width, height, draw.randint(0, 3), draw.randint(0, 2), *sides)
+    if kind == "fan":
+        count, height = 20, draw.choice([60, 130, 400])
+        blocks["fan"] = Placed(700, 40, 60, height, count, 1, "left", "right")
+        for k in range(count):
+            blocks[f"s{k}"] = Placed(draw.randint(380, 560), 34 * k, 40, 22, 0, 1, "left", "right")
+    outputs = [(name, k) for name, block in blocks.items() for k in range(block.outputs)]
+    drivers = {
+        (name, k): draw.choice(outputs)
+        for name, block in blocks.items()
+        for k in range(block.inputs)
+        if outputs and draw.random() < 0.85
+    }
+    bends = {
+        end: tuple(float(draw.randint(-50, 500)) for _ in range(draw.randint(1, 4)))
+        for end in drivers
+        if draw.random() < 0.15
+    }
+    return SheetModel(blocks, drivers, bends)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_reader_of_the_lines_infers_the_model(seed: int) -> None:
+    """Over random layouts and drags; and what is kept from the sheet before changes no route."""
+    draw = random.Random(seed)
+    model, routing = random_model(draw), Routing()
+    for _ in range(3):
+        nets, _ = model.nets()
+        routed = routing.update(model.obstacles(), nets)
+        expect_truth(model, routed)
+        moved = dict(model.blocks)
+        dx, dy = draw.randint(-120, 120), draw.randint(-90, 90)
+        for name in draw.sample(sorted(moved), min(len(moved), draw.choice([1, 1, 1, 2, 4]))):
+            moved[name] = replace(moved[name], x=moved[name].x + dx, y=moved[name].y + dy)
+        model = replace(model, blocks=moved)
+    nets, _ = model.nets()
+    assert routing.update(model.obstacles(), nets) == Routing().update(model.obstacles(), nets)
+
+
+# -- ways that somebody has drawn ----------------------------------------------------------------------------
+
+SOURCE, NEAR, FAR = WireEnd(0, 0, 1, 0), WireEnd(200, 0, 1, 0), WireEnd(200, 100, 1, 0)
+
+
+def test_a_drawn_way_is_kept_and_branches_leave_it() -> None:
+    bends = (60.0, 50.0, 120.0)
+    path = bent(SOURCE, bends, FAR)
+    assert path == ((0, 0), (60, 0), (60, 50), (120, 50), (120, 100), (200, 100))
+    (laid,) = route([], [Net(SOURCE, (NEAR, FAR), ((), bends))])
+    assert laid.paths[1] == path
+    assert laid.paths[0] == ((60, 0), (200, 0))
+    assert laid.dots == ((60, 0),)
+    # Where the block is turned the way no longer leads into its port, and is chosen anew.
+    assert bent(SOURCE, bends, WireEnd(200, 100, 0, 1)) is None
+    assert bent(SOURCE, (), FAR) is None
+
+
+@pytest.mark.parametrize(("source", "bend"), [(0.0, 60.0), (0.0, -40.0), (-60.0, 150.0)])
+def test_a_drawn_way_that_lies_is_given_up(source: float, bend: float) -> None:
+    """One under a block, one that leaves its port backwards, and one along that of a shorter net."""
+    block = Obstacle(45.0, 20.0, 40.0, 60.0, (45.0, 82.0, 40.0, 16.0))
+    start, end = WireEnd(0, source, 1, 0), WireEnd(200, 160 if source else 100, 1, 0)
+    shorter = Net(WireEnd(120, 20, 1, 0), (WireEnd(200, 60, 1, 0),), ((150.0,),))
+    kept, laid = route([block], [shorter, Net(start, (end,), ((bend,),))])
+    assert kept.paths == (bent(shorter.source, (150.0,), shorter.targets[0]),)
+    (path,) = laid.paths
+    assert path != bent(start, (bend,), end)
+    assert path[0] == (start.x, start.y) and path[-1] == (end.x, end.y)
+
+
+# -- the reader ----------------------------------------------------------------------------------------------
+
+PORTS = {
+    "a/y": Port("a", 0, 0, (1, 0), True),
+    "b/u": Port("b", 100, 0, (-1, 0), False),
+    "c/y": Port("c", 0, 40, (1, 0), True),
+    "d/u": Port("d", 100, 40, (-1, 0), False),
+}
+AB, CD = ((0, 0), (100, 0)), ((0, 40), (100, 40))
+
+
+@pytest.mark.parametrize(
+    ("lines", "dots", "lie"),
+    [
+        ([AB, ((0, 40), (20, 40), (20, 60), (80, 60), (80, 40), (100, 40))], [], "runs under e"),
+        ([AB, ((0, 40), (20, 40), (20, 1), (80, 1), (80, 40), (100, 40))], [], "lines touch"),
+        ([AB, ((0, 40), (50, 40), (50, 0), (60, 0), (60, 40), (100, 40))], [], "lines touch"),
+        ([AB, CD], [(50, 0)], "a dot at"),
+        ([AB, ((50, 0), (50, 40), (100, 40))], [], "begins nowhere|lines touch"),
+        ([AB, ((0, 40), (90, 40))], [], "ends nowhere"),
+        ([AB, ((0, 40), (-20, 40), (-20, 20), (80, 20), (80, 40), (100, 40))], [], "outwards"),
+        ([((0, 0), (100, 40))], [], "neither level nor upright"),
+        ([AB, ((0, 40), (50, 40), (50, -3), (98.5, -3), (98.5, 40), (100, 40))], [], "touches b/u|outwards"),
+    ],
+)
+def test_the_reader_sees_lies(lines: list[Path], dots: list[tuple[float, float]], lie: str) -> None:
+    seen = Drawing({"e": Block(40, 50, 20, 20)}, PORTS, lines, dots, {})
+    with pytest.raises(AmbiguousError, match=lie):
+        read(seen)
+
+
+def test_the_reader_follows_crossings_branches_and_labels() -> None:
+    crossing = ((0, 40), (50, 40), (50, -20), (80, -20), (80, 40), (100, 40))
+    assert read(Drawing({}, PORTS, [AB, crossing], [], {})) == {"b/u": "a/y", "d/u": "c/y"}
+    branch = ((50, 0), (50, 40), (100, 40))
+    assert read(Drawing({}, PORTS, [AB, branch], [(50, 0)], {})) == {"b/u": "a/y", "d/u": "a/y"}
+    assert read(Drawing({}, PORTS, [AB], [], {"c/y": "c", "d/u": "c"})) == {"b/u": "a/y", "d/u": "c/y"}
