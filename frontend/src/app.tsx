@@ -12,7 +12,7 @@ import { useDesk } from './robot/editor/desk'
 const RobotEditor = lazy(() => import('./robot/editor/robot_editor'))
 const Dialogs = later(async () => (await import('./all_dialogs')).AllDialogs)
 
-/** Every panel is a file of `panels/`. */
+/** Every file in `panels/` is a panel. */
 const PANELS = panelsOf(import.meta.glob<{ panel: Panel }>('./panels/*.tsx', { eager: true }))
 
 /** A tab without a close button: panels can be moved but not closed. */

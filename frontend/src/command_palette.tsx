@@ -24,7 +24,7 @@ export function CommandPalette() {
       nothing={`No command matches “${typed}”. To add a block, type its name on the sheet.`}
       items={found.map(({ title, keys }) => ({ key: title, title, ...(keys ? { keys } : {}) }))}
       onPick={(index) => {
-        // When the list has closed and the focus is back.
+        // Executed after the list has closed and the focus has returned.
         setTimeout(() => found[index]?.run())
       }}
     />

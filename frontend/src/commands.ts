@@ -6,7 +6,7 @@ import { exportDrawing, openReport } from './documents/export'
 import { startOrResume } from './run/start'
 import { alter, ask, change, look, useStudio } from './store'
 
-/** A command: in the command palette, in the list of keys, and by its key. */
+/** A command: shown in the command palette and in the list of keys, and executed by its key. */
 export interface Command {
   title: string
   /** Key combination, `Ctrl+Shift+G`; alternatives separated by a comma. */
@@ -92,7 +92,7 @@ const LIST: Command[] = [
   { title: 'All keys', keys: '?', run: () => show('keys') },
 ]
 
-/** Whether these keys, all of them with Ctrl, are the ones pressed. */
+/** Whether exactly these keys are pressed, all of them with Ctrl. */
 function pressed(keys: string, event: KeyboardEvent): boolean {
   return keys.split(', ').some((way) => {
     const parts = way.split('+')
@@ -106,7 +106,7 @@ function pressed(keys: string, event: KeyboardEvent): boolean {
   })
 }
 
-/** The command that these keys call, among those of the sheet or among all others. */
+/** The command for the pressed keys, among the commands of the sheet or among all others. */
 export function commandOf(event: KeyboardEvent, ofSheet: boolean): Command | undefined {
   const typing = event.target instanceof Element && event.target.closest('input, textarea') !== null
   return LIST.find(

@@ -13,7 +13,7 @@ export class Refusal extends Error {
   }
 }
 
-/** `up`; `down`: nothing answers; `stranger`: the server answers and does not know this page. */
+/** `up`; `down`: no reply; `stranger`: the server replies but does not accept the session of this page. */
 export type Line = 'up' | 'down' | 'stranger'
 
 interface Waiting {
@@ -24,23 +24,23 @@ interface Waiting {
 
 const FIRST_DELAY_MS = 250
 const LONGEST_DELAY_MS = 2000
-/** How often the page asks whether somebody is there, and how long it waits before it says that nobody is. */
+/** Interval of the connection test, and time without a reply after which the connection counts as lost. */
 const PING_MS = 1000
 const SILENCE_MS = 2500
-/** After this long without an answer the line is given up and made anew. */
+/** Time without a reply after which the connection is closed and opened again. */
 const DEAD_MS = 10_000
 
 /**
- * The websocket to the server. What was not answered when the line broke, and what is asked while it is down,
- * is sent when it is back and the page has its document again (`resend`): edits carry keys, so the server
- * does each once, and they outlive a reload of the page.
+ * The websocket to the server. Requests without a reply are sent again after a reconnection, when the page
+ * has its document again (`resend`), and also after a reload of the page. Edits carry keys, so the server
+ * applies each of them once.
  */
 export class Connection {
   private socket: WebSocket | null = null
   private number = 0
   private readonly waiting = new Map<number, Waiting>()
   private delay = FIRST_DELAY_MS
-  /** Whether requests may go out: not before the server knows again what this page shows. */
+  /** Whether requests may be sent: not until the server has reopened the documents of this page. */
   private flowing = false
   private asked = 0
   private onEvent: (event: ServerEvent) => void = () => {}
@@ -55,7 +55,7 @@ export class Connection {
     setInterval(() => this.listen(), PING_MS)
   }
 
-  /** Make the line; `onEvent` hears what the server tells. */
+  /** Open the connection; `onEvent` receives the events of the server. */
   open(onEvent: (event: ServerEvent) => void): void {
     this.onEvent = onEvent
     this.connect()
@@ -88,7 +88,7 @@ export class Connection {
     }
   }
 
-  /** Ask whether somebody is there; say so where nobody answers, and in the end make the line anew. */
+  /** Test the connection; report a missing reply, and after a longer time reconnect. */
   private listen(): void {
     const { socket } = this
     if (socket?.readyState !== WebSocket.OPEN) return
@@ -110,7 +110,7 @@ export class Connection {
     for (const [number, { request }] of this.waiting) if (request.kind === kind) this.waiting.delete(number)
   }
 
-  /** Ask the server for something; the promise fails with a Refusal. */
+  /** Send a request to the server; the promise is rejected with a Refusal. */
   ask<R extends Request>(request: R): Promise<ReplyTo<R>> {
     const number = ++this.number
     return new Promise<ReplyTo<R>>((resolve, reject) => {
@@ -120,7 +120,7 @@ export class Connection {
     })
   }
 
-  /** Let requests flow, first those that have no answer yet: called once the page has its document again. */
+  /** Send requests again, first those without a reply; called when the page has its document again. */
   resend(): void {
     this.flowing = true
     for (const [number, { request }] of this.waiting) this.send(number, request)
@@ -149,7 +149,7 @@ export class Connection {
   }
 }
 
-/** Whether the server is there and does not know this page: it was started anew, and the login is another. */
+/** Whether the server replies but rejects this page: it was restarted with a new login. */
 async function strange(): Promise<boolean> {
   try {
     const answer = await fetch(new URL('index.html', location.href), { method: 'HEAD', cache: 'no-store' })

@@ -2,7 +2,7 @@ import { create } from 'zustand'
 import { ask, useStudio } from './store'
 
 /**
- * All dialogs, except that of a block (`useStudio().edit`) and the tour.
+ * All dialogs except that of a block (`useStudio().edit`) and the tour.
  */
 type Dialog =
   | 'commands'
@@ -18,22 +18,21 @@ type Dialog =
 
 interface Dialogs {
   open: Dialog | null
-  /** Distinguishes one opening from the next. */
+  /** Distinguishes consecutive openings of the dialog. */
   times: number
-  /** Text typed into the lists that are searched. */
+  /** Text typed into the search lists. */
   typed: string
   /**
-   * The subsystem whose mask is edited; `''` is the model. `ofSheet`: it is the one whose sheet is on the
-   * screen.
+   * The subsystem whose mask is edited; `''` is the model. `ofSheet`: it is the subsystem of the visible sheet.
    */
   of: string
   ofSheet: boolean
-  /** Where a new block goes, in screen px; `null` is a free place. */
+  /** Position of a new block, screen px; `null` selects a free position. */
   at: { x: number; y: number } | null
 }
 
 /**
- * Which dialog is open: known before the dialogs themselves, which come after the first picture of the page.
+ * The open dialog. This state is loaded before the dialogs, which load after the first rendering of the page.
  */
 export const useDialogs = create<Dialogs>(() => ({
   open: null,
@@ -44,7 +43,7 @@ export const useDialogs = create<Dialogs>(() => ({
   at: null,
 }))
 
-/** Open a dialog, or close the one that is open. */
+/** Open a dialog, or close the open one. */
 export function show(open: Dialog | null, typed = '', at: Dialogs['at'] = null): void {
   // A closing dialog still shows its content for a moment.
   useDialogs.setState((s) => (open ? { open, times: s.times + 1, typed, at } : { open }))
@@ -55,12 +54,12 @@ export const useTour = create<{ stop: number | null }>(() => ({ stop: null }))
 
 export const openTour = (): void => useTour.setState({ stop: 0 })
 
-/** Configuration parameters are those of a document. */
+/** The configuration parameters belong to a document. */
 export function openConfiguration(): void {
   if (useStudio.getState().document) show('configuration')
 }
 
-/** The mask of a subsystem on the sheet; without one that of the sheet itself. */
+/** Edit the mask of a subsystem on the sheet; without a block, the mask of the sheet. */
 export function openMask(block?: string): void {
   const { document } = useStudio.getState()
   if (!document) return
@@ -68,12 +67,12 @@ export function openMask(block?: string): void {
   show('mask')
 }
 
-/** The files of the project folder as they are now, and those used last. */
+/** Request the present files of the project folder and the recent files. */
 export async function projectFiles(): Promise<{ files: string[]; recent: string[] }> {
   return (await ask({ kind: 'files' })) ?? { files: [], recent: [] }
 }
 
-/** Save under the present name; asks for one where there is none. */
+/** Save under the present name; without a file, ask for a name. */
 export async function save(): Promise<void> {
   const { document } = useStudio.getState()
   if (!document) return

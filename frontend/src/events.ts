@@ -31,12 +31,12 @@ function changed(document: OpenDocument, state: DocumentState, change: ChangeOf<
 
 function checked(document: OpenDocument, event: Checked): OpenDocument {
   if (event.version !== document.state.version) return document
-  // While something is wrong nothing new is known of the wires; what was known still helps the eye.
+  // With an error in the diagram no new signal types are known; the previous ones remain displayed.
   const wireKinds = event.findings.length ? document.wireKinds : event.wires
   return { ...document, findings: event.findings, wireKinds }
 }
 
-/** What each event of the server changes. */
+/** The changes of the state for each event of the server. */
 const HEARD: { [Kind in ServerEvent['kind']]: (event: EventOf<Kind>) => void } = {
   welcome,
   documents: ({ documents, recoveries }) => useStudio.setState({ documents, recoveries }),
@@ -50,19 +50,19 @@ const HEARD: { [Kind in ServerEvent['kind']]: (event: EventOf<Kind>) => void } =
   reply: () => {},
 }
 
-/** What a document of each kind changes that a page shows from now on. */
+/** The changes of the state when a document of each kind is opened. */
 const OPENED: { [Kind in DocumentKind]: (event: EventOf<'opened'>, content: ContentOf<Kind>) => void } = {
   diagram: diagramOpened,
   robot: robotOpened,
 }
 
-/** What a change of a document of each kind changes on the page. */
+/** The changes of the state when a document of each kind changes. */
 const CHANGED: { [Kind in DocumentKind]: (event: EventOf<'changed'>, change: ChangeOf<Kind>) => void } = {
   diagram: diagramChanged,
   robot: robotChanged,
 }
 
-/** What the page shows after the server has told something. */
+/** Update the state after an event of the server. */
 export function receive<Kind extends ServerEvent['kind']>(event: EventOf<Kind> & { kind: Kind }): void {
   HEARD[event.kind](event)
 }
@@ -142,7 +142,7 @@ function documentChecked(event: EventOf<'checked'>): void {
 }
 
 function runStarted(event: EventOf<'run_started'>): void {
-  // Told again after the line was down: its samples are the same.
+  // Sent again after a reconnection: the samples are the same.
   if (useStudio.getState().run?.run === event.run) return
   runs.began(event)
   useStudio.setState({
@@ -167,7 +167,7 @@ function runStarted(event: EventOf<'run_started'>): void {
 function runProgressed(event: EventOf<'run_progress'>): void {
   const { run } = useStudio.getState()
   runs.progressed(event)
-  // Progress of a run may be shown later; all other messages about it are handled at once.
+  // The progress of a run may be displayed later; other messages of a run are handled at once.
   if (
     run?.run === event.run &&
     (event.state !== 'running' || run.state !== 'running' || isFree(performance.now()))
@@ -187,7 +187,7 @@ function runProgressed(event: EventOf<'run_progress'>): void {
   if (event.fault) refuse(event.fault)
 }
 
-/** Show the document that this page showed before, or else what its address names; then let requests flow. */
+/** Reopen the last document of this page, or the one in its address; then send the pending requests. */
 async function showAgain(welcome: EventOf<'welcome'>): Promise<void> {
   const robot = await attachAgain()
   await showDiagramAgain(welcome)

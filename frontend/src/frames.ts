@@ -1,7 +1,7 @@
 /**
- * Views of data outside React's state: samples, the time cursor, sizes. Each view is called
- * in the animation frame after a change, and compares there what it shows with what it drew last. While
- * nothing changes the page requests no frames.
+ * Views of data outside React's state: samples, the time cursor, sizes. Each view is called in the animation
+ * frame after a change and compares the present data with the drawn data. Without changes the page requests
+ * no frames.
  */
 type Look = (now: number) => void
 
@@ -17,7 +17,7 @@ export function changed(): void {
 }
 
 /**
- * Call `look` in the next animation frame and in the frame after every change; returns the function that ends
+ * Call `look` in the next animation frame and in the frame after every change. Returns a function that ends
  * this.
  */
 export function watch(look: Look): () => void {

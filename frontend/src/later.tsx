@@ -7,9 +7,8 @@ const PATIENCE_MS = 1500
 const parts: (() => Promise<unknown>)[] = []
 
 /**
- * A part of the page that is not in its first download: fetched as soon as the page has shown its document
- * and has nothing else to do, or earlier where somebody wants it. Until it is there, `words` stand in its
- * place.
+ * A part of the page that is not in the first download. It is fetched when the page has shown its document
+ * and is idle, or earlier if it is needed. Until then, `words` is displayed in its place.
  */
 export function later(load: () => Promise<ComponentType>, words = ''): ComponentType {
   const Part = lazy(() => load().then((part) => ({ default: part })))

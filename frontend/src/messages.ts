@@ -1,9 +1,9 @@
 import type { DocumentState, Envelope, Replies, ServerMessage } from './protocol'
 
 export type Request = Envelope['request']
-/** The value of the reply to a request: declared with its class in Python. */
+/** The value of the reply to a request, as declared in Python. */
 export type ReplyTo<R extends Request> = Replies[R['kind']]
-/** An edit of a document: the server refuses what is of another kind of document. */
+/** An edit of a document; the server refuses edits for another kind of document. */
 export type Edit = Extract<Request, { kind: 'change' }>['edit']
 export type DocumentKind = DocumentState['kind']
 export type ServerEvent = ServerMessage['event']

@@ -3,7 +3,7 @@ import { IconAlertTriangle } from '@tabler/icons-react'
 import { DiskNotice } from './documents/disk_notice'
 import { useStudio } from './store'
 
-/** What the server refused, and that the line is down: in words, with what to do. */
+/** Notices about refused requests and a lost connection, with remedies. */
 export function Notices() {
   const notices = useStudio((s) => s.notices)
   const line = useStudio((s) => s.line)

@@ -3,20 +3,20 @@ import { useEffect, useState, type ComponentType, type FunctionComponent } from 
 
 type Body = FunctionComponent<IDockviewPanelProps>
 
-/** A panel of the studio. Each file of `panels/` exports one as `panel`; the name of the file is its key. */
+/** A panel of the studio. Each file in `panels/` exports one as `panel`; the file name is its key. */
 export interface Panel {
   title: string
   component: Body
-  /** Panels are added in this order: each takes its space from the one beside which it stands. */
+  /** Order in which panels are added; each takes its space from the panel beside which it is placed. */
   order: number
   /**
-   * Where it is at first: beside another panel, with a size in px, or a tab behind it. The first panel has
-   * no place.
+   * Initial position: beside another panel, with a size in px, or as a tab behind it. The first panel has no
+   * position.
    */
   place?: { beside: string; side: 'left' | 'right' | 'below'; size: number } | { behind: string }
 }
 
-/** The panels of these files: their components by key, and what adds all of them to the dock. */
+/** The panels of these files: components by key, and a function that adds all panels to the dock. */
 export function panelsOf(files: Record<string, { panel: Panel }>) {
   const panels = Object.entries(files)
     .map(([path, { panel }]) => ({ id: path.replace(/^.*\/|\.tsx$/g, ''), ...panel }))
@@ -36,7 +36,7 @@ function spot(place: Panel['place']) {
   return side === 'below' ? { position, initialHeight: size } : { position, initialWidth: size }
 }
 
-/** A panel that is rendered when it is first shown: hidden panels cost nothing. */
+/** A panel that is rendered when it is first visible, so that hidden panels cost nothing. */
 export function inFront(Part: ComponentType): Body {
   return function Panel({ api }) {
     const [seen, setSeen] = useState(api.isVisible)

@@ -1,7 +1,7 @@
 import { changed } from './frames'
 import { RunSamples } from './model/run_samples'
 
-/** The samples of the run on the screen; another object for each run. */
+/** The samples of the displayed run; a new object for each run. */
 export let samples = new RunSamples('', [], {})
 
 export function showSamples(shown: RunSamples): void {

@@ -1,7 +1,6 @@
 /**
- * How a list that drops down is scrolled: by the browser. Mantine's own scroll area asks for every animation
- * frame for ever where it is closed within 100 ms of its last scrolling, which lists do that scroll to what
- * is chosen.
+ * Scrolling of drop-down lists by the browser. Mantine's scroll area requests animation frames without end
+ * if it is closed within 100 ms after scrolling, as in lists that scroll to the selected entry.
  */
 export const SCROLLED = {
   withScrollArea: false,

@@ -4,7 +4,7 @@ import { commands } from './commands'
 import { show, useDialogs } from './dialogs'
 import { KEYS } from './key_list'
 
-/** Every key of the page, by the place where it is heard. */
+/** The list of all keys, by the place where they are handled. */
 export function Shortcuts() {
   const opened = useDialogs((s) => s.open === 'keys')
   const called = commands().flatMap(({ keys, title }): [string, string][] => (keys ? [[keys, title]] : []))

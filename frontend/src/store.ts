@@ -19,19 +19,19 @@ import type {
 } from './protocol'
 import { samples } from './samples'
 
-/** The diagram on the screen: what the server last said of it. */
+/** The displayed diagram, in the last state sent by the server. */
 export interface OpenDocument {
   state: DocumentState
-  /** How it is run, by the names of `SimulationOptions`. */
+  /** The run settings, by the names of `SimulationOptions`. */
   settings: Record<string, number | string | null>
-  /** Names of the subsystems on the way to the sheet on the screen. */
+  /** Names of the subsystems that lead to the displayed sheet. */
   inside: string[]
   name: string
   description: string
   blocks: Record<string, SheetBlock>
   wires: Wire[]
   notes: Record<string, SheetNote>
-  /** The library block that the sheet belongs to, by its path; empty for a sheet of one's own. */
+  /** Path of the library block that contains the sheet; empty if the sheet is not in a library block. */
   linked: string[]
   link: string
   logged: string[]
@@ -47,7 +47,7 @@ export interface RunView {
   realTimeFactor: number
   message: string
   fault: Fault | null
-  /** What worked it out and why that: known at the end. */
+  /** The solver that was used and the reason for its choice, known at the end. */
   solver: string
   reason: string
   channels: Channel[]
@@ -64,10 +64,10 @@ export interface Notice {
 
 interface Studio {
   line: Line
-  /** What the server has open, and what it offers to recover. */
+  /** The open and the recoverable documents of the server. */
   documents: DocumentState[]
   recoveries: Recovery[]
-  /** Whether this page has come back to what it showed: then it is not stopped by what others lost. */
+  /** Whether this page has reopened its document; it then shows no recovery dialog for other documents. */
   returned: boolean
   welcome: EventOf<'welcome'> | null
   library: Map<string, BlockType>
@@ -75,7 +75,7 @@ interface Studio {
   run: RunView | null
   selection: ReadonlySet<string>
   editing: string | null
-  /** A block that is to be brought into the middle of the window. */
+  /** A block that is to be centred in the window. */
   sought: string | null
   notices: Notice[]
   select: (names: Iterable<string>) => void
@@ -102,7 +102,7 @@ export const useStudio = create<Studio>((set) => ({
 }))
 useStudio.subscribe(viewsChanged)
 
-/** The line to the server; `events.ts` says what happens when the server tells something. */
+/** The connection to the server; `events.ts` handles its events. */
 export const line = new Connection(
   (frame) => {
     samples.receive(frame)
@@ -114,13 +114,13 @@ export const line = new Connection(
 
 let notices = 0
 
-/** Show what was refused, or why a run ended, in words. */
+/** Show a notice for a refused request or a failed run. */
 export function refuse({ what, where, fix }: Pick<Fault, 'what' | 'where' | 'fix'>): void {
   const notice = { id: ++notices, what: where ? `${where}: ${what}` : what, fix }
   useStudio.setState((s) => ({ notices: [...s.notices.slice(-4), notice] }))
 }
 
-/** Ask the server; a refusal becomes a notice, and the promise then gives undefined. */
+/** Send a request; a refusal is shown as a notice, and the promise then resolves to undefined. */
 export async function ask<R extends Request>(request: R): Promise<ReplyTo<R> | undefined> {
   try {
     return await line.ask(request)
@@ -131,15 +131,15 @@ export async function ask<R extends Request>(request: R): Promise<ReplyTo<R> | u
   }
 }
 
-/** By what the server tells the edits of this page from those of others. */
+/** Identifies the edits of this page. */
 export const author = newKey()
 
-/** What goes with every change of a document: which, what this page saw of it, and a key to do it once. */
+/** The common fields of all changes of a document: document, displayed version, author and unique key. */
 export function alteration({ document, version }: DocumentState) {
   return { document, key: newKey(), base: version, author }
 }
 
-/** Carry out an edit of the diagram on the screen; where it is refused the sheet is shown as it is. */
+/** Apply an edit to the displayed diagram; if it is refused, the sheet is restored. */
 export async function change(edit: Edit): Promise<number | undefined> {
   const { document } = useStudio.getState()
   if (!document) return undefined
@@ -149,13 +149,13 @@ export async function change(edit: Edit): Promise<number | undefined> {
   return version
 }
 
-/** Carry out an edit of the sheet at a path of subsystems; a refusal is thrown to who asks. */
+/** Apply an edit to the sheet at a path of subsystems; a refusal is thrown to the caller. */
 export async function attempt(edit: Edit, inside: string[]): Promise<void> {
   const { document } = useStudio.getState()
   if (document) await line.ask({ kind: 'change', ...alteration(document.state), inside, edit })
 }
 
-/** Take the last step of a document back, do it again, or take what its file holds now. */
+/** Undo or redo a step of a document, or reload its file. */
 export function alter(
   kind: 'undo' | 'redo' | 'reload',
   of: DocumentState | undefined = useStudio.getState().document?.state,
@@ -163,18 +163,18 @@ export function alter(
   if (of) void ask({ kind, ...alteration(of) })
 }
 
-/** Bring a document that the server has open to the front of this page. */
+/** Show a document that the server has open. */
 export function bringToFront({ document, kind, path, origin }: DocumentState): Promise<string | undefined> {
   return ask({ kind: 'attach', document, document_kind: kind, path, origin })
 }
 
-/** Look at the sheet inside a subsystem; the empty path is the whole model. */
+/** Show the sheet inside a subsystem; the empty path is the top sheet. */
 export function look(inside: string[]): void {
   const document = useStudio.getState().document
   if (document) void ask({ kind: 'look', document: document.state.document, inside })
 }
 
-/** Show a block: its sheet, with it selected. */
+/** Show the sheet of a block and select the block. */
 export async function showBlock(inside: string[], name: string): Promise<void> {
   const { document } = useStudio.getState()
   if (!document) return
@@ -183,7 +183,7 @@ export async function showBlock(inside: string[], name: string): Promise<void> {
   useStudio.setState({ selection: new Set([name]), sought: name })
 }
 
-/** A name for a new block that no other has: "Gain", "Gain 2", … */
+/** An unused name for a new block: "Gain", "Gain 2", … */
 export function freeName(wish: string, taken: Iterable<string>): string {
   const folded = new Set([...taken].map((name) => name.toLowerCase()))
   if (!folded.has(wish.toLowerCase())) return wish

@@ -1,11 +1,11 @@
 import { createTheme, type AlertProps, type MantineTheme } from '@mantine/core'
 
-/** Colours, type and corners of the component library, as everywhere in armblocks. */
+/** Colours, fonts and corners of the component library, as in all figures of armblocks. */
 export const theme = createTheme({
   fontFamily: 'var(--font)',
   fontFamilyMonospace: 'var(--mono)',
   colors: {
-    // The greys of the component library are neutral: ours lean to warm in the light, to blue in the dark.
+    // The greys of the component library are neutral; these are warmer in the light, bluer in the dark theme.
     gray: [
       '#f6f4f1',
       '#f1eeea',
@@ -61,8 +61,8 @@ export const theme = createTheme({
   autoContrast: true,
   defaultRadius: 'sm',
   components: {
-    // The colours of titles and labels on their own tint are too pale to read; the tints are those of every
-    // message.
+    // The colours of titles and labels have too little contrast on their own tint; the tints are those of all
+    // messages.
     Alert: {
       styles: { title: { color: 'var(--ink)' } },
       vars: (_theme: MantineTheme, { color }: AlertProps) => {
@@ -75,9 +75,9 @@ export const theme = createTheme({
         }
       },
     },
-    // A stop for the focus before the first entry is no entry; the arrows find the entries without it.
+    // The focus stop before the first entry is not an entry; the arrow keys do not need it.
     Menu: { defaultProps: { withInitialFocusPlaceholder: false } },
-    // The page never scrolls; to forbid it anyway would style the whole of it anew for each dialog.
+    // The page never scrolls; disabling it would restyle the whole page for each dialog.
     Modal: { defaultProps: { closeButtonProps: { 'aria-label': 'Close' }, lockScroll: false } },
   },
   fontSizes: { xs: '11px', sm: '12px', md: '13px', lg: '15px', xl: '18px' },

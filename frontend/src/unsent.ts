@@ -2,21 +2,21 @@ import type { Request } from './messages'
 
 const PLACE = 'armblocks-unsent'
 
-/** Whether a request changes something, and may be sent twice: the server does what has a key once. */
+/** Whether a request changes something and can be repeated: the server applies each key once. */
 const isAlteration = (request: Request) => 'key' in request && Boolean(request.key)
 
-/** Note what this tab has asked for and has no answer to, so that a reload does not lose it. */
+/** Store the requests of this tab without a reply, so that a reload does not lose them. */
 export function keepUnsent(requests: Iterable<Request>): void {
   const kept = [...requests].filter(isAlteration)
   try {
     if (kept.length) sessionStorage.setItem(PLACE, JSON.stringify(kept))
     else sessionStorage.removeItem(PLACE)
   } catch {
-    // More than the browser keeps for a tab: it is still sent from memory, only a reload would lose it.
+    // Over the storage limit of the browser: requests are still sent from memory, but a reload loses them.
   }
 }
 
-/** What this tab had asked for before it was loaded anew. */
+/** The stored requests from before the reload of this tab. */
 export function unsent(): Request[] {
   return JSON.parse(sessionStorage.getItem(PLACE) ?? '[]') as Request[]
 }

@@ -27,7 +27,7 @@ const files = {
   },
 } satisfies Record<string, { panel: Panel }>
 
-test('a file is a panel, which stands where it says', () => {
+test('a file is a panel at its declared position', () => {
   const added: unknown[] = []
   const addPanel = ((options: unknown) => added.push(options)) as unknown as DockviewApi['addPanel']
   const { arrange, components } = panelsOf({ ...files, ...ADDED })

@@ -7,7 +7,7 @@ const row = [
   [5, 6, 7, 8],
 ]
 
-test('bodies are not drawn at the poses of another form of the robot', () => {
+test('bodies are not drawn with poses of another number of rows', () => {
   const poses = fitting(scene, [row, row, row])
   expect([poses?.(2, 3), poses?.(1, 4)]).toEqual([4, 5])
   expect(fitting(scene, [row, row])).toBeUndefined()

@@ -6,8 +6,8 @@ import { alter, ask, useStudio } from '../store'
 import { show } from '../dialogs'
 
 /**
- * That somebody else has written the file of a document, or that nothing keeps its edits: with what can be
- * done.
+ * Notice that another program has changed the file of a document, or that its journal cannot be written,
+ * with the possible actions.
  */
 function FileNotice({ state, saveAs }: { state: DocumentState; saveAs: () => void }) {
   const { document, path, disk, dirty, journaled } = state

@@ -3,8 +3,7 @@ import { useStudio } from '../store'
 const CHECK = { headers: { 'X-Armblocks': '1' } }
 
 /**
- * Save a drawing of the sheet on the screen: what `armblocks diagram` writes, in the colours of this page for
- * SVG and PNG.
+ * Save a drawing of the visible sheet, as `armblocks diagram` does; SVG and PNG have the theme of this page.
  */
 export function exportDrawing(kind: 'svg' | 'png' | 'pdf'): void {
   const { document } = useStudio.getState()
@@ -26,7 +25,7 @@ async function download(path: string, name: string): Promise<void> {
   setTimeout(() => URL.revokeObjectURL(link.href), 1000)
 }
 
-/** Open the report of the model in another tab: the one that the command line writes. */
+/** Open the report of the model in another tab; it equals the report of the command line. */
 export function openReport(): void {
   const { document } = useStudio.getState()
   if (document) window.open(`report/${document.state.document}`, '_blank')

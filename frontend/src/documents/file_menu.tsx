@@ -17,7 +17,7 @@ import { save, show } from '../dialogs'
 /** Maximum number of files in the menu; the dialog lists all. */
 const MOST_FILES = 12
 
-/** The menu of documents: new, open, save, what is open, what can be recovered, and the examples. */
+/** The menu of documents: new, open, save, open documents, recoverable documents, examples. */
 export function FileMenu() {
   const welcome = useStudio((s) => s.welcome)
   const recoveries = useStudio((s) => s.recoveries)
@@ -118,7 +118,7 @@ function Shipped() {
   )
 }
 
-/** The diagrams that are open besides the one on the screen, and the robots. */
+/** The other open diagrams, and the robots. */
 function OpenDocuments() {
   const documents = useStudio((s) => s.documents)
   const here = useStudio((s) => s.document?.state.document)

@@ -1,6 +1,6 @@
 import type { DocumentState } from '../protocol'
 
-/** The document that a tab showed last, which is shown again after a reload. */
+/** The last document of a tab, which is shown again after a reload. */
 interface Shown {
   document: string
   inside: string[]
@@ -10,7 +10,7 @@ interface Shown {
 
 const PLACE = 'armblocks-shown'
 
-/** Note what this tab shows; a document that has a file gives the address its name. */
+/** Store which document this tab shows; the address contains the path of its file. */
 export function remember({ document, path, origin }: DocumentState, inside: string[]): void {
   const address = path ? `#${encodeURI(path)}` : ''
   if (location.hash !== address) history.replaceState(null, '', address || location.pathname)
@@ -18,7 +18,7 @@ export function remember({ document, path, origin }: DocumentState, inside: stri
   sessionStorage.setItem(PLACE, JSON.stringify({ address, shown }))
 }
 
-/** What this tab showed last, unless it was given another address since. */
+/** The last document of this tab, unless its address has changed since. */
 export function lastShown(): Shown | undefined {
   const kept = sessionStorage.getItem(PLACE)
   if (!kept) return undefined

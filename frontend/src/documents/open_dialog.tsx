@@ -4,7 +4,7 @@ import { useEffect, useState } from 'react'
 import { ask, bringToFront, useStudio } from '../store'
 import { projectFiles, show, useDialogs } from '../dialogs'
 
-/** Open: what is open now, what was used last, and every file of the project folder. */
+/** The Open dialog: open documents, recent files, and all files of the project folder. */
 export function OpenDialog() {
   const opened = useDialogs((s) => s.open === 'open')
   const times = useDialogs((s) => s.times)

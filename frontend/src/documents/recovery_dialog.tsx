@@ -9,7 +9,7 @@ const when = (seconds: number) =>
 
 const counted = (count: number, thing: string) => `${count} ${thing}${count === 1 ? '' : 's'}`
 
-/** Unsaved work from the last session: offered when a page connects, and later in the menu. */
+/** Unsaved work of the last session; offered when a page connects, and later in the menu. */
 export function RecoveryDialog() {
   const recoveries = useStudio((s) => s.recoveries)
   const opened = useDialogs((s) => s.open === 'recovery')

@@ -2,7 +2,7 @@ import { Text, Tooltip } from '@mantine/core'
 import { useEffect } from 'react'
 import { useStudio } from '../store'
 
-/** The document's name, and whether it has unsaved changes; also in the window's title. */
+/** The name of the document and whether it has unsaved changes; also in the window title. */
 export function DocumentTitle() {
   const state = useStudio((s) => s.document?.state)
   const description = useStudio((s) => s.document?.description)

@@ -8,7 +8,7 @@ const WIDTH = 320
 const GAP = 14
 
 interface Stop {
-  /** The element of the page; the first that exists. */
+  /** Selectors of the highlighted element; the first existing one is used. */
   at: string
   title: string
   text: string
@@ -67,7 +67,7 @@ function leave(): void {
   localStorage.setItem(SEEN, 'yes')
 }
 
-/** A tour of the page of two minutes: offered at the first visit, and on request. */
+/** A tour of the page, about two minutes; offered at the first visit and in the menu. */
 export function Tour() {
   const { stop } = useTour()
   const offered = useStudio((s) => s.document !== null)
@@ -170,7 +170,7 @@ function Offer({ done }: { done: () => void }) {
   )
 }
 
-/** Position of the text: right of the element, left of it, or else over its middle. */
+/** Position of the text: right of the element, else left of it, else over its centre. */
 function beside(box: DOMRect | null): React.CSSProperties {
   if (!box) return { left: (innerWidth - WIDTH) / 2, top: innerHeight / 3, width: WIDTH }
   const top = Math.min(Math.max(box.y + 8, 8), innerHeight - 190)

@@ -9,8 +9,7 @@ import { valueText } from './value_text'
 const CHECK_DELAY_MS = 200
 
 /**
- * The parameters of a block, made from its own declaration: what each is, its unit, what is allowed, what it
- * means.
+ * The parameters of a block, generated from its declaration: name, unit, allowed values, description.
  */
 export function BlockDialog() {
   const name = useStudio((s) => s.editing)
@@ -214,7 +213,7 @@ function Field({ rule, block, text, focus, onText, onFault }: FieldProps) {
   )
 }
 
-/** The server's answer to a text while it is typed: its value, or the error. */
+/** The server's evaluation of a text while it is typed: its value, or the error. */
 function useCheck(rule: ParameterRule, block: SheetBlock, text: string, onFault: (fault: string) => void) {
   const [state, setState] = useState({ fault: '', value: '' })
   useEffect(() => {

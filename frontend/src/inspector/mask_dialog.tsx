@@ -20,8 +20,8 @@ const KINDS = [
 const COLUMNS = ['Name', 'Kind', 'Default', 'Unit', 'Range or choices', 'Description']
 
 /**
- * A parameter as its row is typed; `range` is `0 … 10`, `> 0`, or for a choice what may be chosen, apart by
- * commas.
+ * A parameter as typed in its row; `range` is for example `0 … 10` or `> 0`; for a choice, the allowed
+ * values separated by commas.
  */
 interface Row {
   key: string
@@ -37,8 +37,8 @@ interface Row {
 const close = () => show(null)
 
 /**
- * The parameters of a subsystem or of the model: declared, renamed, ordered. Blocks inside may have formulas
- * over them.
+ * The mask of a subsystem or of the model: parameters are declared, renamed and ordered. Formulas of the
+ * blocks inside can use them.
  */
 export function MaskDialog() {
   const opened = useDialogs((s) => s.open === 'mask')
@@ -317,8 +317,8 @@ function Order({ name, first, last, swap, remove }: OrderProps) {
 }
 
 /**
- * Where a mask lies: a block of the sheet on the screen, or that whole sheet, which is a block of the one
- * around it.
+ * The owner of a mask: a block of the visible sheet, or the visible sheet itself, which is a block of the
+ * sheet around it.
  */
 function place(): { inside: string[]; block: string } {
   const { of, ofSheet } = useDialogs.getState()
@@ -326,7 +326,7 @@ function place(): { inside: string[]; block: string } {
   return { inside: of && ofSheet ? inside.slice(0, -1) : inside, block: of }
 }
 
-/** What a row begins with when its kind is another. */
+/** The initial values of a row after a change of its type. */
 function fresh(kind: string, robots: string[]): Partial<Row> {
   if (kind === 'boolean') return { value: 'true', range: '' }
   if (kind === 'robot') return { value: robots[0] ?? '', range: '' }
@@ -372,7 +372,7 @@ function rangeText(minimum: number | null, above: number | null, maximum: number
   return low ? `${low} … ${maximum}` : `<= ${maximum}`
 }
 
-/** The bounds that a range says; a bound that is no number is NaN. */
+/** The bounds in a range text; an invalid bound is NaN. */
 function bounds(range: string): Pick<MaskParameter, 'minimum' | 'above' | 'maximum'> {
   const found = { minimum: null, above: null, maximum: null } as {
     minimum: number | null
@@ -390,7 +390,7 @@ function bounds(range: string): Pick<MaskParameter, 'minimum' | 'above' | 'maxim
   return found
 }
 
-/** Whether numbers of this kind have bounds, and whether those of a row can be read. */
+/** Whether parameters of this type have bounds, and whether the bounds of a row are valid. */
 const isRanged = (kind: Row['kind']): boolean => kind === 'number' || kind === 'array' || kind === 'integer'
 const isReadable = ({ kind, range }: Row): boolean =>
   !isRanged(kind) || !Object.values(bounds(range)).some(Number.isNaN)

@@ -7,7 +7,7 @@ import { line, look, useStudio } from '../store'
 
 const SEPARATOR = '/'
 
-/** The subsystems of the model as a tree: a click shows the sheet. */
+/** The subsystems of the model as a tree; a click opens the sheet. */
 export function Explorer() {
   const document = useStudio((s) => s.document?.state.document)
   const version = useStudio((s) => s.document?.state.version)

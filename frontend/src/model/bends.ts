@@ -10,7 +10,7 @@ const STUB = 15
 export const isFlat = (path: readonly Point[], piece: number): boolean =>
   path[piece]![1] === path[piece + 1]![1]
 
-/** A wire's whole way: its own path, and before it what it shares with the wire that it branches from. */
+/** The complete route of a wire: its own path, preceded by the part shared with the wire it branches from. */
 export function wholeWay(net: RoutedNet, key: string, seen: ReadonlySet<string> = new Set([key])): Point[] {
   const own = net.paths.get(key) ?? []
   const [start] = own
@@ -38,8 +38,8 @@ function lies(p: Point, a: Point, b: Point): boolean {
 }
 
 /**
- * The coordinates of the pieces between the first, which goes with the source, and the last, which goes with
- * the target.
+ * The coordinates of the segments between the first, which moves with the source, and the last, which moves
+ * with the target.
  */
 function pieces(way: readonly Point[]): number[] {
   const between: number[] = []
@@ -48,8 +48,8 @@ function pieces(way: readonly Point[]): number[] {
 }
 
 /**
- * The bends after piece `piece` of a way was dragged to `level`. A piece at a port stays there for a short
- * way, and a step leads from it to the level: the port itself does not move.
+ * The bends after segment `piece` of a route was dragged to `level`. A segment at a port keeps a short part
+ * at the port and continues with a step to the level, because the port does not move.
  */
 export function dragged(way: readonly Point[], piece: number, level: number): number[] {
   const between = pieces(way)
@@ -66,7 +66,7 @@ export function dragged(way: readonly Point[], piece: number, level: number): nu
   return straightened(piece === 0 ? [leaving, level, ...between] : [...between, level, arriving])
 }
 
-/** Without steps that have become level with what comes before them. */
+/** Remove steps of zero length. */
 function straightened(bends: number[]): number[] {
   const kept = [...bends]
   for (let k = 0; k + 2 < kept.length; k++)

@@ -14,8 +14,8 @@ const known = new Map<string, Difference>()
 const MOST_KNOWN = 256
 
 /**
- * `compared - baseline` at the baseline's instants, where both have values. Between two samples of the other
- * run the straight line counts.
+ * `compared - baseline` at the instants of the baseline, where both have values. The compared run is
+ * interpolated linearly between its samples.
  */
 export function difference(
   baseline: RunSamples,

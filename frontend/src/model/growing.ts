@@ -1,14 +1,14 @@
 import type { Drawn } from './trace'
 
-/** How a trace is drawn: the colour as the canvas wants it, and CSS px. */
+/** Line style of a trace: colour for the canvas, and width and dashes in CSS px. */
 export interface Stroke {
   colour: string
   dash: number[]
 }
 
 /**
- * A plot that is drawn already: its canvas, where on it the lines lie, and where a value is there (device
- * px).
+ * A plot that is already drawn: its canvas, the area of the lines on it, and the mapping from values to
+ * device px.
  */
 export interface Surface {
   ctx: CanvasRenderingContext2D
@@ -19,11 +19,11 @@ export interface Surface {
 const WIDTH = 1.5
 
 /**
- * Draws the new samples of a run onto an existing plot: the cost of a frame is that of its new samples. The
- * lines look like those of uPlot, which redraws the whole plot when anything else changes.
+ * Draws the new samples of a run onto an existing plot, so that a frame costs only its new samples. The
+ * lines equal those of uPlot, which redraws the whole plot when anything else changes.
  */
 export class Growing {
-  /** Of each trace the row that was drawn last, and how far its dashes have come (px). */
+  /** For each trace the last drawn row, and the phase of its dashes (px). */
   private rows: number[] = []
   private lengths: number[] = []
 
@@ -39,8 +39,7 @@ export class Growing {
   }
 
   /**
-   * Draw what came after; `ends` are the rows from which on nothing is certain yet, `ratio` device px per CSS
-   * px.
+   * Draw the new rows; from the rows `ends` on, values may still change. `ratio` is device px per CSS px.
    */
   grow([time, ...columns]: Drawn, factor: number, ends: number[], ratio: number): void {
     const { ctx, bbox } = this.plot
@@ -49,7 +48,7 @@ export class Growing {
     ctx.beginPath()
     ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height)
     ctx.clip()
-    // Where uPlot puts lines that are not as wide as pixels are.
+    // The offset that uPlot uses for lines whose width is not a whole number of pixels.
     ctx.translate((width % 2) / 2, (width % 2) / 2)
     ctx.lineWidth = width
     ctx.lineJoin = 'round'

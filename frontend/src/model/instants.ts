@@ -1,4 +1,4 @@
-/** Index of the first of `count` increasing times that is later than a time; `count` if none is. */
+/** Index of the first of `count` increasing times that is later than a time; `count` if there is none. */
 export function firstAfter(times: Float64Array, time: number, count = times.length): number {
   let low = 0
   let high = count

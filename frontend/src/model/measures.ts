@@ -8,7 +8,7 @@ export interface Measures {
   mean: number
   rms: number
   peakToPeak: number
-  /** From 10 to 90 % of the way from the first to the last value, s. */
+  /** Time from 10 to 90 % of the change between first and last value, s. */
   riseTime: number
   /** Overshoot beyond the last value, relative to the step. */
   overshoot: number
@@ -18,9 +18,8 @@ const SETTLED_PART = 0.05
 const SETTLED_BAND = 0.02
 
 /**
- * Measures of the straight lines between the samples, from one instant to another. Mean and RMS weigh by
- * time, so that uneven samples do not shift them: between samples a and b the integral of y² is
- * dt (a² + ab + b²) / 3.
+ * Measures of the linearly interpolated samples in a time window. Mean and RMS are weighted by time, so that
+ * uneven sampling does not affect them: between samples a and b the integral of y² is dt (a² + ab + b²) / 3.
  */
 export function measures(
   trace: { time: Float64Array; values: Float64Array },
@@ -63,7 +62,7 @@ export function measures(
   }
 }
 
-/** Rise time and overshoot, if the trace settles at another value than its first. */
+/** Rise time and overshoot, if the last value differs from the first. */
 function step(
   time: Float64Array,
   values: Float64Array,
@@ -98,7 +97,7 @@ function crossing(time: Float64Array, values: Float64Array, level: number, way: 
   return NaN
 }
 
-/** The part of a trace between two instants, its ends on the lines between samples. */
+/** The part of a trace between two instants; its ends are interpolated. */
 function cut(trace: { time: Float64Array; values: Float64Array }, from: number, to: number) {
   const { time, values } = trace
   const begin = Math.max(from, time[0] ?? Infinity)

@@ -2,17 +2,17 @@ import type { SheetBlock, Wire } from '../protocol'
 import { blockOf, wireKey, type Places } from './wires'
 import type { Point } from './router'
 
-/** Removal of blocks from wires and insertion into wires: the changes of a sheet's wires. */
+/** Disconnecting blocks from wires and inserting them into wires: the resulting changes of the wires. */
 
-/** px from a wire at which a block that is dropped goes into it. */
+/** Distance from a wire within which a dropped block is inserted into it, px. */
 const INTO_WIRE = 12
-/** px of wire beside a block that make it stand in the middle where there are no more. */
+/** Length of wire on both sides of an inserted block; on shorter segments the block is centred, px. */
 const ROOM = 60
 
 /** Whether a block can be inserted into a wire. */
 const passes = (block: SheetBlock): boolean => block.inputs.length > 0 && block.outputs.length > 0
 
-/** Whether a block has no wires, so that it can be inserted into a wire by dropping it there. */
+/** Whether a block has no wires, so that dropping it on a wire inserts it. */
 export function isLoose(block: SheetBlock, wires: Wire[]): boolean {
   return (
     passes(block) &&
@@ -21,8 +21,8 @@ export function isLoose(block: SheetBlock, wires: Wire[]): boolean {
 }
 
 /**
- * The wires without those between some blocks and all others; where that is one block with one input and one
- * output they close behind it.
+ * The wires without those between some blocks and all others. For a single block with one input and one
+ * output, its two neighbours are connected.
  */
 export function takenOut(blocks: SheetBlock[], wires: Wire[]): Wire[] {
   const names = new Set(blocks.map(({ name }) => name))
@@ -37,7 +37,7 @@ export function takenOut(blocks: SheetBlock[], wires: Wire[]): Wire[] {
   return [...left, ...driven.map(({ target }) => ({ source: driver.source, target }))]
 }
 
-/** The wires after the insertion of a block into one of them, by its first input and first output. */
+/** The wires after inserting a block into one of them with its first input and first output. */
 export function putInto(block: SheetBlock, wire: Wire, wires: Wire[]): Wire[] {
   const [input, output] = [block.inputs[0], block.outputs[0]]
   if (!input || !output) return wires
@@ -49,7 +49,7 @@ export function putInto(block: SheetBlock, wire: Wire, wires: Wire[]): Wire[] {
   ]
 }
 
-/** The edit that turns one list of wires into another. */
+/** The edit that changes one list of wires into another. */
 export function rewired(before: Wire[], after: Wire[]): { wires: Wire[]; instead: Wire[] } {
   const [old, next] = [new Set(before.map(wireKey)), new Set(after.map(wireKey))]
   return {
@@ -58,7 +58,7 @@ export function rewired(before: Wire[], after: Wire[]): { wires: Wire[]; instead
   }
 }
 
-/** A level piece of a wire: its height and its ends, and whether it runs to the left. */
+/** A horizontal segment of a wire: its height, its ends, and whether it runs to the left. */
 interface Piece {
   wire: Wire
   y: number
@@ -67,7 +67,7 @@ interface Piece {
   flipped: boolean
 }
 
-/** A wire as it is drawn: its ends by block and port, and its corner points. */
+/** A drawn wire: the block and port of its ends, and its corner points. */
 interface DrawnWire {
   id: string
   source: string
@@ -77,7 +77,7 @@ interface DrawnWire {
   data?: { path: readonly Point[] }
 }
 
-/** The horizontal segment under a point, of the existing wires. */
+/** The horizontal segment of an existing wire under a point. */
 export function wireAt(
   at: { x: number; y: number },
   edges: readonly DrawnWire[],
@@ -85,7 +85,7 @@ export function wireAt(
 ): Piece | undefined {
   const present = new Set(wires.map(wireKey))
   for (const { id, source, sourceHandle, target, targetHandle, data } of edges) {
-    // A wire that has just been reconnected does not take the block again.
+    // A wire that was closed when the block was disconnected does not take the block again.
     if (!present.has(id)) continue
     const path = data?.path ?? []
     for (let k = 1; k < path.length; k++) {
@@ -105,8 +105,8 @@ export function wireAt(
 }
 
 /**
- * Where a block stands so that a wire runs straight into its first input, and through it the way that the
- * wire goes; where there is little room, in the middle of it.
+ * The position of a block at which a wire runs straight into its first input, in the direction of the wire;
+ * on a short segment the block is centred.
  */
 export function levelled(
   block: SheetBlock,

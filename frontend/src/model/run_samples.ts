@@ -19,13 +19,13 @@ const FIRST_ROOM = 1024
 let versions = 0
 
 /**
- * The samples of one run, outside of React: frames arrive faster than a page may render. Every view draws
- * from here in the animation frame after a change and compares `version` with what it drew last.
+ * The samples of one run, stored outside React because frames arrive faster than the page may render. In the
+ * animation frame after a change, each view compares `version` with the version that it has drawn.
  */
 export class RunSamples {
   version = ++versions
   count = 0
-  /** The number of times that the run has stepped back. */
+  /** Number of times that the run has stepped back. */
   returns = 0
   time = new Float64Array(FIRST_ROOM)
   private data: Float64Array[]
@@ -69,31 +69,31 @@ export class RunSamples {
     this.version = ++versions
   }
 
-  /** Drop the samples after the first ones, because the run has stepped back. */
+  /** Drop the samples after the first `count`, because the run has stepped back. */
   truncate(count: number): void {
     this.count = Math.min(this.count, count)
     this.returns++
     this.version = ++versions
   }
 
-  /** The run has ended: release unused memory. */
+  /** Release unused memory when the run has ended. */
   close(): void {
     this.time = this.time.slice(0, this.count)
     this.data = this.data.map((column) => column.slice(0, this.count))
   }
 
-  /** The display name of a signal: its block, if that has no other output. */
+  /** The display name of a signal: its block, if the block has no other output. */
   title(name: string): string {
     const block = name.slice(0, name.lastIndexOf('/'))
     return this.aliases[block] === name ? block : name
   }
 
-  /** Names of all signals, as they were recorded. */
+  /** Names of all recorded signals. */
   get names(): string[] {
     return [...this.columns.keys()]
   }
 
-  /** The signal of this name or alias. */
+  /** The signal with this name or alias. */
   signal(name: string): Signal | undefined {
     const found = this.columns.get(name) ?? this.columns.get(this.aliases[name] ?? '')
     if (!found) return undefined

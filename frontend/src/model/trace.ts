@@ -3,10 +3,10 @@ import type { RunSamples } from './run_samples'
 
 /** One line of a plot. The arrays are read at each frame, because they grow during a run. */
 export interface Trace {
-  /** The same for the same line whatever else is shown. */
+  /** Identifies the line, independently of the other displayed lines. */
   key: string
   label: string
-  /** The signal and the entry of it that the label is made of: a number, or a name such as a joint's. */
+  /** The signal and the entry in the label: a number, or a name such as that of a joint. */
   stem: string
   entry: string
   unit: string
@@ -20,9 +20,9 @@ export const DASHES = [[], [7, 3], [2, 3], [9, 3, 2, 3]]
 export const MOST_TRACES = 32
 
 /**
- * The traces of some signals of a run. An element of a vector has the colour of its number in every view, so
- * that a joint has one colour everywhere; scalars have different colours. Traces that would look alike are
- * dashed.
+ * The traces of some signals of a run. An element of a vector has the colour of its index in every view, so
+ * that a joint has the same colour everywhere; scalars have different colours. Traces of equal colour have
+ * different dashes.
  */
 export function tracesOf(samples: RunSamples, paths: { path: string; label: string }[]): Trace[] {
   const taken = new Map<string, number>()
@@ -57,10 +57,10 @@ export function tracesOf(samples: RunSamples, paths: { path: string; label: stri
     .slice(0, MOST_TRACES)
 }
 
-/** The columns that a plot draws: a common row of instants, and for each trace its values there. */
+/** The columns of a plot: common instants, and the values of each trace. */
 export type Drawn = [Float64Array, ...(Float64Array | (number | null | undefined)[])[]]
 
-/** The extremes of some traces in the stretches of a window, as far as they have been worked out. */
+/** The extremes of traces in the intervals of a window, as far as they are computed. */
 export interface Extremes {
   from: number
   to: number
@@ -75,9 +75,8 @@ export interface Extremes {
 }
 
 /**
- * The least and maximum of each trace in each of `width` equal intervals of a time window: no more
- * points than can be seen, and no peak is lost. Rows of the same window that `before` holds are not computed
- * again.
+ * Minimum and maximum of each trace in each of `width` equal intervals of a time window: no more points than
+ * visible pixels, and no lost peak. Rows of the same window that `before` contains are not computed again.
  */
 export function extremes(
   traces: { time: Float64Array; values: Float64Array }[],
@@ -103,7 +102,7 @@ export function extremes(
     const column = known
       ? (known.drawn[trace + 1] as (number | undefined)[])
       : Array.from({ length: 2 * width }, (): number | undefined => undefined)
-    // One sample beyond each side, so that a line leaves the window where it should.
+    // One more sample on each side, so that lines leave the window at the correct height.
     let row = known ? known.rows[trace]! : Math.max(firstAfter(at, from) - 1, 0)
     let begin = row
     let last = known ? known.ends[trace]! : 0
@@ -130,7 +129,7 @@ export function extremes(
   return { from, to, width, drawn: [time, ...columns], rows, ends }
 }
 
-/** Samples of a trace in a window of time, as they were recorded, with one beyond each side. */
+/** The recorded samples of a trace in a time window, with one more on each side. */
 export function within(
   { time, values }: { time: Float64Array; values: Float64Array },
   from: number,
@@ -141,7 +140,7 @@ export function within(
   return { time: time.subarray(begin, end), values: values.subarray(begin, end) }
 }
 
-/** The value at an instant, on the straight line between two samples; NaN outside of them. */
+/** The linearly interpolated value at an instant; NaN outside the samples. */
 export function valueAt({ time, values }: { time: Float64Array; values: Float64Array }, at: number): number {
   const after = firstAfter(time, at)
   if (after === 0 || (after === time.length && time[after - 1] !== at)) return NaN

@@ -17,11 +17,11 @@ import { useStudio } from '../store'
 import { theme } from '../theme'
 import { shareCursor } from './shared_cursor'
 
-/** The messages of the notebook to this page: see `studio/notebook.py`. */
+/** The messages from the notebook to this page; see `studio/notebook.py`. */
 interface Shown {
   kind: 'show'
   dark: boolean
-  /** The key of a result, whose views share one time cursor. */
+  /** The key of a result; views of the same result share one time cursor. */
   key: string
   run: { stopTime: number; channels: Channel[]; views: ViewOf[]; aliases: Record<string, string> } | null
   frame: ArrayBuffer

@@ -3,8 +3,8 @@ import { useCursor } from '../run/cursor'
 const REST_MS = 150
 
 /**
- * One time cursor for all views of a result in the notebook. The views exchange its time without a kernel.
- * `onRest` gets the instant after the cursor has stopped moving.
+ * One time cursor for all views of a result in the notebook. The views exchange the time without a kernel.
+ * `onRest` receives the time when the cursor has stopped.
  */
 export function shareCursor(onRest: (time: number) => void) {
   let channel: BroadcastChannel | null = null

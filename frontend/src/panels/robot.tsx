@@ -3,7 +3,7 @@ import type { Panel } from '../panel'
 
 const RobotView = later(async () => (await import('../robot/robot_view')).default, 'Loading the robot view …')
 
-/** With software rendering the first picture of the arm takes seconds: the diagram is shown first. */
+/** With software rendering the first picture of the arm takes seconds, so the diagram is shown first. */
 function RobotPanel() {
   const settled = useSettled()
   return settled ? <RobotView /> : <p className="empty">Loading the robot view …</p>

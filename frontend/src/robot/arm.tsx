@@ -16,7 +16,7 @@ export interface Body {
   geometry: BufferGeometry
 }
 
-/** The bodies of a scene as geometry, given back when the scene goes. */
+/** The bodies of a scene as geometry, which is disposed with the scene. */
 export function useBodies(scene: RobotScene): Body[] {
   const bodies = useMemo(
     () => scene.bodies.map((body) => ({ row: body.row, material: body.material, geometry: geometry(body) })),
@@ -30,7 +30,7 @@ interface ArmProps {
   rows: number
   bodies: Body[]
   poses: () => Poses | undefined
-  /** The colour of a ghost, a past or future pose of the arm. */
+  /** The colour of a ghost, which shows a past or future pose of the arm. */
   ghost?: string
 }
 
@@ -48,7 +48,7 @@ export function Arm({ rows, bodies, poses, ghost }: ArmProps) {
       group.matrixWorldNeedsUpdate = true
     })
   })
-  const first = ghost ? 1 : 0 // the base of a ghost is that of the arm
+  const first = ghost ? 1 : 0 // a ghost shares the base of the arm
   return (
     <group name={ghost ? 'ghost' : 'arm'}>
       {Array.from({ length: rows - first }, (_, k) => k + first).map((row) => (
@@ -76,10 +76,10 @@ function SolidBody({ geometry, material }: Body) {
   )
 }
 
-/** A ghost a little behind where it stands, so that it never shimmers through the arm itself. */
+/** A ghost is drawn slightly behind its depth, so that it never flickers through the arm itself. */
 const BEHIND = { polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2 }
 
-/** First the depth of a body, then its colour: bodies behind one another do not add up. */
+/** Depth is drawn before colour, so that the transparent bodies of a ghost do not add up. */
 function GhostBody({ geometry, colour }: { geometry: BufferGeometry; colour: string }) {
   return (
     <>

@@ -15,7 +15,7 @@ export const PRESETS = {
 
 export type Preset = keyof typeof PRESETS | 'tool'
 
-/** Commands of the view's buttons to its camera. */
+/** Commands from the buttons of the view to its camera. */
 export interface CameraHandle {
   look: (preset: Preset) => void
   fit: () => void
@@ -25,7 +25,7 @@ export interface CameraHandle {
 
 const MARGIN = 1.14
 
-/** The corners of the boxes around the bodies, each box in the axes of its own link. */
+/** The corners of the bounding boxes of the bodies, in the axes of their links. */
 function cornersOf(arm: Object3D): Vector3[] {
   const corners: Vector3[] = []
   arm.traverse((one) => {
@@ -42,7 +42,7 @@ function cornersOf(arm: Object3D): Vector3[] {
   return corners
 }
 
-/** Corners of all that is to be seen: the arm, the places that a run reaches, the floor below the base. */
+/** Corners of everything to be shown: the arm, the positions reached in a run, the floor below the base. */
 function seenCorners(arm: Object3D, floor: number, extent: CameraProps['extent'], thick: number): Vector3[] {
   const corners = cornersOf(arm)
   for (const [x, y, z] of extent?.() ?? [])
@@ -52,7 +52,7 @@ function seenCorners(arm: Object3D, floor: number, extent: CameraProps['extent']
 }
 
 /**
- * Where an eye stands that looks at `centre` from a direction and sees all corners, no nearer than `nearest`.
+ * The position of a camera that looks at `centre` and sees all corners; its distance is at least `nearest`.
  */
 function eyeOf(
   corners: Vector3[],
@@ -79,7 +79,7 @@ function eyeOf(
   return centre.clone().addScaledVector(d, distance)
 }
 
-/** What each frame computes with, made once. */
+/** Working vectors of the frame callback, allocated once. */
 const newScratch = () => ({
   matrix: new Matrix4(),
   tool: new Vector3(),
@@ -90,7 +90,7 @@ const newScratch = () => ({
 type Scratch = ReturnType<typeof newScratch>
 
 function standBehindTool(now: CameraControls, { matrix, eye, to }: Scratch, reach: number): void {
-  // A hand camera: behind the tool and a little above, looking where the tool points.
+  // A hand camera: behind the tool and a little above, looking along the axis of the tool.
   eye.set(-0.16 * reach, 0, -0.3 * reach).applyMatrix4(matrix)
   to.set(0, 0, 0.35 * reach).applyMatrix4(matrix)
   void now.setLookAt(eye.x, eye.y, eye.z, to.x, to.y, to.z, false)
@@ -123,7 +123,7 @@ interface View {
   invalidate: () => void
 }
 
-/** What others do with the view. */
+/** The commands of the camera for other components. */
 function handleOf({ controls, mounted, touched, camera, fit, invalidate }: View): CameraHandle {
   return {
     look: (preset) => {
@@ -180,14 +180,14 @@ export function ViewCamera({ scene, poses, floor, extent, whole, handle }: Camer
 
   handle.current = handleOf({ controls, mounted, touched, camera, fit, invalidate })
 
-  // As long as nobody has moved the view, it fits whatever size it has.
+  // Until the user moves the view, it is fitted to every size of its panel.
   const size = useThree((s) => s.size)
   useEffect(() => {
     if (!touched.current) fit(new Vector3(...PRESETS.iso), false)
     // eslint-disable-next-line react-hooks/exhaustive-deps
   }, [size.width, size.height, floor, whole])
 
-  // Another robot, or the first one: all of it is to be seen. Edits of a robot leave the camera where it is.
+  // A new robot is shown completely. Edits of a robot do not move the camera.
   useEffect(() => {
     touched.current = false
     const timer = setTimeout(() => fit(new Vector3(...PRESETS.iso), false), 0)
@@ -202,7 +202,7 @@ export function ViewCamera({ scene, poses, floor, extent, whole, handle }: Camer
 
   useFrame(() => {
     const now = controls.current
-    // As long as nobody has moved the view, it takes in whatever a run that goes on has reached.
+    // Until the user moves the view, it is extended to all positions that the run has reached.
     if (!touched.current && !follow && toolAt(scratch.tool)) {
       const { x, y } = scratch.tool.project(camera)
       if (Math.max(Math.abs(x), Math.abs(y)) > 1) fit(new Vector3(...PRESETS.iso), false)

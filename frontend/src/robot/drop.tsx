@@ -46,7 +46,7 @@ export function DropZone() {
   )
 }
 
-/** Send a file to the server, which reads it as data: nothing of it is run. */
+/** Send a file to the server, which reads it as data; scripts are not executed. */
 export async function open(file: File): Promise<void> {
   if (file.size > MOST_BYTES) {
     refuse({

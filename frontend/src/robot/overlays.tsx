@@ -13,7 +13,7 @@ interface OverlayProps {
   dark: boolean
 }
 
-/** Something that rides on one row of the arm. */
+/** An object that moves with one row of the poses. */
 function Riding({
   row,
   poses,
@@ -98,7 +98,7 @@ export function JointAxes({ scene, poses, dark }: OverlayProps) {
   })
 }
 
-/** The ranges of the joints: an arc (a bar) where the joint may stand, and a hand where it stands. */
+/** The ranges of the joints: an arc or a bar over the allowed positions, and a pointer at the present one. */
 export function Limits({ scene, poses, dark }: OverlayProps) {
   return scene.joints.map((joint) => (
     <Range key={joint.name} joint={joint} poses={poses} dark={dark} reach={scene.reach} />

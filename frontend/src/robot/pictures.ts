@@ -1,6 +1,6 @@
 import type { WebGLRenderer } from 'three'
 
-/** The renderer of a view and how it draws one frame. */
+/** The renderer of a view and the function that draws one frame. */
 export interface Shot {
   gl: WebGLRenderer
   draw: () => void
@@ -17,7 +17,7 @@ function download(data: Blob, name: string): void {
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000)
 }
 
-/** Save what the view shows as a PNG, with two pixels a point at least. */
+/** Save the view as a PNG with at least two pixels per CSS px. */
 export function takePicture(shot: React.RefObject<Shot | null>, name: string): void {
   const now = shot.current
   if (!now) return
@@ -31,14 +31,14 @@ export function takePicture(shot: React.RefObject<Shot | null>, name: string): v
   }, 'image/png')
 }
 
-/** The kind of film that this browser can record; undefined where it records none. */
+/** A video format that this browser can record; undefined if there is none. */
 export function filmKind(): string | undefined {
   return typeof MediaRecorder === 'undefined'
     ? undefined
     : FILMS.find((kind) => MediaRecorder.isTypeSupported(kind))
 }
 
-/** Film the view while something plays; the returned function ends the film early. */
+/** Record a video of the view during a playback; the returned function ends it early. */
 export function takeFilm(
   shot: React.RefObject<Shot | null>,
   name: string,

@@ -2,11 +2,11 @@ import { lazy, Suspense, useEffect, useMemo, useState } from 'react'
 import { ask, useStudio } from '../store'
 import type { RobotScene } from './scene'
 
-/** 3-D comes with the first robot: a model without one needs none of it. */
+/** The 3-D code is loaded with the first robot; a model without a robot does not need it. */
 const stage = () => import('./run_stage')
 const RunStage = lazy(stage)
 
-/** The arm of the first robot block: as the run moves it, or at rest before the first run. */
+/** The arm of the first robot block, as moved by the run, or at rest before the first run. */
 export default function RobotView() {
   const document = useStudio((s) => s.document?.state.document)
   const path = useStudio((s) => s.document?.inside)
@@ -34,7 +34,7 @@ export default function RobotView() {
     return () => {
       current = false
     }
-    // What the server says of the block is said anew when its robot changes, also where its name stays.
+    // The data of the block are requested again when its robot changes, even if its name does not.
   }, [document, inside, block, said])
   if (!block) return <p className="empty">This sheet has no robot: add a Robot Plot to see its arm here.</p>
   if (!shown || !document) return <p className="empty">Loading the robot …</p>

@@ -30,8 +30,8 @@ export function RunArm({ path, scene, rest, drawing, children }: RunArmProps) {
   )
   const drawn = useRef('')
   const state = useCallback(() => {
-    // A run that has begun and says nothing yet moves no arm: its first samples are there before a picture
-    // would be.
+    // A run that has started but sent no samples does not move the arm: the samples arrive before the next
+    // picture is drawn.
     if (samples.count || !samples.run) drawn.current = `${samples.run} ${samples.version} ${shownTime()}`
     return drawn.current
   }, [])
@@ -48,7 +48,7 @@ export function RunArm({ path, scene, rest, drawing, children }: RunArmProps) {
   }, [path, scene.rows])
   const ghosts = useMemo<Ghosts>(
     () => ({
-      // Where the arm itself stands there is no ghost.
+      // A ghost at the pose of the arm itself is hidden.
       start: () => (samples.indexAt(shownTime()) > 0 ? posesAt(path, scene.rows, 0) : undefined),
       goal: () =>
         useStudio.getState().run?.state === 'done' && samples.indexAt(shownTime()) < samples.count - 1
@@ -75,7 +75,7 @@ export function RunArm({ path, scene, rest, drawing, children }: RunArmProps) {
   )
 }
 
-/** The columns of the poses that a run records for a block. */
+/** The columns of the poses that a run has recorded for a block. */
 function poseSignal(path: string, rows: number): Float64Array[] | undefined {
   const { run } = useStudio.getState()
   const view = run?.views.find((one) => one.kind === 'robot' && one.block === path)
@@ -90,7 +90,7 @@ function posesAt(path: string, rows: number, index: number): Poses | undefined {
 
 const EXTENT_SAMPLES = 60
 
-/** Poses of the links, at times spread over the whole run. */
+/** Poses of the links at times distributed over the whole run. */
 function extentOf(path: string, rows: number): [number, number, number][] {
   const found = poseSignal(path, rows)
   if (!found || !samples.count) return []

@@ -10,12 +10,12 @@ export interface RunStageProps {
   inside: string[]
   block: string
   scene: RobotScene
-  /** Poses of the arm at rest, and the joints' values there. */
+  /** Poses of the arm at rest, and its joint positions. */
   rest: number[][][]
   q: number[]
 }
 
-/** The arm of a block as the run moves it. */
+/** The arm of a block as moved by the run. */
 export default function RunStage({ document, inside, block, scene, rest, q }: RunStageProps) {
   const poses = useMemo(() => listed(rest), [rest])
   const drawing = useCallback(

@@ -5,17 +5,17 @@ export type { RobotScene, SceneJoint }
 
 export type Material = RobotScene['bodies'][number]['material']
 
-/** Where the rows of an arm are: 16 numbers each, row by row; undefined while it is not known. */
+/** Poses of an arm: 16 numbers for each row, row by row; undefined while they are unknown. */
 export type Poses = (row: number, k: number) => number
 
-/** Poses as the server lists them: (rows, 4, 4). */
+/** Poses in the format of the server: (rows, 4, 4). */
 export function listed(poses: number[][][]): Poses {
   return (row, k) => poses[row]![k >> 2]![k & 3]!
 }
 
 /**
- * Poses for the bodies of a scene. There are none while the poses have more or fewer rows: after a link is
- * added or removed, bodies and poses arrive one after the other.
+ * Poses for the bodies of a scene, or undefined if the numbers of rows differ: after a link is added or
+ * removed, bodies and poses arrive one after the other.
  */
 export function fitting(scene: RobotScene | null, poses: number[][][] | undefined): Poses | undefined {
   return scene && poses?.length === scene.rows ? listed(poses) : undefined

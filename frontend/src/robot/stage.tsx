@@ -35,7 +35,7 @@ const COLOURS = {
   },
 }
 
-/** Poses that are shown beside the arm: where it came from, where it goes. */
+/** Poses that are shown in addition to the arm: past and future ones. */
 export interface Ghosts {
   start: () => Poses | undefined
   goal: () => Poses | undefined
@@ -45,22 +45,21 @@ interface StageProps {
   scene: RobotScene
   poses: () => Poses | undefined
   /**
-   * Changes whenever the poses do, with a call of `changed` in `frames.ts`: what is not changed is not drawn
-   * again.
+   * Changes with the poses, with a call of `changed` in `frames.ts`; an unchanged scene is not redrawn.
    */
   state: () => string
   way?: () => Way | undefined
   ghosts?: Ghosts
-  /** Where the links go in all that is to be shown; the floor lies under it, and the view takes it in. */
+  /** Poses over the whole run, for the extent of the view and the height of the floor. */
   extent?: () => [number, number, number][]
   /** Changes when the extent is complete. */
   whole?: string
   /** The drawing for browsers without WebGL. */
   drawing: () => Promise<string | undefined>
-  /** Changes when the drawing would; one that says nothing is drawn once. */
+  /** Changes when the drawing changes; without it, the drawing is requested once. */
   drawn?: () => string
   /**
-   * Plays what is to be filmed from its beginning and tells when it has ended; without one there is no film.
+   * Plays the run from its start and resolves at its end, for a video; without it no video can be recorded.
    */
   film?: () => Promise<void>
   /** Additional buttons, before the others. */
@@ -210,7 +209,7 @@ function Inside({ scene, poses, state, way, ghosts, extent, whole, scheme, camer
   )
 }
 
-/** What is mirrored in the arm: made once for each colour scheme, for it costs more than many frames. */
+/** The environment map of reflections: created once for each colour scheme, because it costs many frames. */
 const Surroundings = memo(function Surroundings({ dark }: { dark: boolean }) {
   return (
     <Environment resolution={64} environmentIntensity={dark ? 0.42 : 0.6}>
@@ -244,8 +243,8 @@ const Surroundings = memo(function Surroundings({ dark }: { dark: boolean }) {
 })
 
 /**
- * The floor, m: under the foot of the arm, or, where the arm has reached below its foot, under all that it
- * has reached.
+ * The height of the floor, m: at the foot of the arm, or below all positions reached, if the arm has reached
+ * below its foot.
  */
 function useFloor(
   scene: RobotScene,
@@ -273,7 +272,7 @@ function useFloor(
   return lowest.name === scene.name ? Math.min(foot, lowest.floor) : foot
 }
 
-/** A column under an arm that reaches below its foot. */
+/** A column below the foot of an arm that reaches below its foot. */
 function Pedestal({
   from,
   to,
@@ -303,7 +302,7 @@ function Pedestal({
   )
 }
 
-/** Renders a frame only when something has moved. */
+/** Renders a frame only if something has moved. */
 function useDrawnWhenChanged(state: () => string): void {
   const invalidate = useThree((s) => s.invalidate)
   useEffect(() => {
@@ -328,7 +327,7 @@ function Ground({
 }) {
   return (
     <>
-      {/* The shadow hides nothing: the lines lie so near above it that depth cannot tell them apart. */}
+      {/* The shadow writes no depth: the lines above it are too close for the depth buffer. */}
       <mesh position={[0, 0, height - 0.001 * reach]} renderOrder={-2} receiveShadow>
         <planeGeometry args={[12 * reach, 12 * reach]} />
         <shadowMaterial opacity={colours.shadow} depthWrite={false} />
@@ -345,7 +344,7 @@ function Ground({
         sectionThickness={1.1}
         cellColor={colours.cell}
         sectionColor={colours.section}
-        // Around the arm, however far from it the camera is.
+        // The size depends on the arm, not on the distance of the camera.
         fadeFrom={0}
         fadeDistance={6 * reach}
         fadeStrength={1.2}
@@ -354,7 +353,7 @@ function Ground({
   )
 }
 
-/** Where the tool is, in a corner. */
+/** The position of the tool, in a corner of the view. */
 function Instant({
   poses,
   rows,

@@ -5,12 +5,11 @@ import { Color, Vector3 } from 'three'
 import { LineGeometry, type Line2 } from 'three-stdlib'
 
 const MOST_POINTS = 600
-/** How much of the colour the oldest point keeps. */
+/** Fraction of the colour at the oldest point. */
 const OLDEST = 0.22
 
 /**
- * The way of the tool so far: how many points there are, what tells one state of it from another, and each
- * point.
+ * The path of the tool up to now: number of points, a version that changes with the path, and each point.
  */
 export interface Way {
   key: string
@@ -18,7 +17,7 @@ export interface Way {
   point: (k: number) => [number, number, number]
 }
 
-/** The way of the tool up to the instant shown; what is old fades. */
+/** The path of the tool up to the displayed instant; older parts fade. */
 export function ToolPath({
   way,
   dark,
@@ -59,7 +58,7 @@ export function ToolPath({
     }
     for (let k = 0; k < now.last; k += stride) put(k)
     put(now.last)
-    // A geometry keeps the count of instances that it had first: a longer line needs a new one.
+    // A geometry keeps its first instance count, so a longer line needs a new geometry.
     line.current.geometry.dispose()
     line.current.geometry = new LineGeometry()
     line.current.geometry.setPositions(points)

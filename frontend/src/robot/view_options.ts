@@ -1,6 +1,6 @@
 import { create } from 'zustand'
 
-/** The displayed items besides the bodies. */
+/** The displayed items in addition to the bodies. */
 export interface ViewOptions {
   frames: boolean
   axes: boolean

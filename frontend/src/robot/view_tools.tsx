@@ -41,7 +41,7 @@ interface ViewToolsProps {
   children?: React.ReactNode
 }
 
-/** The buttons over an arm: camera, display options, picture and film. */
+/** The buttons over an arm: camera, display options, picture and video. */
 export function ViewTools({
   camera,
   shot,

@@ -7,7 +7,7 @@ import { ask, change, useStudio } from '../store'
 
 const CHECK_DELAY_MS = 200
 
-/** How the model is run: solver, steps, tolerances, stop time; kept with the model. */
+/** The run settings of the model: solver, steps, tolerances, stop time. */
 export function Configuration() {
   const opened = useDialogs((s) => s.open === 'configuration')
   const close = () => show(null)
@@ -18,13 +18,13 @@ export function Configuration() {
   )
 }
 
-/** Small numbers as one types them: 1e-6. */
+/** Format small numbers as typed: 1e-6. */
 const numberText = (value: number | string | null) =>
   typeof value === 'number' && value !== 0 && Math.abs(value) < 1e-3
     ? value.toExponential()
     : valueText(value)
 
-/** What is wrong with typed settings, by their names, as the server finds it. */
+/** Errors of typed settings by name, from the server. */
 function useFaults(document: string, values: Record<string, string | null>): Record<string, string> {
   const [faults, setFaults] = useState<Record<string, string>>({})
   const asked = JSON.stringify(values)

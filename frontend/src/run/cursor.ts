@@ -4,7 +4,7 @@ import { samples } from '../samples'
 import { useStudio } from '../store'
 
 interface Cursor {
-  /** The time (s) that all views show; null follows the end of the run. */
+  /** The time (s) that all views show; null is the end of the run. */
   time: number | null
   playing: boolean
   loop: boolean
@@ -21,10 +21,10 @@ export function shownTime(): number {
   return useCursor.getState().time ?? reached()
 }
 
-/** The frame (ms) in which the playback was moved last; null while nothing is played. */
+/** The frame (ms) in which the playback was last advanced; null without playback. */
 let last: number | null = null
 
-/** Move the playback. It is watched before all views: they draw the new instant in the same frame. */
+/** Advance the playback. It runs before all views, so that they draw the new instant in the same frame. */
 function move(now: number): void {
   const { playing, loop, time, rate } = useCursor.getState()
   if (playing && time !== null && last !== null) {
@@ -40,7 +40,7 @@ function move(now: number): void {
 watch(move)
 useCursor.subscribe(changed)
 
-/** Play the recorded run from the cursor, from the start where it stands at the end. */
+/** Play the recorded run from the cursor, or from the start if the cursor is at the end. */
 export function play(): void {
   const from = shownTime()
   useCursor.setState({ playing: true, time: from >= reached() ? (samples.time[0] ?? 0) : from })

@@ -1,30 +1,30 @@
 /**
- * Views that follow a run are drawn as often as the machine allows. If rendering is slow, a pause follows
- * each frame, so that user input is handled in between.
+ * Views that follow a run are drawn as often as the machine allows. If rendering is slow, each frame is
+ * followed by a pause, so that user input is handled in between.
  */
 
-/** ms that two pictures may take without a pause. */
+/** Duration of two frames above which pauses are inserted, ms. */
 const QUICK_MS = 60
-/** The pause, in times of what the pictures took. */
+/** Length of the pause, as a multiple of the duration of the frames. */
 const PAUSE = 1.5
 
 let freeAt = 0
 let drawn = 0
 
-/** Whether the pictures of before are on the screen, at an instant of `performance.now()`. */
+/** Whether the previous frames have been displayed, at a time of `performance.now()`. */
 export function isFree(now: number): boolean {
   return now >= freeAt
 }
 
 /**
- * Whether what follows the run may be drawn in the animation frame `now`; it is measured then what that
- * costs.
+ * Whether views that follow the run may be drawn in the animation frame `now`; the duration of this frame is
+ * then measured.
  */
 export function mayFollow(now: number): boolean {
   if (!isFree(now)) return false
   if (drawn !== now) {
     drawn = now
-    // Two frames, because a browser prepares one picture while it shows another.
+    // Two frames, because a browser prepares one frame while it displays another.
     requestAnimationFrame(() =>
       requestAnimationFrame((then) => {
         if (then - now > QUICK_MS) freeAt = Math.max(freeAt, then + PAUSE * (then - now))

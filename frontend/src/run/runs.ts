@@ -19,7 +19,7 @@ export interface KeptRun {
   name: string
   began: Date
   stopTime: number
-  /** Of so many recorded instants there are the extremes; 1: all. */
+  /** Number of recorded instants that are reduced to their extremes; 1: no reduction. */
   stride: number
   state: string
   solver: string
@@ -37,10 +37,10 @@ const MOST_BYTES = 384 * 2 ** 20
 interface Runs {
   runs: KeptRun[]
   /**
-   * Values of tunable parameters that are tried, by `block.parameter`: not in the model until they are kept.
+   * Trial values of tunable parameters by `block.parameter`; they are not in the model until they are kept.
    */
   tried: Record<string, unknown>
-  /** Simulated seconds for each second of the clock; null: as fast as possible. */
+  /** Simulated seconds per second of clock time; null: as fast as possible. */
   speed: number | null
   rename: (key: string, name: string) => void
   remove: (key: string) => void
@@ -68,7 +68,7 @@ function update(key: string, change: (run: KeptRun) => Partial<KeptRun>): void {
 export function began(event: EventOf<'run_started'>): void {
   const known = useRuns.getState().runs.find(({ key }) => key === event.run)
   if (known) {
-    // After a line that broke, the server tells of its run again, from the beginning.
+    // After a reconnection the server sends its run again from the beginning.
     known.samples.truncate(0)
     showSamples(known.samples)
     update(event.run, () => ({ state: 'running', tunings: [] }))
@@ -106,7 +106,7 @@ export function tuned({ run, time, parameter, value }: EventOf<'run_tuned'>): vo
 export function rewound({ run, time, count }: EventOf<'run_rewound'>): void {
   if (samples.run === run) samples.truncate(count)
   changed()
-  // What was tuned later holds from the instant to which the run has returned.
+  // Values tuned later apply from the instant to which the run has returned.
   update(run, ({ tunings }) => ({
     tunings: tunings.map((one) => ({ ...one, time: Math.min(one.time, time) })),
   }))

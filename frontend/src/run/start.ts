@@ -10,7 +10,7 @@ async function run(): Promise<void> {
   await ask({ kind: 'run', document: document.state.document, speed, tuned: tried })
 }
 
-/** Start the model, or let a paused run go on. */
+/** Start the model, or resume a paused run. */
 export function startOrResume(): void {
   const { run: shown } = useStudio.getState()
   if (shown?.state === 'paused') void ask({ kind: 'control', run: shown.run, action: 'resume' })

@@ -8,7 +8,7 @@ const RATES = ['0.1', '0.25', '0.5', '1', '2', '5', '10'].map((value) => ({ valu
 const LONG_STEP = 10
 
 /**
- * The time cursor of all views: drag it through the run, or play the run again; `wires` where there are any.
+ * The time cursor of all views: drag it, or play the recorded run. `wires`: show the button for wire values.
  */
 export function Timeline({ wires = false }: { wires?: boolean }) {
   const run = useStudio((s) => s.run)

@@ -132,7 +132,7 @@ function RunControls({ known }: { known: boolean }) {
   )
 }
 
-/** Components of their own: an edit renders no other tool. */
+/** Separate components, so that an edit does not render the other tools. */
 function Undo() {
   const edit = useStudio((s) => s.document?.state.undo)
   return (
@@ -157,7 +157,7 @@ function Redo() {
   )
 }
 
-/** When the model stops, s: what is typed counts when the field is left. */
+/** The stop time of the model, s; the text is applied when the field loses the focus. */
 function StopTime() {
   const known = useStudio((s) => s.document !== null)
   const value = Number(useStudio((s) => s.document?.settings['stop_time']) ?? 10)

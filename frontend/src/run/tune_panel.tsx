@@ -18,8 +18,8 @@ const NUMERIC = ['number', 'array']
 const SLIDER_STEPS = 400
 
 /**
- * What can be tuned on the sheet that is shown, with the values of the model; below it, by the last run's
- * account.
+ * The tunable parameters of the visible sheet, with the values of the model; for subsystems, as listed by
+ * the last run.
  */
 function useTunables(): Map<string, Tunable> {
   const blocks = useStudio((s) => s.document?.blocks)
@@ -46,7 +46,7 @@ function useTunables(): Map<string, Tunable> {
   }, [blocks, library, level, ofRun])
 }
 
-/** Tunable parameters of the selected blocks and of those that are pinned: changed while the run goes on. */
+/** Tunable parameters of the selected and pinned blocks, which can be changed during a run. */
 export function TunePanel() {
   const tunables = useTunables()
   const selection = useStudio((s) => s.selection)
@@ -99,7 +99,7 @@ function send(path: string, value: unknown): void {
 
 const waiting = new Map<string, unknown>()
 
-/** Try a value; while a slider moves, once a frame at most. */
+/** Try a value; at most once a frame while a slider moves. */
 function attempt(path: string, value: unknown): void {
   useRuns.setState((s) => ({ tried: { ...s.tried, [path]: value } }))
   if (!waiting.size)
@@ -210,7 +210,7 @@ function Pin({ path }: { path: string }) {
   )
 }
 
-/** A slider with its bounds, which can be typed. */
+/** A slider with editable bounds. */
 function Slide({ tunable, value }: { tunable: Tunable; value: number }) {
   const { path, low, high } = tunable
   const given = useTuning((s) => s.ranges[path])

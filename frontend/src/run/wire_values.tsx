@@ -14,9 +14,9 @@ import { change, useStudio } from '../store'
 import { shownTime } from './cursor'
 
 interface Shown {
-  /** Values of all outputs. */
+  /** Whether the values of all outputs are displayed. */
   all: boolean
-  /** Outputs, `block/port` with the path of their sheet, whose values stay on the sheet. */
+  /** Outputs, `block/port` with the path of their sheet, whose values are pinned. */
   pinned: ReadonlySet<string>
 }
 
@@ -46,7 +46,7 @@ function outputs(blocks: Record<string, SheetBlock>): { ref: string; block: Shee
 }
 
 /**
- * Values on the wires, marks of what is logged, and what can be done with the wire that is `chosen`: on the
+ * Values on the wires, marks of logged signals, and the tools of the selected wire `chosen`, drawn on the
  * sheet itself.
  */
 export function WireValues({ chosen }: { chosen: WireEdgeType | undefined }) {
@@ -57,7 +57,7 @@ export function WireValues({ chosen }: { chosen: WireEdgeType | undefined }) {
   const ran = useStudio((s) => s.run !== null)
   const { all, pinned } = useValues()
   const flow = useStore((s) => s.domNode)
-  // Looked for once: React Flow's own portal looks through the whole sheet at every change of it.
+  // Searched once, because React Flow's portal searches the whole sheet at every change.
   const portal = useMemo(() => flow?.querySelector('.react-flow__viewport-portal'), [flow])
   const zoom = useStore((s) => s.transform[2])
   const layer = useRef<HTMLDivElement>(null)
@@ -126,9 +126,9 @@ export function WireValues({ chosen }: { chosen: WireEdgeType | undefined }) {
   )
 }
 
-/** Write the values of the instant into their places, in the frame after a change and past React. */
+/** Write the displayed values into their elements, in the frame after a change and without React. */
 function useWriting(layer: React.RefObject<HTMLDivElement | null>): void {
-  useEffect(changed) // there may be other places
+  useEffect(changed) // the elements may have changed
   useEffect(
     () =>
       watch(() => {
@@ -226,7 +226,7 @@ function WireTools({
 const length = (path: Point[], k: number) =>
   path[k + 1] ? Math.abs(path[k + 1]![0] - path[k]![0]) + Math.abs(path[k + 1]![1] - path[k]![1]) : 0
 
-/** The output of the wire under the mouse; empty if there is none. */
+/** The output of the wire under the pointer; empty if there is none. */
 function useHovered(flow: HTMLElement | null): string {
   const [hovered, setHovered] = useState('')
   useEffect(() => {
@@ -241,7 +241,7 @@ function useHovered(flow: HTMLElement | null): string {
   return hovered
 }
 
-/** To a place of the sheet (px), as large as can be read however far away the sheet is. */
+/** A label at a position of the sheet (px), in readable size at every zoom. */
 function legible(x: number, y: number): string {
   return `translate(${x}px, ${y}px) scale(var(--legible))`
 }

@@ -10,10 +10,10 @@ import type { Trace } from '../model/trace'
 import { useWindow } from './window'
 import { XyPlot } from './xy_plot'
 
-/** Letters of a name that a legend never cuts. */
+/** Number of letters of a name that the legend always shows. */
 const SHORT = 8
 
-/** A plot with its title, its legend (a click hides a trace), its exports, and the measures beside it. */
+/** A plot with its title, legend (a click hides a trace), export menu and table of measures. */
 export function Chart({
   title,
   traces,
@@ -148,7 +148,7 @@ function Exports({ title, traces, figure }: ExportsProps) {
   )
 }
 
-/** The entries of one signal by their numbers or names alone, after the name of the signal. */
+/** The names of entries without the name of their common signal. */
 function shortened(traces: Trace[]): { stem: string; names: string[] } {
   const stem = traces[0]?.stem
   if (!stem || traces.length < 2 || !traces.every((one) => one.entry && one.label === `${stem} ${one.entry}`))

@@ -3,7 +3,7 @@ import type { Trace } from '../model/trace'
 
 const PNG_SCALE = 2
 
-/** Hand a file to the browser. */
+/** Start the download of a file. */
 export function download(name: string, content: Blob): void {
   const link = document.createElement('a')
   link.href = URL.createObjectURL(content)
@@ -28,7 +28,7 @@ export async function savePng(figure: Figure): Promise<void> {
 const quoted = (text: string) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text)
 
 /**
- * Every recorded sample of the traces, in SI units; a trace of another run has a column of times of its own.
+ * Every recorded sample of the traces, in SI units; traces of another run have a separate time column.
  */
 export function csvOf(traces: Trace[]): string {
   const columns: { name: string; values: Float64Array }[] = []

@@ -6,14 +6,14 @@ export interface Axis {
   label: string
 }
 
-/** One plot as data: painted on a canvas or written as SVG, alike. */
+/** A plot as data, which is painted on a canvas or written as SVG with the same appearance. */
 export interface Figure {
   title: string
   width: number
   height: number
   x: Axis
   y: Axis
-  /** One unit is as long both ways. */
+  /** Whether both axes have the same scale. */
   equal?: boolean
   lines: {
     tone: string
@@ -22,7 +22,7 @@ export interface Figure {
     x: ArrayLike<number>
     y: ArrayLike<number | null | undefined>
   }[]
-  /** Where the run stands, on a path. */
+  /** The present position on a path. */
   mark?: [x: number, y: number] | undefined
 }
 
@@ -158,7 +158,7 @@ const colour = (tone: string) =>
   getComputedStyle(document.documentElement).getPropertyValue(`--${tone}`).trim()
 const fontOf = () => colour('font') || 'sans-serif'
 
-/** Paint a figure; the canvas's own size is given by the caller, in device pixels. */
+/** Paint a figure on a canvas whose size, in device pixels, the caller has set. */
 export function paint(figure: Figure, canvas: HTMLCanvasElement, scale: number): void {
   const c = canvas.getContext('2d')
   if (!c) return
@@ -204,7 +204,7 @@ export function paint(figure: Figure, canvas: HTMLCanvasElement, scale: number):
 
 const escaped = (text: string) => text.replace(/[&<>"]/g, (mark) => `&#${mark.charCodeAt(0)};`)
 
-/** The figure as an SVG document, in the colours of the page as it is. */
+/** The figure as an SVG document, in the present theme of the page. */
 export function svgOf(figure: Figure): string {
   const parts: string[] = []
   draw(figure, {

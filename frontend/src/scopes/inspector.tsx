@@ -39,7 +39,7 @@ function toggled(set: ReadonlySet<string>, key: string): Set<string> {
   return next
 }
 
-/** All runs and their signals: several in one plot, or two compared. */
+/** All runs and their signals; several signals in one plot, or two runs compared. */
 export function SignalInspector() {
   const document = useStudio((s) => s.document?.state.document)
   const all = useRuns((s) => s.runs)
@@ -238,7 +238,7 @@ function SignalList({ runs }: { runs: KeptRun[] }) {
 function InspectorPlot({ runs }: { runs: KeptRun[] }) {
   const { signals, hidden, comparing, baseline, compared, tolerance } = useInspector()
   const paths = useMemo(() => [...signals].map((path) => ({ path, label: '' })), [signals])
-  // The first look at the inspector shows something: the first signal that there is.
+  // Initially the inspector shows the first signal.
   useEffect(() => {
     const first = runs.at(-1)?.views.find(({ kind }) => kind === 'traces')
     const path = first && runs.at(-1)?.samples.signal(`${first.block}/${first.signals[0]}`)?.channel.name

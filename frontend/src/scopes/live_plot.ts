@@ -14,20 +14,20 @@ import { LEAST_PX, plotOptions } from './plot_options'
 import { reading, useUnits, type Reading } from './quantity'
 import { shownWindow, useWindow } from './window'
 
-/** From so many samples in a pixel on only the least and the greatest are drawn. */
+/** Number of samples per pixel above which only minimum and maximum are drawn. */
 const DENSE = 3
-/** While a run goes on, the part of its range that a vertical axis grows by beyond what is needed. */
+/** Margin by which a vertical axis is extended beyond the values during a run, as a fraction of its range. */
 const ROOM = 0.15
 
-/** The values that are seen, in the unit of the signals (`null`: all of them), and who hears of others. */
+/** The displayed range in the unit of the signals (`null`: all values), and a callback for changes of it. */
 export interface SeenValues {
   values: Values | null
   onValues: (values: Values | null) => void
 }
 
 /**
- * A plot that follows a run: drawn in the animation frame after a change, and only what is new where nothing
- * else changed.
+ * A plot that follows a run, drawn in the animation frame after a change. If only samples were added, only
+ * these are drawn.
  */
 export class LivePlot {
   private readonly plot: uPlot
@@ -38,10 +38,10 @@ export class LivePlot {
   private drawn: Drawn = [new Float64Array(0)]
   private known: Extremes | undefined
   private range: [number, number] = [0, 1]
-  /** The version of the samples that was looked at last, and the one of which all is drawn. */
+  /** The last examined version of the samples, and the version of the last complete drawing. */
   private seen = 0
   private whole = 0
-  /** What the picture depends on besides the samples: all of it anew, and the lines above it. */
+  /** Other data of the drawing: those that require a complete drawing, and the lines above it. */
   private shape = ''
   private lines = ''
 
@@ -83,7 +83,7 @@ export class LivePlot {
     this.plot.destroy()
   }
 
-  /** The picture as it is now, for exports. */
+  /** The present picture, for exports. */
   figure(title: string): Figure {
     const { plot, shown } = this
     const [min, max] = [plot.scales['y']?.min ?? 0, plot.scales['y']?.max ?? 1]
@@ -100,7 +100,7 @@ export class LivePlot {
   }
 
   private frame(at: number): void {
-    if (!this.element.isConnected) return // behind another panel
+    if (!this.element.isConnected) return // hidden by another panel
     const [from, to] = shownWindow()
     const width = Math.max(Math.floor(this.plot.bbox.width / devicePixelRatio), 10)
     const live = useStudio.getState().run?.state === 'running'
@@ -129,7 +129,7 @@ export class LivePlot {
       this.plot.redraw(false, false)
     } else if (same && marked && live && !mayFollow(at)) changed()
     else {
-      // What is drawn of a run that goes on only grows; once it went back, all is looked at again.
+      // During a run samples are only appended; after a step back everything is examined again.
       const before = same ? this.known : undefined
       const made = drawnOf(this.shown, from, to, width, before)
       this.drawn = made.drawn
@@ -142,7 +142,7 @@ export class LivePlot {
     }
   }
 
-  /** Draw what was made; whether only what is new had to be drawn. */
+  /** Draw new samples; returns whether drawing only the new ones was sufficient. */
   private draw(
     made: ToDraw,
     before: Extremes | undefined,
@@ -175,7 +175,7 @@ export class LivePlot {
   }
 }
 
-/** Unit and factor of the vertical axis: shared by all traces, or none. */
+/** Unit and factor of the vertical axis if all traces have the same unit. */
 function axisReading(traces: Trace[], drawn: Drawn): Reading {
   const [first, ...others] = traces
   if (!first || others.some(({ unit }) => unit !== first.unit)) return { factor: 1, unit: '' }
@@ -186,14 +186,14 @@ function axisReading(traces: Trace[], drawn: Drawn): Reading {
   return reading(first.unit, largest)
 }
 
-/** What there is to draw; of each trace the rows before its end stay as they are while the run goes on. */
+/** The data to draw; the rows of each trace before its end do not change during the run. */
 interface ToDraw {
   drawn: Drawn
   ends?: number[]
   extremes?: Extremes
 }
 
-/** What there is to draw in a window: raw samples while few, else the extremes of each pixel. */
+/** The data to draw in a window: samples if there are few, otherwise the extremes in each pixel. */
 function drawnOf(
   traces: Trace[],
   from: number,
@@ -241,7 +241,7 @@ function scaled(drawn: Drawn, factor: number): Drawn {
   ]
 }
 
-/** Least and greatest value that is seen, with air around them. */
+/** Minimum and maximum of the visible values, with a margin. */
 function rangeOf([time, ...columns]: Drawn, factor: number, from: number, to: number): [number, number] {
   let low = Infinity
   let high = -Infinity
@@ -255,7 +255,7 @@ function rangeOf([time, ...columns]: Drawn, factor: number, from: number, to: nu
   return aired(low * factor, high * factor)
 }
 
-/** A range that has become too small, with room to where it grows: each change of it draws all anew. */
+/** Extend a range that is too small, with a margin in the direction of growth: each change redraws all. */
 function withRoom([low, high]: [number, number], [before, after]: [number, number]): [number, number] {
   const room = ROOM * (Math.max(high, after) - Math.min(low, before))
   return [low < before ? low - room : before, high > after ? high + room : after]

@@ -17,7 +17,7 @@ const ROWS: [name: keyof Measures, head: string, title: string][] = [
   ['overshoot', 'over', 'overshoot beyond the last value, relative to the step'],
 ]
 
-/** Draw again a few times a second while something changes: no sample goes through React's state. */
+/** Render at most a few times a second during changes; samples do not pass through React's state. */
 function useRefresh(): void {
   const [, setCount] = useState(0)
   const seen = useRef('')
@@ -91,7 +91,7 @@ interface Data {
   values: Float64Array
 }
 
-/** One trace: its value at the cursors or now, and its measures over a window of time. */
+/** One trace: its value at the cursors or now, and its measures in a time window. */
 function Row({
   trace,
   data,
@@ -130,7 +130,7 @@ function Row({
   )
 }
 
-/** A measure as it is read; a dash where it makes no sense. */
+/** A formatted measure; a dash if it is undefined. */
 function measureText(found: Measures, name: keyof Measures, factor: number): string {
   const value = found[name]
   if (name === 'riseTime') return Number.isNaN(value) ? '–' : spoken(value, 's')

@@ -6,7 +6,7 @@ const GRIP_PX = 6
 export const CLICK_PX = 3
 export type Values = [low: number, high: number]
 
-/** Which measuring cursor is under the pointer. */
+/** The measuring cursor under the pointer. */
 export function gripOf(plot: uPlot, event: MouseEvent): 0 | 1 | null {
   const { cursors } = useWindow.getState()
   if (!cursors) return null
@@ -16,7 +16,7 @@ export function gripOf(plot: uPlot, event: MouseEvent): 0 | 1 | null {
   return far[nearest]! <= GRIP_PX ? nearest : null
 }
 
-/** Wheel zooms, Shift or the middle button pans, a click shows an instant, measuring cursors are dragged. */
+/** The wheel zooms, Shift or the middle button pans, a click selects an instant, cursors are dragged. */
 export function listen(plot: uPlot): () => void {
   const { over } = plot
   const timeOf = (event: MouseEvent) => plot.posToVal(event.clientX - over.getBoundingClientRect().left, 'x')
@@ -69,8 +69,7 @@ export function listen(plot: uPlot): () => void {
 const ZOOM = 1.25
 
 /**
- * On the axis of values the wheel zooms about the pointer, dragging moves, and a double click shows all
- * values.
+ * On the value axis the wheel zooms about the pointer, dragging pans, and a double click shows all values.
  */
 export function listenAtValues(plot: uPlot, show: (values: Values | null) => void): () => void {
   const axis = plot.root.querySelectorAll<HTMLElement>('.u-axis')[1]

@@ -19,7 +19,7 @@ export function drawBand(plot: uPlot, tolerance: number): void {
 }
 
 /**
- * Upright lines: the instant that every view shows, the measuring cursors, and where a parameter was tuned.
+ * Vertical lines: the displayed instant, the measuring cursors, and the instants of parameter changes.
  */
 export function drawLines(plot: uPlot): void {
   const { ctx, bbox } = plot

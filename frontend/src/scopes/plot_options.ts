@@ -6,11 +6,11 @@ import { digits } from './quantity'
 import { useWindow, zoomTo } from './window'
 
 const FONT = '11px "Inter Variable", system-ui, sans-serif'
-/** Width and height of a plot whose panel has none yet. */
+/** Width and height of a plot before its panel has a size, px. */
 export const LEAST_PX = 60
 
 /**
- * How uPlot draws the traces; `unit` is the label of the vertical axis, `band` a band about zero.
+ * The uPlot options of the traces; `unit` is the label of the vertical axis, `band` a band about zero.
  */
 export function plotOptions(
   element: HTMLElement,

@@ -1,7 +1,7 @@
 import { create } from 'zustand'
 import { changed } from '../frames'
 
-/** The display unit of a quantity: its number times `factor` has this unit. */
+/** The display unit of a quantity, and the factor from SI to this unit. */
 export interface Reading {
   factor: number
   unit: string
@@ -30,15 +30,14 @@ export const useUnits = create<{ radians: boolean }>(() => ({ radians: false }))
 useUnits.subscribe(changed)
 
 /**
- * Factor and unit in which magnitudes up to `largest` read well: degrees for angles, SI prefixes instead of
- * long zeros.
+ * Factor and unit for magnitudes up to `largest`: degrees for angles, SI prefixes to avoid long zeros.
  */
 export function reading(unit: string, largest: number, radians = useUnits.getState().radians): Reading {
   if (/^rad\b/.test(unit) && !radians) {
     return { factor: 180 / Math.PI, unit: spell(unit.replace(/^rad/, 'deg')) }
   }
   const spelled = spell(unit)
-  // Prefixes go to plain units only: 1 kkg, 1 m m/s and 1 mrad would puzzle.
+  // Only plain units have prefixes, which excludes 1 kkg, 1 m m/s and 1 mrad.
   if (!spelled || !(largest > 0) || !/^(m|N|s|A|V|W|J|N m|Hz|Pa|H|F)\b/.test(spelled))
     return { factor: 1, unit: spelled }
   const power = Math.floor(Math.log10(largest) / 3 + 1e-9) * 3
@@ -46,7 +45,7 @@ export function reading(unit: string, largest: number, radians = useUnits.getSta
   return { factor: 10 ** -exponent, unit: prefix + spelled }
 }
 
-/** A number with so many significant digits, no exponent where people need none, and a true minus. */
+/** A number with so many significant digits, without exponent if possible, and with a true minus sign. */
 export function digits(value: number, significant = 4): string {
   if (!Number.isFinite(value)) return Number.isNaN(value) ? '–' : value > 0 ? '∞' : '−∞'
   if (value === 0) return '0'
@@ -57,7 +56,7 @@ export function digits(value: number, significant = 4): string {
   return plain.replaceAll('-', '−')
 }
 
-/** A value with its unit, each as people read it: `1.234 mm`. */
+/** A value with its display unit: `1.234 mm`. */
 export function spoken(value: number, unit: string, significant = 4): string {
   const { factor, unit: shown } = reading(unit, Math.abs(value))
   return `${digits(value * factor, significant)}${shown.startsWith('°') ? shown : shown && ` ${shown}`}`

@@ -17,9 +17,9 @@ import { useUnits } from './quantity'
 import { tracesOf } from '../model/trace'
 import { toggleCursors, useWindow, zoomBy } from './window'
 
-/** Every Scope and XY Graph of the run and every logged signal, side by side. */
+/** All Scopes, XY Graphs and logged signals of the run, side by side. */
 export function Scopes() {
-  // Not the whole run: where it stands changes sixty times a second.
+  // Selected fields only: the progress of the run changes sixty times a second.
   const run = useStudio((s) => s.run?.run)
   const all = useStudio((s) => s.run?.views)
   const views = all?.filter(({ kind }) => kind === 'traces' || kind === 'path') ?? []
@@ -50,14 +50,14 @@ function ScopeChart({ run, view }: { run: string; view: ViewOf }) {
         samples,
         view.signals.map((name, k) => ({ path: `${view.block}/${name}`, label: view.labels[k] ?? '' })),
       ),
-    // The samples of a run are one object as long as it is on the screen.
+    // The samples of a run are one object while the run is displayed.
     // eslint-disable-next-line react-hooks/exhaustive-deps
     [run, view],
   )
   return <Chart title={view.title || view.block} traces={traces} path={view.kind === 'path'} />
 }
 
-/** What is done to all time plots at once. */
+/** The tools for all time plots. */
 export function PlotTools() {
   const zoomed = useWindow((s) => s.range !== null)
   const cursors = useWindow((s) => s.cursors !== null)

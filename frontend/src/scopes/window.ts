@@ -8,7 +8,7 @@ interface Window {
   range: [number, number] | null
   /** The two measuring cursors (s); null without measurement. */
   cursors: [number, number] | null
-  /** Whether the tables of measures are shown beside the plots. */
+  /** Whether the tables of measures are visible. */
   measuring: boolean
 }
 
@@ -16,7 +16,7 @@ interface Window {
 export const useWindow = create<Window>(() => ({ range: null, cursors: null, measuring: false }))
 useWindow.subscribe(changed)
 
-/** The range of the whole run: to its stop time while it is running, else to its last sample. */
+/** The range of the whole run: up to its stop time while it runs, otherwise up to its last sample. */
 export function wholeRun(): [number, number] {
   const { run } = useStudio.getState()
   const reached = samples.time[samples.count - 1] ?? 0
@@ -49,7 +49,7 @@ export function pan(by: number): void {
   useWindow.setState({ range: [from + by, to + by] })
 }
 
-/** Two cursors, at a third and two thirds of the visible range; or none. */
+/** Place two cursors at one third and two thirds of the visible range, or remove them. */
 export function toggleCursors(): void {
   const [from, to] = shownWindow()
   useWindow.setState((s) => ({

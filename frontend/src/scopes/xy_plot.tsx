@@ -12,7 +12,7 @@ import type { Trace } from '../model/trace'
 
 const MOST_POINTS = 20_000
 
-/** The second trace over the first, with a mark at the instant that is shown. */
+/** The second trace over the first, with a mark at the displayed instant. */
 function figureOf([across, up]: Trace[], title: string, width: number, height: number): Figure {
   const x = across?.read()?.values ?? new Float64Array(0)
   const y = up?.read()?.values ?? new Float64Array(0)
@@ -21,7 +21,7 @@ function figureOf([across, up]: Trace[], title: string, width: number, height: n
   const most = Math.max(largest(x), largest(y))
   const readX = reading(across?.unit ?? '', equal ? most : largest(x))
   const readY = reading(up?.unit ?? '', equal ? most : largest(y))
-  // Of a long run every k-th point is drawn, and the last.
+  // For a long run every k-th point and the last one are drawn.
   const stride = Math.max(1, Math.ceil(x.length / MOST_POINTS))
   const count = Math.ceil(x.length / stride)
   const pick = (values: Float64Array, factor: number) =>
@@ -69,7 +69,7 @@ export function XyPlot({
     if (!element || !box) return
     let seen = ''
     const frame = (at: number) => {
-      if (!box.isConnected) return // behind another panel
+      if (!box.isConnected) return // hidden by another panel
       const { clientWidth: width, clientHeight: height } = box
       const now = `${samples.version} ${shownTime()} ${width} ${height} ${useUnits.getState().radians}`
       if (now === seen || width < 40 || height < 40) return

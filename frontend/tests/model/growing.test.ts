@@ -8,7 +8,7 @@ const TIME = Float64Array.from({ length: 5000 }, (_, k) => k / 1000)
 const VALUES = TIME.map((t) => Math.sin(40 * t) + 0.2 * Math.sin(911 * t))
 const until = (count: number) => ({ time: TIME.subarray(0, count), values: VALUES.subarray(0, count) })
 
-test('extremes that grow with a run are those of the whole run', () => {
+test('extremes extended during a run equal those of the whole run', () => {
   let grown = extremes([until(1)], 0, 5, 300)
   for (const count of [7, 8, 900, 901, 3333, 5000]) {
     grown = extremes([until(count)], 0, 5, 300, grown)
@@ -16,14 +16,14 @@ test('extremes that grow with a run are those of the whole run', () => {
   }
 })
 
-test('no peak is lost, and each interval has two points at most', () => {
+test('no peak is lost, and each interval has at most two points', () => {
   const { drawn } = extremes([until(5000)], 0, 5, 50)
   const shown = (drawn[1] as (number | undefined)[]).filter((value) => value !== undefined)
   expect(shown.length).toBeLessThanOrEqual(100)
   expect([Math.min(...shown), Math.max(...shown)]).toEqual([Math.min(...VALUES), Math.max(...VALUES)])
 })
 
-/** A canvas that notes the lines drawn onto it, and the dash with which each begins. */
+/** A canvas that records the drawn lines and their initial dash offsets. */
 function surface() {
   const strokes: { points: [number, number][]; offset: number }[] = []
   const ctx: CanvasRenderingContext2D = {
@@ -48,7 +48,7 @@ function surface() {
 
 const nothing = (made: { drawn: Drawn }): Drawn => [made.drawn[0], made.drawn[0].map(() => NaN)]
 
-test('what is drawn piece by piece is the line that is drawn at once, dashes too', () => {
+test('a line drawn in parts equals the line drawn at once, dashes included', () => {
   const strokes = [{ colour: 'black', dash: [7, 3] }]
   const whole = surface()
   const all = extremes([until(5000)], 0, 5, 300)
@@ -73,12 +73,12 @@ test('what is drawn piece by piece is the line that is drawn at once, dashes too
     points.slice(1).reduce((sum, [x, y], k) => sum + Math.hypot(x - points[k]![0], y - points[k]![1]), 0)
   let before = 0
   for (const { points, offset } of pieces) {
-    expect(offset, 'the dashes go on where they ended').toBeCloseTo(before, 9)
+    expect(offset, 'the dashes continue without a jump').toBeCloseTo(before, 9)
     before += length(points)
   }
 })
 
-/** A frame of samples as the server sends it: a header, the instants, the columns. */
+/** A sample frame in the format of the server: header, instants, columns. */
 function frame(run: string, first: number, time: number[], columns: number[][]): ArrayBuffer {
   const header = JSON.stringify({ run, first, count: time.length })
   const text = new TextEncoder().encode(header.padEnd(Math.ceil((header.length + 4) / 8) * 8 - 4))
@@ -89,7 +89,7 @@ function frame(run: string, first: number, time: number[], columns: number[][]):
   return made
 }
 
-test('samples of a run come in frames, go back with it, and are found by name', () => {
+test('samples are added by frames, dropped by a step back, and found by name', () => {
   const channel = (name: string, shape: number[]): Channel => ({ name, shape, unit: 'rad', entries: [] })
   const run = new RunSamples('r', [channel('arm/q', [2]), channel('clock/y', [])], { arm: 'arm/q' })
   run.receive(

@@ -17,10 +17,10 @@ describe('measures of a trace', () => {
     expect(found.mean).toBeCloseTo(1, 9)
     expect(found.rms).toBeCloseTo(Math.sqrt(1 + 4.5), 5)
     expect(found.peakToPeak).toBeCloseTo(6, 9)
-    expect([found.riseTime, found.overshoot], 'it has no end value').toEqual([NaN, NaN])
+    expect([found.riseTime, found.overshoot], 'no final value').toEqual([NaN, NaN])
   })
 
-  test('weigh by time: a straight line has the same at uneven samples', () => {
+  test('are weighted by time: uneven samples of a straight line do not change them', () => {
     const line = (t: number) => 2 * t
     const uneven = measures(trace([0, 0.1, 0.15, 3.9, 4], line), 0, 4)
     expect(uneven.mean).toBeCloseTo(4, 12)
@@ -61,7 +61,7 @@ describe('measures of a trace', () => {
     expect(falling.riseTime).toBeCloseTo(Math.log(9), 4)
   })
 
-  test('where there is nothing', () => {
+  test('of an empty window are NaN', () => {
     expect(
       Object.values(
         measures(
@@ -81,7 +81,7 @@ describe('measures of a trace', () => {
   })
 })
 
-test('the value at an instant lies on the line between two samples', () => {
+test('the value at an instant is linearly interpolated', () => {
   const line = trace([0, 1, 3], (t) => t * t)
   expect([0, 0.5, 1, 2, 3].map((at) => valueAt(line, at))).toEqual([0, 0.5, 1, 5, 9])
   expect([-1, 3.5].map((at) => valueAt(line, at))).toEqual([NaN, NaN])

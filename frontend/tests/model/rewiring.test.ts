@@ -44,7 +44,7 @@ const chain = [
   wire('clock/y', 'log/in1'),
 ]
 
-test('a block that is taken out closes its wires behind it, and put back it is where it was', () => {
+test('disconnecting a block connects its neighbours, and inserting it again restores the wires', () => {
   const without = takenOut([gain], chain)
   expect(sorted(without)).toEqual(
     sorted([wire('step/y', 'plant/u'), wire('step/y', 'scope/in1'), wire('clock/y', 'log/in1')]),
@@ -60,7 +60,7 @@ test('several blocks keep the wires between them and lose all others', () => {
   ])
 })
 
-test('a block with two inputs leaves no wire behind, and goes into one by its first ends', () => {
+test('disconnecting a block with two inputs connects no neighbours; insertion uses its first ports', () => {
   const sum = block('sum', ['in1', 'in2'])
   expect(takenOut([sum], [wire('a/y', 'sum/in1'), wire('b/y', 'sum/in2'), wire('sum/y', 'c/u')])).toEqual([])
   expect(putInto(sum, wire('a/y', 'c/u'), [wire('a/y', 'c/u')])).toEqual([
@@ -69,7 +69,7 @@ test('a block with two inputs leaves no wire behind, and goes into one by its fi
   ])
 })
 
-test('an edit says which wires come and which give way, no others', () => {
+test('an edit contains exactly the added and removed wires', () => {
   const after = takenOut([gain], chain)
   const { wires, instead } = rewired(chain, after)
   const gone = new Set(instead.map(wireKey))
@@ -77,13 +77,13 @@ test('an edit says which wires come and which give way, no others', () => {
   expect(wires.concat(instead).map(wireKey)).not.toContain(wireKey(wire('clock/y', 'log/in1')))
 })
 
-test('only a block that can stand in a wire and has none is loose', () => {
+test('only an unconnected block with an input and an output can be inserted by dropping', () => {
   expect(isLoose(gain, chain)).toBe(false)
   expect(isLoose(block('other'), chain)).toBe(true)
   expect(isLoose(block('source', []), chain)).toBe(false)
 })
 
-test('a dropped block finds the level piece below it and stands straight in it', () => {
+test('a dropped block is inserted into the horizontal segment below it and aligned with it', () => {
   const drawn = {
     id: wireKey(wire('step/y', 'plant/u')),
     source: 'step',
@@ -105,11 +105,11 @@ test('a dropped block finds the level piece below it and stands straight in it',
   expect(levelled(gain, { x: 170, y: 65 }, found)).toEqual({ x: 170, y: 70, flipped: false })
   expect(
     levelled(gain, { x: 170, y: 65 }, { ...found, right: 200 }),
-    'in the middle of a short piece',
+    'centred on a short segment',
   ).toMatchObject({
     x: 120,
   })
   expect(wireAt({ x: 200, y: 60 }, [drawn], wires), 'too far away').toBeUndefined()
   expect(wireAt({ x: 100, y: 70 }, [drawn], wires), 'an upright piece').toBeUndefined()
-  expect(wireAt({ x: 200, y: 85 }, [drawn], []), 'a wire that has just closed').toBeUndefined()
+  expect(wireAt({ x: 200, y: 85 }, [drawn], []), 'a wire that was just closed').toBeUndefined()
 })

@@ -1,6 +1,6 @@
 import type { Panel } from '../../src/panel'
 
-/** A panel that somebody adds: this file is all of it. */
+/** A panel that is added by this single file. */
 export const panel: Panel = {
   title: 'Doubled',
   component: () => <p>2 × 21 = {2 * 21}</p>,

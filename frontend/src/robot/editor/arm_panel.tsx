@@ -20,7 +20,7 @@ export default function ArmPanel() {
     let alive = true
     let under = false
     let wanted = true
-    // Of many configurations while one is answered only the last is asked for.
+    // While a request is pending, only the latest of the later configurations is requested.
     const move = async () => {
       wanted = true
       if (under) return

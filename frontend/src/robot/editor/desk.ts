@@ -4,13 +4,13 @@ import type { ChangeOf, ContentOf, Edit, EventOf } from '../../messages'
 import type { CellColumn, DocumentState, Readings, RobotContent, RobotTables } from '../../protocol'
 import { alteration, ask, line } from '../../store'
 
-/** A robot that this page shows or has shown, as the server says it is now. */
+/** A robot that this page shows or has shown, in the last state sent by the server. */
 export interface OpenRobot extends RobotContent {
   state: DocumentState
 }
 export type Angles = 'deg' | 'rad'
 
-/** Positions, speeds and accelerations of the joints on the page: rad, m and per second. */
+/** Joint positions, speeds and accelerations on the page: rad, m and per second. */
 export interface Joints {
   q: number[]
   qd: number[]
@@ -18,21 +18,21 @@ export interface Joints {
 }
 
 interface Desk {
-  /** By the keys of their documents. */
+  /** Robots by the keys of their documents. */
   robots: Record<string, OpenRobot>
-  /** The robot in the editor; null while the diagram is on the screen. */
+  /** The key of the robot in the editor; null while a diagram is displayed. */
   current: string | null
   tables: RobotTables | null
   joints: Record<string, Joints>
   readings: Readings | null
-  /** The latest readings are of another form or configuration than the one on the screen. */
+  /** Whether the latest read-outs belong to an earlier robot or configuration. */
   reading: boolean
   angles: Angles
-  /** What was said when the file was read that was opened last. */
+  /** Warnings issued while the last opened file was read. */
   notes: string[]
 }
 
-/** The robots that are open, and the one in the editor. */
+/** The open robots, and the one in the editor. */
 export const useDesk = create<Desk>(() => ({
   robots: {},
   current: null,
@@ -57,18 +57,18 @@ function put(state: DocumentState, content: RobotContent): void {
   if (useDesk.getState().current === state.document) readSoon()
 }
 
-/** The page shows a robot from now on. */
+/** Add a robot that this page shows from now on. */
 export function robotOpened(event: EventOf<'opened'>, content: ContentOf<'robot'>): void {
   put(event.state, content)
   if (event.in_front) toFront(event.state.document, event.notes)
 }
 
-/** A robot has changed. */
+/** Update a robot that has changed. */
 export function robotChanged({ state }: EventOf<'changed'>, change: ChangeOf<'robot'>): void {
   put(state, change.content)
 }
 
-/** Bring a robot that this page knows to the screen. */
+/** Display a robot that this page has loaded. */
 export function toFront(robot: string, notes: string[] = []): void {
   useDesk.setState({ current: robot, notes, readings: null })
   if (!useDesk.getState().tables)
@@ -76,12 +76,12 @@ export function toFront(robot: string, notes: string[] = []): void {
   readSoon()
 }
 
-/** Back to the diagram. */
+/** Return to the diagram. */
 export function leaveEditor(): void {
   useDesk.setState({ current: null, notes: [] })
 }
 
-/** Put a robot away that needs no saving. */
+/** Close a robot without unsaved edits. */
 export async function closeRobot(robot: string): Promise<void> {
   if ((await ask({ kind: 'close', document: robot })) === undefined) return
   const { [robot]: _, ...robots } = useDesk.getState().robots
@@ -91,7 +91,7 @@ export async function closeRobot(robot: string): Promise<void> {
 const PLACE = 'armblocks-robot'
 type Name = Pick<DocumentState, 'document' | 'path' | 'origin'>
 
-/** Note which robot this tab shows: by it the same comes back after a reload. */
+/** Store which robot this tab shows, so that a reload shows it again. */
 useDesk.subscribe(({ robots, current }, before) => {
   if (robots === before.robots && current === before.current) return
   const shown = current ? robots[current] : undefined
@@ -101,8 +101,8 @@ useDesk.subscribe(({ robots, current }, before) => {
 })
 
 /**
- * After the line was broken, or a reload: the server opens again what this page has open, under the same
- * keys. Gives the key of what the tab showed before it was loaded anew.
+ * After a reconnection or a reload, let the server reopen the robots of this page under the same keys.
+ * Returns the key of the robot that the tab showed before a reload.
  */
 export async function attachAgain(): Promise<string | undefined> {
   const { robots, current } = useDesk.getState()
@@ -117,7 +117,7 @@ export async function attachAgain(): Promise<string | undefined> {
   return last ? attach(last) : undefined
 }
 
-/** All joints at zero, or as near to it as their ranges allow. */
+/** All joint positions at zero, or at the limit nearest to zero. */
 export function atRest({ links }: RobotContent): Joints {
   const moving = links.filter(({ moves }) => moves)
   const zero = moving.map(() => 0)
@@ -135,7 +135,7 @@ export function setJoints(change: Partial<Joints>): void {
   readSoon()
 }
 
-/** Carry out an edit; the refusal where there was one. Refusals belong to the cell, not to the notices. */
+/** Apply an edit; returns the refusal if there is one. Refusals are shown at the cell, not as notices. */
 export async function edit(change: Edit, gesture = ''): Promise<Refusal | undefined> {
   const { current, robots } = useDesk.getState()
   const robot = current ? robots[current] : undefined
@@ -152,7 +152,7 @@ export async function edit(change: Edit, gesture = ''): Promise<Refusal | undefi
 let wanted = false
 let under = false
 
-/** Read the arm as it stands now; of requests that come while one is answered, only the last counts. */
+/** Request the read-outs of the present configuration; of several pending requests only the last is sent. */
 function readSoon(): void {
   wanted = true
   if (under) return
@@ -171,7 +171,7 @@ async function readOn(): Promise<void> {
       const readings = await line.ask({ kind: 'readings', document: current, ...now })
       if (useDesk.getState().current === current) useDesk.setState({ readings })
     } catch (error) {
-      // A joint came or went meanwhile: the next form asks again. What cannot be read shows nothing.
+      // The joints have changed meanwhile: another request follows. After an error nothing is shown.
       if (!(error instanceof Refusal)) throw error
       useDesk.setState({ readings: null })
     }
@@ -180,16 +180,16 @@ async function readOn(): Promise<void> {
   useDesk.setState({ reading: false })
 }
 
-// -- numbers as people read them ----------------------------------------------------------------------------
+// -- display of numbers -------------------------------------------------------------------------------------
 
-/** Whether a column of a joint that turns or slides holds an angle. */
+/** Whether a joint column contains an angle, for the type of the joint. */
 export function isAngle(column: CellColumn, turns: boolean): boolean {
   return (
     column.quantity === 'angle' || (turns && (column.quantity === 'coordinate' || column.quantity === 'rate'))
   )
 }
 
-/** The unit of a cell as it is shown. */
+/** The displayed unit of a cell. */
 export function unitOf(column: CellColumn, angles: Angles, turns?: boolean): string {
   if (column.quantity === 'angle') return angles === 'deg' ? '°' : 'rad'
   if (column.quantity === 'coordinate' || column.quantity === 'rate') {
@@ -227,7 +227,7 @@ function plain(value: number): string {
   return String(Object.is(value, -0) ? 0 : value).replace('e+', 'e')
 }
 
-/** A reading with as many digits as an eye can use. */
+/** A read-out rounded to a readable number of digits. */
 export function shortNumber(value: number, digits = 4): string {
   const size = Math.abs(value)
   if (size < 0.5 * 10 ** -digits) return (0).toFixed(Math.min(digits, 3))

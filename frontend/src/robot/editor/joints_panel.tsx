@@ -6,14 +6,14 @@ import { atRest, cellText, setJoints, useDesk, type Joints } from './desk'
 const WHOLE_TURN = Math.PI
 const WITHOUT_RANGE = 1
 
-/** The quantities of a joint: position, speed, acceleration. */
+/** The displayed quantity of the joints: position, speed, acceleration. */
 const KINDS = [
   { value: 'q', label: 'q' },
   { value: 'qd', label: 'qd' },
   { value: 'qdd', label: 'qdd' },
 ]
 
-/** A slider for each joint within its range, and numbers for speeds and accelerations. */
+/** A slider for each joint within its range, and fields for speeds and accelerations. */
 export function JointsPanel() {
   const shown = useDesk((s) => (s.current ? s.robots[s.current] : undefined))
   const joints = useDesk((s) => (s.current ? s.joints[s.current] : undefined))
@@ -117,8 +117,8 @@ function NumberField({
 }
 
 /**
- * The range of a slider: that of the joint, else a whole turn or a metre either way; of speeds the joint's
- * own.
+ * The range of a slider: that of the joint, otherwise one turn or one metre in both directions; for speeds
+ * the speed limit.
  */
 function range(link: LinkRow, kind: keyof Joints): [number, number] {
   const { lowest, highest, speed } = link.cells

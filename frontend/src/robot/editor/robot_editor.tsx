@@ -30,7 +30,7 @@ import { LinkTable } from './table'
 import { saveRobot, SaveDialog } from './save_dialog'
 
 const ArmPanel = lazy(() => import('./arm_panel'))
-/** From this height on (px) both tables are seen at once. */
+/** Panel height above which both tables are visible at the same time, px. */
 const TALL = 1000
 const BAR_PX = 44
 
@@ -90,7 +90,7 @@ function arrange({ api }: DockviewReadyEvent): void {
     inactive: true,
     position: { referencePanel: tall ? 'dynamics' : 'kinematics' },
   })
-  // Sizes last, from the left and from above: a group that is set takes from those behind it.
+  // Sizes are set last, from left and top: a resized group takes space from those after it.
   const width = (least: number, share: number) => Math.min(Math.max(least, share * innerWidth), 1.5 * least)
   const [joints, readings] = [width(300, 0.2), width(376, 0.26)]
   api.getPanel('arm')?.group.api.setSize({ width: innerWidth - joints - readings })
@@ -109,14 +109,14 @@ function Table({ which }: { which: 'kinematics' | 'dynamics' | 'robot' }) {
   return <LinkTable shown={shown} columns={tables[which]} actions={which === 'kinematics'} />
 }
 
-/** A robot as a document: its tables, the arm that they make, and what it does. */
+/** The editor of a robot: its tables, the arm, and its read-outs. */
 export default function RobotEditor() {
   const scheme = useComputedColorScheme('light')
   const shown = useDesk((s) => (s.current ? s.robots[s.current] : undefined))
   const key = shown?.state.document
   useEffect(() => {
     if (!key) return
-    // On the document, so that the keys of the sheet and of its toolbar (on the window) do not hear them too.
+    // Registered on the document, before the key handlers of the sheet and its toolbar on the window.
     const onKey = (event: KeyboardEvent) => {
       event.stopPropagation()
       const pressed = event.key.toLowerCase()
@@ -149,7 +149,7 @@ export default function RobotEditor() {
   )
 }
 
-/** A cell that is being typed into keeps its letters; leaving it first makes its text a step of its own. */
+/** A cell in edit keeps its text; leaving the cell ends its undo step. */
 function leaveCell(): void {
   if (document.activeElement instanceof HTMLElement) document.activeElement.blur()
 }
@@ -261,7 +261,7 @@ function Tool({
   )
 }
 
-/** New robots, and copies of the shipped ones: for the menus. */
+/** Menu entries for new robots and copies of shipped ones. */
 export function RobotItems() {
   const robots = useStudio((s) => s.welcome?.robots) ?? []
   return (
@@ -308,7 +308,7 @@ function Findings({ shown }: { shown: OpenRobot }) {
   )
 }
 
-/** Standard or modified rows: the same numbers read the other way, or the same arm written the other way. */
+/** Change of the D-H convention: the same numbers reinterpreted, or the same arm converted. */
 function Convention({ shown }: { shown: OpenRobot }) {
   if (!shown.convention) return null
   const other = shown.convention === 'standard' ? 'modified' : 'standard'

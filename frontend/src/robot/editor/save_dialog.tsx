@@ -12,7 +12,7 @@ interface Saving {
 
 const useSaving = create<Saving>(() => ({ robot: null, path: '', refused: '' }))
 
-/** Save under the present name; asks for one where there is none. */
+/** Save under the present name; without a file, ask for a name. */
 export function saveRobot(): void {
   const { current, robots } = useDesk.getState()
   const shown = current ? robots[current] : undefined
@@ -21,7 +21,7 @@ export function saveRobot(): void {
   else saveRobotAs(shown)
 }
 
-/** Ask for a name, and save under that. */
+/** Ask for a name and save under it. */
 export function saveRobotAs({ name, state }: OpenRobot): void {
   useSaving.setState({
     robot: state.document,

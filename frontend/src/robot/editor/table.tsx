@@ -104,7 +104,7 @@ const startsGroup = (columns: CellColumn[], k: number) => k > 0 && columns[k]!.g
 const LETTER_PX = 7.3
 const AROUND_PX = 4
 
-/** What the longest text of a column takes, px (the padding of the header comes to it). */
+/** Width of the longest text in a column, px (the padding of the header is added). */
 function widest(links: LinkRow[], column: CellColumn, angles: Angles): number {
   const longest = Math.max(
     ...links.map(({ cells, turns }) => cellText(cells[column.name], isAngle(column, turns), angles).length),
@@ -112,13 +112,13 @@ function widest(links: LinkRow[], column: CellColumn, angles: Angles): number {
   return Math.round(longest * LETTER_PX + AROUND_PX)
 }
 
-/** Whether all joints turn, or all slide; undefined where there are both. */
+/** Whether all joints are revolute or all are prismatic; undefined for mixed types. */
 function oneKind(links: LinkRow[]): boolean | undefined {
   const kinds = new Set(links.filter(({ moves }) => moves).map(({ turns }) => turns))
   return kinds.size === 1 ? [...kinds][0] : undefined
 }
 
-/** Up, down and Enter go from row to row; Tab goes from cell to cell by itself. */
+/** Up, Down and Enter move between rows; the browser handles Tab. */
 function walk(event: React.KeyboardEvent): void {
   const step = { ArrowUp: -1, ArrowDown: 1, Enter: event.shiftKey ? -1 : 1 }[event.key]
   const field = event.target
@@ -164,7 +164,7 @@ interface CellProps {
   finding?: RobotFinding | undefined
 }
 
-/** One cell: typing changes the arm at once, and errors are shown here. */
+/** One cell: typing changes the arm at once, and errors are displayed at the cell. */
 export const Cell = memo(function Cell({
   owner,
   turns,
@@ -221,7 +221,7 @@ interface TextCellProps {
   send: (text: string, gesture: string) => Promise<Fault | undefined>
   marked?: Fault | undefined
   wide?: boolean
-  /** Send once, when the cell is left, because a partial text would have another meaning. */
+  /** Sent once, when the cell loses the focus, because a partial text would have another meaning. */
   onlyAtTheEnd?: boolean
 }
 
