@@ -1,7 +1,8 @@
-"""Formulas of blocks in NumPy: what an output has to be at every recorded time, by the recorded inputs.
+"""Formulas of blocks in NumPy: the required output at every recorded time as a function of the recorded
+inputs.
 
-A second opinion that shares nothing with the blocks, for blocks without memory that switch. It holds at every
-row of every run. Sources are formulas of the time.
+The formulas share no code with the blocks. They cover sources and switching blocks without memory, and hold
+at every recorded time of every run.
 """
 
 from __future__ import annotations
@@ -17,10 +18,10 @@ from armblocks.diagram import Block, Diagram, flat_diagram
 
 Inputs = Mapping[str, np.ndarray]
 Formula = Callable[[Any, Inputs, np.ndarray], np.ndarray]
-"""Of a block, its inputs (N, *shape) by port and the time (N, 1, …): the output y."""
+"""Function of a block, its inputs (N, *shape) by port, and the time (N, 1, …); it returns the output y."""
 
 BORDER = 1e-8
-"""How far a switching instant may be from the exact one, as a difference of inputs relative to 1 + |u|."""
+"""Tolerance of switching times, as a difference of inputs relative to 1 + |u|."""
 
 _RELATIONS: Mapping[str, Callable[[Any, Any], Any]] = {
     "==": np.equal,
@@ -80,7 +81,7 @@ def _multiport(block: Any, u: Inputs, t: np.ndarray) -> np.ndarray:
 def _table(block: Any, u: Inputs, t: np.ndarray) -> np.ndarray:
     x, y, v = _array(block.positions), _array(block.table), u["u"]
     if block.method == "cubic":
-        return np.full(v.shape, np.nan)  # no formula here: a spline does not switch
+        return np.full(v.shape, np.nan)  # no formula: a spline does not switch
     if block.method == "flat":
         return y[np.clip(np.searchsorted(x, v, side="right") - 1, 0, len(x) - 1)]
     if block.method == "nearest":
@@ -91,7 +92,7 @@ def _table(block: Any, u: Inputs, t: np.ndarray) -> np.ndarray:
 
 
 def _phase(t: np.ndarray, period: float) -> np.ndarray:
-    """Time since the period began; an instant a few rounding errors before a period belongs to it."""
+    """Return the time since the start of the period; a time a few rounding errors before it belongs to it."""
     count = np.floor(t / period * (1.0 + 2e-14))
     return np.maximum(t - count * period, 0.0)
 
@@ -166,10 +167,10 @@ FORMULAS: Mapping[str, Formula] = {
 
 
 def broken_formulas(diagram: Diagram, found: Any, t: np.ndarray) -> dict[str, tuple[int, float, float]]:
-    """Where a result contradicts a formula: by block, the first such row, the output, and the one wanted.
+    """Return by block the first row that contradicts its formula, the output, and the required output.
 
     ``found`` gives signals (N, *shape) by path, at the times ``t`` (N,). Blocks inside conditional subsystems
-    are left out: what they give while off is nobody's.
+    are skipped: their outputs are undefined while the subsystem is off.
     """
     flat = flat_diagram(diagram)
     broken: dict[str, tuple[int, float, float]] = {}
@@ -189,7 +190,7 @@ def broken_formulas(diagram: Diagram, found: Any, t: np.ndarray) -> dict[str, tu
 def contradictions(
     formula: Formula, block: Block, inputs: Inputs, t: np.ndarray, y: np.ndarray
 ) -> tuple[int, float, float] | None:
-    """The first row at which no input within ``BORDER`` of the recorded one gives the recorded output."""
+    """Return the first row whose output no input within ``BORDER`` of the recorded one gives."""
     rank = y.ndim
     wide = {name: _spread(value, rank) for name, value in inputs.items()}
     t = t.reshape((-1,) + (1,) * (rank - 1))
@@ -205,7 +206,7 @@ def contradictions(
     near = exact.copy()
     for moves in itertools.product((0.0, BORDER, -BORDER), repeat=len(wide)):
         near |= fits(moves)[0]
-    # An instant may be found a little late, at one row; what stays at a border has a side.
+    # A switching time may be located slightly late, which affects one row; longer deviations are errors.
     wrong = np.pad(~exact, [(2, 2)] + [(0, 0)] * (rank - 1))
     n = len(y)
     stays = np.any(
@@ -219,5 +220,5 @@ def contradictions(
 
 
 def _spread(value: np.ndarray, rank: int) -> np.ndarray:
-    """(N,) to (N, 1, …): a scalar is spread over every element."""
+    """Reshape (N,) to (N, 1, …), so that a scalar is broadcast to every element."""
     return value.reshape(value.shape + (1,) * (rank - value.ndim)) if value.ndim < rank else value

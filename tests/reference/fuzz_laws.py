@@ -1,8 +1,8 @@
-"""Laws that hold for every diagram: what a fuzzer checks of a random one.
+"""Laws that hold for every diagram; the fuzzer checks them for random diagrams.
 
-Each law takes a :class:`Case` and returns a text for every contradiction. A run is repeated with altered
-settings or with an altered diagram; the alterations are those of SLforge and SLEMI (Chowdhury et al., ICSE
-2018 and 2020), equivalence modulo input among them.
+Each law takes a :class:`Case` and yields a text for every contradiction. Several laws repeat the run with
+changed settings or with an equivalent diagram. The changes are those of SLforge and SLEMI (Chowdhury et al.,
+ICSE 2018 and 2020), including equivalence modulo input.
 """
 
 from __future__ import annotations
@@ -34,15 +34,15 @@ from armblocks.formats.diagram_python import diagram_to_python
 
 Signals = Mapping[str, np.ndarray]
 TOO_LARGE = 1e4
-"""Beyond this a diagram counts as unstable, and nothing is compared."""
+"""A diagram with larger signals counts as unstable, and is not compared."""
 
 
 class InconclusiveError(Exception):
-    """A case of which nothing can be said, with the reason."""
+    """A case that cannot be judged, with the reason."""
 
 
 class Case:
-    """One diagram and its run, from which the laws start."""
+    """One diagram and its run, the input of every law."""
 
     def __init__(self, recipe: Recipe) -> None:
         self.recipe = recipe
@@ -70,7 +70,7 @@ class Case:
                     raise InconclusiveError(f"the state of '{name}' may have moved before it is held")
 
     def signals(self, diagram: Diagram, **settings: Any) -> dict[str, np.ndarray]:
-        """All signals that are compared, by path: not those inside conditional subsystems."""
+        """Simulate and return the compared signals by path, without those inside conditional subsystems."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             result = ab.simulate(diagram, **{**self.settings, "rtol": 1e-9, "atol": 1e-12, **settings})
@@ -79,7 +79,7 @@ class Case:
 
     @staticmethod
     def compared(diagram: Diagram) -> list[str]:
-        """Outputs outside of conditional subsystems."""
+        """Return the paths of all outputs outside conditional subsystems."""
         flat = flat_diagram(diagram)
         return [
             f"{name}/{port.name}"
@@ -90,13 +90,13 @@ class Case:
 
     @cached_property
     def reference(self) -> Signals:
-        """The reference simulator's signals, refined until they converge."""
+        """The signals of the reference simulator."""
         return self.converged(self.diagram)
 
     def converged(
         self, diagram: Diagram, times: np.ndarray | None = None, steps: tuple[float, float] = (0.01, 0.004)
     ) -> dict[str, np.ndarray]:
-        """Two reference runs, the second with shorter steps; they say how uncertain each signal is."""
+        """Run the reference with two step sizes; the difference is the uncertainty of each signal."""
         try:
             two = run_reference(diagram, self.times if times is None else times, steps[1], most_events=300)
             if times is not None:
@@ -106,14 +106,14 @@ class Case:
             raise InconclusiveError(f"reference: {error}") from None
         for name in self.run:
             if name in two and not np.isfinite(two[name]).all():
-                # Equations are simplified: a signal over itself is 1, also where it is 0.
+                # The native equations are simplified: u / u is 1, even where u is 0.
                 raise InconclusiveError(f"reference: '{name}' is not finite")
         self.uncertainty = {name: rows_of(two[name], one[name]) for name in two}
         return two
 
 
 def rows_of(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """The largest difference in each row."""
+    """Return the largest difference in each row."""
     if len(a) != len(b):
         return np.full(max(len(a), len(b)), np.inf)
     a, b = a.reshape(len(a), -1), b.reshape(len(b), -1)
@@ -123,7 +123,7 @@ def rows_of(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def different(
     found: Signals, wanted: Signals, tolerance: float, excess: Mapping[str, np.ndarray] | None = None
 ) -> Iterator[str]:
-    """Every signal that differs by more than ``tolerance`` of its size (and of what else is uncertain)."""
+    """Yield every signal that differs by more than ``tolerance`` of its size plus its uncertainty."""
     for name, values in wanted.items():
         if name not in found:
             yield f"'{name}' is missing"
@@ -143,16 +143,16 @@ def different(
 
 
 def agrees_with_reference(case: Case) -> Iterator[str]:
-    """The native run gives what the reference simulator gives."""
+    """The native run agrees with the reference simulator."""
     wanted = {name: v for name, v in case.reference.items() if name in case.run}
     if not any(different(case.run, wanted, 1e-6, case.uncertainty)):
         return
-    # A stiff block makes long steps unstable.
+    # Long steps of the reference are unstable for a stiff block.
     shorter = case.converged(case.diagram, steps=(0.001, 0.0005))
     wanted = {name: shorter[name] for name in wanted}
     if not any(different(case.run, wanted, 1e-6, case.uncertainty)):
         return
-    # Where a signal jumps at a recorded time, a single row may show what is just before or just after it.
+    # Where a signal jumps at a recorded time, a single row may have the value just before or just after it.
     beside = case.converged(
         case.diagram, np.unique([0.0, *(case.times - 1e-7), *(case.times + 1e-7)]).clip(0.0)
     )
@@ -166,11 +166,12 @@ NUDGE, NEIGHBOURS = 1e-9, 8
 
 
 def expect_well_posed(case: Case, run: Signals) -> None:
-    """Raise where diagrams that differ by next to nothing explain how a run differs from the reference.
+    """Raise ``InconclusiveError`` if tiny changes of the diagram explain the difference from the reference.
 
-    Where a signal rests at a border, or reaches it at the very instant of a tick, rounding decides what
-    happens. The neighbours have a number of the size of ``NUDGE`` added to the signal of every wire. The run
-    lies between theirs, or they differ from each other where the run first leaves the reference.
+    If a signal stays at a switching value, or reaches it exactly at a tick, rounding errors decide the
+    result. In the neighbours, ``NUDGE`` with a random sign is added to the signal of every connection. The
+    error is raised if the run lies between the neighbours, or if the neighbours differ from each other where
+    the run first leaves the reference.
     """
     neighbours = [case.reference]
     for seed in range(NEIGHBOURS):
@@ -192,11 +193,11 @@ def expect_well_posed(case: Case, run: Signals) -> None:
             first, scattered = row, scatters or (scattered and row == first)
     if outside and not scattered:
         return
-    raise InconclusiveError("a change by next to nothing changes these numbers")
+    raise InconclusiveError("a change of the signals by a rounding error changes the result")
 
 
 def nudged(nodes: tuple[Node, ...], random: np.random.Generator) -> tuple[Node, ...]:
-    """The diagram with a small number added on each wire, also inside of subsystems."""
+    """Return the diagram with a small number added on each connection, including those in subsystems."""
     found: list[Node] = []
     for k, node in enumerate(nodes):
         inputs = dict(node.inputs)
@@ -212,19 +213,19 @@ def nudged(nodes: tuple[Node, ...], random: np.random.Generator) -> tuple[Node, 
 
 
 def is_action(node: Node, source: str) -> bool:
-    """Whether a wire leads an action, or one of the signals that exclude one another, to a block."""
+    """Return whether a connection carries an action signal, or one of the inputs of a Merge."""
     return node.kind in ("Merge", "ActionSubsystem") or source.split("/")[0].startswith("if ")
 
 
 def without_single_rows(found: Signals, wanted: Signals, beside: Signals) -> dict[str, np.ndarray]:
-    """Signals whose single rows are those wanted, where they lie between the values just before and after."""
+    """Replace a single deviating row by the wanted one if it lies between its neighbours in time."""
     changed: dict[str, np.ndarray] = {}
     for name, values in wanted.items():
         rows = found[name].copy()
         wrong = rows_of(rows, values) > 1e-6 * (1.0 + np.abs(values).max(initial=0.0))
         for k in np.flatnonzero(wrong):
             alone = not wrong[max(k - 1, 0) : k].any() and not wrong[k + 1 : k + 2].any()
-            # What the signal is just before and after, and at this very instant alone.
+            # The values of the signal just before, just after, and exactly at this time.
             near = np.concatenate([beside[name][2 * k : 2 * k + 2], values[k : k + 1]])
             margin = 1e-5 * (1.0 + np.abs(near).max(initial=0.0))
             within = (rows[k] >= near.min(axis=0) - margin) & (rows[k] <= near.max(axis=0) + margin)
@@ -235,16 +236,16 @@ def without_single_rows(found: Signals, wanted: Signals, beside: Signals) -> dic
 
 
 def obeys_formulas(case: Case) -> Iterator[str]:
-    """At every recorded time a block that switches gives its formula of its inputs."""
+    """At every recorded time the output of a switching block agrees with the formula in NumPy."""
     broken = broken_formulas(case.diagram, case.result_of_run, case.times)
     for name, (row, found, wanted) in broken.items():
         yield f"'{name}' gives {found:.17g} at row {row}; its formula gives {wanted:.17g}"
 
 
 def obeys_equations(case: Case) -> Iterator[str]:
-    """At every recorded time a block without memory gives what its equations give for its inputs.
+    """At every recorded time the output of a block without memory solves its equations for its inputs.
 
-    Its modes are worked out from these inputs alone, so that a loop without a solution is noticed, too.
+    The modes are computed from these inputs only, so that a loop without a solution is detected as well.
     """
     flat = flat_diagram(case.diagram)
     shapes = infer_shapes(flat)
@@ -265,7 +266,7 @@ def obeys_equations(case: Case) -> Iterator[str]:
 
 
 def contradicted_rows(case: Case, numbers: BlockNumbers) -> Iterator[str]:
-    """The first row of each output that no input within ``BORDER`` of the recorded one explains."""
+    """Yield the first row of each output that no input within ``BORDER`` of the recorded one explains."""
     ports = list(numbers.shapes)
     recorded = {port: np.asarray(case.result_of_run[f"{numbers.name}/{port}"]) for port in ports}
     for port in numbers.outputs:
@@ -276,7 +277,8 @@ def contradicted_rows(case: Case, numbers: BlockNumbers) -> Iterator[str]:
             y = np.ravel(given[row])
             exact = fits_equations(numbers, port, y, t, inputs, (0.0,))
             streak = 0 if exact else streak + 1
-            # An instant may be found a little late, at one row; what stays at a border has a side.
+            # A switching time may be located slightly late, which affects one row; longer deviations are
+            # errors.
             late = streak < 3 and fits_equations(numbers, port, y, t, inputs, (BORDER, -BORDER, 0.0))
             if not exact and not late:
                 yield f"'{numbers.name}/{port}' is {y} at row {row}, not what its equations give for {inputs}"
@@ -286,13 +288,13 @@ def contradicted_rows(case: Case, numbers: BlockNumbers) -> Iterator[str]:
 def fits_equations(
     numbers: BlockNumbers, port: str, y: np.ndarray, t: float, inputs: Signals, moves: Sequence[float]
 ) -> bool:
-    """Whether inputs that are moved a little give an output, by element."""
+    """Return whether inputs within small deviations give the output, for every element."""
     size = 1.0 + np.abs(y) + sum(np.abs(u).max(initial=0.0) for u in inputs.values())
     fits = np.zeros(y.shape, dtype=bool)
     numbers.arrays["t"][0] = t
     for chosen in itertools.product(moves, repeat=min(len(inputs), 4)):
         for (name, u), move in itertools.zip_longest(inputs.items(), chosen, fillvalue=0.0):
-            # A sum with 0 would take the sign of a zero, which the angle of a point depends on.
+            # Adding 0 would change the sign of -0, on which the angle of a point depends.
             numbers.arrays[f"u:{name}"][:] = u + move * (1.0 + np.abs(u)) if move else u
         numbers.update_modes()
         wanted = numbers.value("out", port)
@@ -304,17 +306,17 @@ def fits_equations(
     return False
 
 
-def obeys_formulas_loosely(case: Case) -> Iterator[str]:
-    """The same at the default tolerances."""
+def obeys_formulas_at_default_tolerances(case: Case) -> Iterator[str]:
+    """The law of ``obeys_formulas`` for a run at the default tolerances."""
     case.signals(case.diagram, rtol=1e-6, atol=1e-9)
     for name, (row, found, wanted) in broken_formulas(case.diagram, case.result, case.times).items():
         yield f"'{name}' gives {found:.17g} at row {row}; its formula gives {wanted:.17g}"
 
 
 def rows_beyond(found: np.ndarray, wanted: np.ndarray, tolerance: float) -> np.ndarray:
-    """Whether each row is outside of what it and its neighbours should be, by ``tolerance`` of the size.
+    """Return by row whether it is outside the range of the wanted row and its neighbours, by ``tolerance``.
 
-    At the very instant of an event rounding decides what a row shows.
+    At the time of an event rounding errors decide which of these values a row has.
     """
     if len(found) != len(wanted):
         return np.ones(len(wanted), dtype=bool)
@@ -326,7 +328,7 @@ def rows_beyond(found: np.ndarray, wanted: np.ndarray, tolerance: float) -> np.n
 
 
 def converges(case: Case) -> Iterator[str]:
-    """A run at the default tolerances is close to one at tight ones, but for instants that move."""
+    """A run at the default tolerances is close to one at tight tolerances, except at shifted event times."""
     loose = case.signals(case.diagram, rtol=1e-6, atol=1e-9)
     for name, values in case.run.items():
         wrong = rows_beyond(loose[name], values, 2e-3)
@@ -337,9 +339,9 @@ def converges(case: Case) -> Iterator[str]:
 
 
 def agrees_with_fixed_steps(case: Case) -> Iterator[str]:
-    """The fixed-step solver locates events, too: it gives the same but for the error of its steps."""
+    """The fixed-step solver, which also locates events, agrees up to the error of its steps."""
     wrong: dict[str, np.ndarray] = {}
-    for step in (0.002, 0.0004):  # jumps that come late by a variable time are errors of first order
+    for step in (0.002, 0.0004):  # jumps through a variable delay have errors of first order
         fixed = case.signals(case.diagram, solver="rk4", step=step)
         rows = {name: rows_beyond(fixed[name], values, 1e-3) for name, values in case.run.items()}
         wrong = {name: found for name, found in rows.items() if found.sum() > max(2, len(found) // 10)}
@@ -351,16 +353,15 @@ def agrees_with_fixed_steps(case: Case) -> Iterator[str]:
 
 
 def repeats(case: Case) -> Iterator[str]:
-    """The same diagram gives the same bits again, also saved and loaded, exported to Python, or compiled with
-    more or less effort."""
+    """A repeated run has the same bits, also of the saved, exported or differently compiled diagram."""
     yield from same_bits("again", case.signals(case.diagram), case.run)
     loaded = diagram_from_bytes(diagram_to_bytes(case.diagram, load_robot), "fuzz", BLOCKS, load_robot)
     if loaded != case.diagram:
-        yield "a saved diagram is loaded as another one"
+        yield "the loaded diagram differs from the saved one"
     yield from same_bits("loaded", case.signals(loaded), case.run)
     text = diagram_to_python(case.diagram)
     scope: dict[str, Any] = {}
-    exec(text[: text.index("result = ")], scope)  # noqa: S102 - what the product has written itself
+    exec(text[: text.index("result = ")], scope)  # noqa: S102 - the code was generated above
     yield from same_bits("exported", case.signals(scope["diagram"]), case.run)
     for effort in ("little", "full"):
         with pytest.MonkeyPatch.context() as patch:
@@ -374,24 +375,24 @@ def same_bits(what: str, found: Signals, wanted: Signals) -> Iterator[str]:
             yield f"{what}: '{name}' has other bits"
 
 
-def goes_on(case: Case) -> Iterator[str]:
-    """A run in pieces, and one that goes on from the state of a shorter one, give the same bits."""
+def continues(case: Case) -> Iterator[str]:
+    """A run with pauses, and one that continues from a saved state, give the same bits."""
     settings = {**case.settings, "rtol": 1e-9, "atol": 1e-12}
     run = ab.begin(case.diagram, **settings)
     while not run.finished:
         run.advance(steps=7)
     result = run.result()
-    yield from same_bits("in pieces", {name: result[name] for name in case.run}, case.run)
+    yield from same_bits("with pauses", {name: result[name] for name in case.run}, case.run)
     middle = round(case.recipe.stop / RECORD / 2) * RECORD
     first = ab.simulate(case.diagram, **{**settings, "stop_time": middle})
     later = ab.simulate(case.diagram, **settings, initial_state=first.final_state)
     row = int(np.argmin(np.abs(case.times - later.time[0])))
     rest = {name: values[row:] for name, values in case.run.items()}
-    yield from same_bits("resumed", {name: later[name] for name in rest}, rest)
+    yield from same_bits("continued", {name: later[name] for name in rest}, rest)
 
 
 def is_invariant(case: Case) -> Iterator[str]:
-    """Renaming, reordering, wrapping, dead blocks, unit gains and added zeros change no signal."""
+    """Renaming, reordering, wrapping, dead blocks, unit gains and added zeros do not change the signals."""
     for what, change in CHANGES.items():
         recipe, names = change(case.recipe)
         try:
@@ -416,7 +417,7 @@ def same(name: str) -> str:
 
 
 def renamed(recipe: Recipe) -> tuple[Recipe, Callable[[str], str]]:
-    """Names that sort the other way round."""
+    """Rename the blocks such that their sorted order is reversed."""
     names = {node.name: f"{chr(122 - k % 26)}{k} {node.name}" for k, node in enumerate(recipe.nodes)}
 
     def ref(text: str) -> str:
@@ -434,7 +435,7 @@ def reordered(recipe: Recipe) -> tuple[Recipe, Callable[[str], str]]:
 
 
 def wrapped(recipe: Recipe) -> tuple[Recipe, Callable[[str], str]]:
-    """Everything inside a subsystem."""
+    """Put all blocks into a subsystem."""
     return replace(
         recipe, nodes=(Node("whole", "Subsystem", {}, {}, recipe.nodes),)
     ), lambda name: f"whole/{name}"
@@ -451,7 +452,7 @@ def with_dead_blocks(recipe: Recipe) -> tuple[Recipe, Callable[[str], str]]:
 
 
 def through(kind: str, parameters: Mapping[str, Any]) -> Change:
-    """A block that changes nothing, between some blocks and what feeds them."""
+    """Return a change that inserts a block without effect before the inputs of some blocks."""
 
     def change(recipe: Recipe) -> tuple[Recipe, Callable[[str], str]]:
         nodes: list[Node] = []
@@ -481,20 +482,20 @@ LAWS: Mapping[str, Callable[[Case], Iterator[str]]] = {
     "reference": agrees_with_reference,
     "formulas": obeys_formulas,
     "equations": obeys_equations,
-    "formulas at default tolerances": obeys_formulas_loosely,
+    "formulas at default tolerances": obeys_formulas_at_default_tolerances,
     "tolerances": converges,
     "fixed steps": agrees_with_fixed_steps,
-    "repeats": repeats,
-    "goes on": goes_on,
+    "repetition": repeats,
+    "continuation": continues,
     "invariance": is_invariant,
 }
 
 
 def failure(recipe: Recipe, message: str) -> dict[str, list[str]]:
-    """A run that fails is a finding where the reference comes to its end with finite signals.
+    """A run that fails is a finding if the reference reaches the stop time with finite signals.
 
-    They are the same with shorter steps: fixed steps leap over a pole, and each time give something else
-    from there on, which rows after the end show too.
+    The reference signals must also agree with those of shorter steps: fixed steps can cross a pole, and the
+    values after it then depend on the step, which is visible in additional rows after the stop time.
     """
     times = np.concatenate([recipe.times, recipe.times[-1] + RECORD * np.arange(1, 6)])
     try:
@@ -510,21 +511,21 @@ def failure(recipe: Recipe, message: str) -> dict[str, list[str]]:
             raise InconclusiveError(f"'{name}' is not finite in the reference either")
         beyond = rows_beyond(values, finer[name], 1e-2)
         if np.count_nonzero(beyond) > 1:
-            raise InconclusiveError(f"'{name}' hangs on the steps of the reference")
+            raise InconclusiveError(f"'{name}' depends on the steps of the reference")
     return {"runs": [message]}
 
 
 def failing(case: Case, law: Callable[[Case], Iterator[str]]) -> Iterator[str]:
-    """The contradictions of a law. An altered diagram that fails is one, if the reference stays finite."""
+    """Yield the contradictions of a law, or a failed run if the reference is finite."""
     try:
         yield from law(case)
     except SimulationError as error:
-        if case.reference:  # raises where it is not
+        if case.reference:  # raises InconclusiveError if it is not finite
             yield f"fails: {error}"
 
 
 def findings(recipe: Recipe, laws: Sequence[str] = tuple(LAWS)) -> dict[str, list[str]]:
-    """Contradictions by law; ``InconclusiveError`` where nothing can be compared."""
+    """Return contradictions by law; raise ``InconclusiveError`` if nothing can be compared."""
     try:
         case = Case(recipe)
     except SimulationError as error:

@@ -1,7 +1,7 @@
-"""The fuzzer: random diagrams, laws, and the reduction of what contradicts them.
+"""The fuzzer: random diagrams, laws, and the reduction of diagrams that contradict them.
 
-Everything runs in a process of its own, which is ended where it takes too long: a run that never returns is a
-finding, too.
+The laws are checked in a separate process, which is killed if it takes too long: a run that never returns is
+a finding as well.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Found = dict[str, list[str]]
 
 @dataclass(frozen=True)
 class Finding:
-    """A law that a diagram contradicts, reduced."""
+    """A law that a diagram contradicts, and the reduced diagram."""
 
     seed: int
     law: str
@@ -36,7 +36,7 @@ class Finding:
     recipe: Recipe
 
     def report(self) -> str:
-        """The finding with a script that builds the diagram."""
+        """Return the finding with a script that builds the diagram."""
         try:
             script = diagram_to_python(self.recipe.diagram())
         except ArmblocksError as error:
@@ -45,7 +45,7 @@ class Finding:
 
 
 def judged(recipe: Recipe, laws: Sequence[str]) -> Found:
-    """Contradictions by law. A refused diagram has none; anything else that is raised is a finding."""
+    """Return contradictions by law. A refused diagram has none; every other exception is a finding."""
     try:
         return findings(recipe, laws)
     except InconclusiveError as reason:
@@ -57,7 +57,7 @@ def judged(recipe: Recipe, laws: Sequence[str]) -> Found:
 
 
 class Judge:
-    """A process that judges diagrams, started anew where one takes ``seconds`` of processor time."""
+    """A process that judges diagrams, replaced when a diagram takes ``seconds`` of processor time."""
 
     def __init__(self, seconds: float) -> None:
         self.seconds = seconds
@@ -82,7 +82,7 @@ class Judge:
             self.process = context.Process(target=_judging, args=(self.theirs, self.seconds), daemon=True)
             self.process.start()
         self.ours.send((recipe, laws))
-        self.theirs.close()  # the process alone has this end: where it dies, nothing is left to wait for
+        self.theirs.close()  # only the process holds this end: if it dies, ``recv`` raises EOFError
         try:
             return self.ours.recv()
         except EOFError:
@@ -95,7 +95,7 @@ class Judge:
 
 
 def _judging(pipe: Connection, seconds: float) -> None:
-    signal.signal(signal.SIGPROF, signal.SIG_DFL)  # ends the process, whatever it does
+    signal.signal(signal.SIGPROF, signal.SIG_DFL)  # the signal ends the process in any state
     while True:
         recipe, laws = pipe.recv()
         signal.setitimer(signal.ITIMER_PROF, seconds)
@@ -106,7 +106,7 @@ NO_FINDING = ("inconclusive", "refused")
 
 
 def kind_of(reason: str) -> str:
-    """A reason without what is special to its diagram, so that equal ones can be counted."""
+    """Remove names and numbers from a reason, so that equal reasons can be counted."""
     first = reason.splitlines()[0].partition(" Allowed:")[0]
     return re.sub(r"-?\d[\d.e+-]*", "#", re.sub(r"'[^']*'", "'…'", first))[:110]
 
@@ -114,7 +114,7 @@ def kind_of(reason: str) -> str:
 def reduced(
     judge: Callable[[Recipe, Sequence[str]], Found], recipe: Recipe, law: str, until: float
 ) -> tuple[Recipe, str]:
-    """The smallest diagram found that still contradicts the law, and what it says of it."""
+    """Return the smallest diagram found that still contradicts the law, and the text of the contradiction."""
     laws = [law] if law in LAWS else list(LAWS)[:1]
     text = ""
     again = True
@@ -138,7 +138,7 @@ def fuzz(
     seconds: float = 300.0,
     reduce_for: float = 180.0,
 ) -> Iterator[Finding]:
-    """Findings of the seeds, one for each law that a diagram contradicts; ``counts`` says how it went."""
+    """Yield one finding per seed and contradicted law; ``counts`` collects the outcomes."""
     with Judge(seconds) as judge:
         for seed in seeds:
             recipe = random_recipe(seed)

@@ -1,8 +1,8 @@
-"""Random diagrams over the block registry, described so that they can be altered and reduced.
+"""Random diagrams of all block types, represented such that they can be changed and reduced.
 
-Sources jump, touch and graze the values at which other blocks switch: sawteeth that reach a limit exactly as
-they jump, squares equal to a limit, steps at recorded times, sines whose crest touches a limit, pulses in
-phase with ticks.
+Sources jump to, touch and graze the switching values of other blocks: sawtooth waves that reach a limit
+exactly when they jump, square waves equal to a limit, steps at recorded times, sines whose crest touches a
+limit, and pulses in phase with ticks.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from armblocks.errors import ArmblocksError
 from armblocks.face.block_examples import example_block
 
 RECORD = 0.0625
-"""s; the interval of the record. Times of sources are often multiples of it, exactly: it is a power of 2."""
+"""Sample time of the record, s. A power of 2, so that the times of sources are often exact multiples."""
 LIMITS = (-1.0, -0.5, 0.0, 0.5, 1.0)
-"""Values at which blocks switch and that sources reach exactly."""
+"""Switching values of blocks, which sources reach exactly."""
 PERIODS = (0.0625, 0.125, 0.25, 0.1, 0.3, (0.125, 0.0625), (0.2, 0.1))
 LEFT_OUT = (
-    # They make or read files, call Python, end the run, or stand for wires that are made by hand here.
+    # These use files, call Python, end the run, or define the structure, which the generator builds itself.
     "FromFile ToFile PythonFunction CalledPythonFunction StopSimulation Assertion Spectrum ManualSwitch "
     "Goto From BusCreator BusSelector BusAssignment Merge Inport Outport Subsystem EnabledSubsystem "
     "TriggeredSubsystem EnabledTriggeredSubsystem ResettableSubsystem ActionSubsystem If SwitchCase"
@@ -38,7 +38,7 @@ SWITCHING = (
     "DeadZoneDynamic WrapToZero MultiportSwitch LookupTable1D HitCrossing LogicalOperator"
 )
 DIVIDING = "Divide LinearSolve Product"
-"""Their inputs differ: equations are simplified, so that a signal over itself is 1 also where it is 0."""
+"""Blocks whose inputs must differ: equations are simplified, so that u / u is 1 even where u is 0."""
 HYSTERESIS = "Relay Backlash RateLimiterContinuous Quantizer"
 STATES = (
     "Integrator FirstOrderLag ResettableIntegrator IntegratorLimited SecondOrderIntegrator TransferFunction "
@@ -49,7 +49,7 @@ STATES = (
 
 @dataclass(frozen=True)
 class Node:
-    """One block: its type, parameters, sources of its inputs (``block/port``) by port, and what is inside."""
+    """One block: its type, parameters, sources of its inputs (``block/port``) by port, and inner blocks."""
 
     name: str
     kind: str
@@ -60,7 +60,7 @@ class Node:
 
 @dataclass(frozen=True)
 class Recipe:
-    """A diagram as a list of nodes, and how long it is run."""
+    """A diagram as a list of nodes, and its stop time."""
 
     nodes: tuple[Node, ...]
     stop: float = 2.0
@@ -71,13 +71,13 @@ class Recipe:
         return np.arange(round(self.stop / RECORD) + 1) * RECORD
 
     def diagram(self) -> Diagram:
-        """The diagram. Raises ``ArmblocksError`` where it is refused."""
+        """Build the diagram. Raises ``ArmblocksError`` if it is refused."""
         return built(self.nodes, "fuzz")
 
 
 @dataclass(frozen=True)
 class Signal:
-    """An output that may feed others. ``steady``: it changes at ticks only, or not at all."""
+    """An output that may be connected. ``steady``: the signal is constant or changes only at ticks."""
 
     ref: str
     shape: Shape
@@ -85,7 +85,7 @@ class Signal:
 
 
 def block_of(node: Node) -> Block:
-    """The block that a node describes."""
+    """Return the block that a node describes."""
     kind = BLOCKS[node.kind]
     if node.inside:
         return kind(**dict(node.parameters), diagram=built(node.inside, node.name))
@@ -98,7 +98,7 @@ def block_of(node: Node) -> Block:
 
 
 def built(nodes: Sequence[Node], name: str) -> Diagram:
-    """The diagram of some nodes; each may be fed by one that stands after it."""
+    """Build the diagram of some nodes; a source may come after its target in the list."""
     builder = DiagramBuilder(name)
     for node in nodes:
         builder.add(node.name, block_of(node))
@@ -110,7 +110,7 @@ def built(nodes: Sequence[Node], name: str) -> Diagram:
 
 
 class Maker:
-    """Makes one diagram from a seed."""
+    """Generates one diagram from a seed."""
 
     def __init__(self, seed: int, size: int = 10) -> None:
         self.random = np.random.default_rng(seed)
@@ -118,14 +118,14 @@ class Maker:
         self.count = 0
 
     def recipe(self) -> Recipe:
-        """A diagram of about ``size`` blocks that a builder accepts."""
+        """Generate a diagram of about ``size`` blocks."""
         nodes = self.level(self.size, depth=0)
         return Recipe(nodes, float(self.random.choice([1.0, 2.0, 3.0])))
 
     def level(
         self, size: int, depth: int, given: Sequence[Signal] = (), calm: bool = False
     ) -> tuple[Node, ...]:
-        """The nodes of one level. ``calm``: no continuous states and clocks, for triggered subsystems."""
+        """Generate the nodes of one level. ``calm``: only blocks that a triggered subsystem may have."""
         self_nodes: list[Node] = []
         signals = list(given)
         loops = [] if calm or self.random.random() < 0.4 else self.begin_feedback(self_nodes, signals)
@@ -154,7 +154,7 @@ class Maker:
         inputs: Mapping[str, Signal] | None = None,
         inside: tuple[Node, ...] = (),
     ) -> bool:
-        """Add a block, if it takes these parameters and inputs; its outputs become signals."""
+        """Add a block if it accepts these parameters and inputs; its outputs become signals."""
         inputs = inputs or {}
         self.count += 1
         node = Node(
@@ -176,7 +176,7 @@ class Maker:
         return True
 
     def source(self) -> tuple[str, dict[str, Any]]:
-        """A source that jumps, touches or grazes."""
+        """Return a source that jumps to, touches or grazes switching values."""
         r = self.random
         height, low = float(r.choice([0.5, 1.0, 1.0, r.uniform(0.3, 2.5)])), float(r.choice(LIMITS))
         grid = float(RECORD * r.integers(1, 30))
@@ -231,8 +231,7 @@ class Maker:
         return choices[int(r.integers(len(choices)))]
 
     def sine(self, amplitude: float) -> dict[str, Any]:
-        """Parameters of a sine that may touch a border, but that reaches none at the very instant of a tick:
-        there, rounding would decide what is sampled."""
+        """Return a sine that may touch a switching value, but not at a tick, where rounding would decide."""
         r = self.random
         frequency = float(r.choice([math.pi, 2 * math.pi, 2.0, r.uniform(0.5, 9.0)]))
         phase = float(r.choice([0.0, math.pi / 2, r.uniform(0, 6)]))
@@ -248,7 +247,7 @@ class Maker:
         return PERIODS[int(self.random.integers(len(PERIODS)))]
 
     def block(self, nodes: list[Node], signals: list[Signal], calm: bool) -> None:
-        """A random block, fed by signals that there are."""
+        """Add a random block with existing signals as inputs."""
         r = self.random
         for _ in range(20):
             draw = r.random()
@@ -293,7 +292,7 @@ class Maker:
                 return
 
     def feeds(self, block: Block, signals: Sequence[Signal]) -> dict[str, Signal] | None:
-        """Signals whose shapes the block takes."""
+        """Return signals whose shapes the block accepts."""
         ports = block.input_ports()
         for attempt in range(6):
             wanted = () if attempt < 4 else (2,)
@@ -303,7 +302,7 @@ class Maker:
                 fitting = [s for s in signals if s.shape == (wanted if shape is None else shape)]
                 if not fitting:
                     break
-                # later signals more often, so that chains grow
+                # prefer later signals, so that chains are formed
                 place = int(len(fitting) * math.sqrt(self.random.random()))
                 inputs[port.name] = fitting[place]
             if len(inputs) < len(ports):
@@ -319,7 +318,7 @@ class Maker:
         return None
 
     def parameters(self, name: str) -> dict[str, Any]:
-        """Parameters of the worked example, some of them altered."""
+        """Return parameters of the worked example with random changes."""
         kind = BLOCKS[name]
         found = (
             {k: v for k, v in kind.example.parameters.items() if k != "robot"}
@@ -340,7 +339,7 @@ class Maker:
         return found
 
     def altered(self, rule: Parameter) -> Any:
-        """Another value of one parameter, or nothing where it has to stay."""
+        """Return another value of one parameter, or None if it must not change."""
         r = self.random
         if rule.kind is ParameterKind.CHOICE:
             return str(r.choice(list(rule.choices)))
@@ -359,7 +358,7 @@ class Maker:
         return None
 
     def subsystem(self, nodes: list[Node], signals: list[Signal], depth: int) -> None:
-        """A subsystem of a random kind around a few blocks."""
+        """Add a subsystem of random type with a few blocks."""
         r = self.random
         scalars = [s for s in signals if s.shape == ()]
         if len(scalars) < 2:
@@ -401,14 +400,14 @@ class Maker:
             self.watch(nodes, signals)
 
     def watch(self, nodes: list[Node], signals: list[Signal]) -> None:
-        """An event behind the latest signal, which must not see what it is on the way to its value."""
+        """Add a block with an event after the latest signal, which must not react to intermediate values."""
         r, watched = self.random, signals[-1]
         if watched.shape == () and r.random() < 0.7:
             kind, limit = (("HitCrossing", "offset"), ("Relay", "on_point"))[int(r.integers(2))]
             self.add(nodes, signals, kind, {limit: float(r.uniform(-1.0, 1.5))}, {"u": watched})
 
     def inside(self, fed: Sequence[Signal], depth: int, calm: bool) -> tuple[Node, ...] | None:
-        """In blocks, some others, and one or two Out blocks."""
+        """Return In blocks, some other blocks, and one or two Out blocks."""
         entries = [Node(f"in{k}", "Inport") for k in range(len(fed))]
         given = [Signal(f"in{k}/y", s.shape, False) for k, s in enumerate(fed)]
         inner = self.level(int(self.random.integers(1, 4)), depth + 1, given, calm)
@@ -438,7 +437,7 @@ class Maker:
         fed: Sequence[Signal],
         depth: int,
     ) -> None:
-        """An If block, two action subsystems and a Merge."""
+        """Add an If block, two action subsystems and a Merge."""
         control = scalars[int(self.random.integers(len(scalars)))]
         limit = float(self.random.choice(LIMITS))
         self.add(nodes, signals, "If", {"expressions": f"u > {limit}"}, {"u": control})
@@ -460,7 +459,7 @@ class Maker:
             self.watch(nodes, signals)
 
     def ball(self, nodes: list[Node], signals: list[Signal]) -> None:
-        """A ball that falls from a height, later or at once, and bounces until it rests."""
+        """Add a ball that falls from a height, at once or later, and bounces until it rests."""
         r = self.random
         self.add(
             nodes,
@@ -481,9 +480,10 @@ class Maker:
         signals += [Signal(f"{name}/x", ()), Signal(f"{name}/dx", ())]
 
     def comparison(self, nodes: list[Node], signals: list[Signal]) -> None:
-        """Watch the difference of what two blocks that switch give, the second fed by the first or beside it.
+        """Add blocks with events for the difference of two switching blocks in series or in parallel.
 
-        At a jump each finds its value in a turn of its own; the difference on the way must not be seen.
+        At a jump the two blocks reach their values in different iterations; no event may see the differences
+        between them.
         """
         r = self.random
         scalars = [s for s in signals if s.shape == ()]
@@ -506,7 +506,7 @@ class Maker:
                 self.add(nodes, signals, kind, {limit: value}, {"u": difference})
 
     def begin_feedback(self, nodes: list[Node], signals: list[Signal]) -> list[str]:
-        """Blocks with states whose inputs are connected at the end."""
+        """Add a block for a feedback loop, whose input is connected at the end."""
         kind = str(self.random.choice(["FirstOrderLag", "Integrator", "UnitDelay", "Gain"]))
         parameters: dict[str, Any] = {"UnitDelay": {"sample_time": self.period()}, "Gain": {"gain": 0.3}}.get(
             kind, {}
@@ -520,7 +520,7 @@ class Maker:
     def end_feedback(
         self, nodes: list[Node], signals: list[Signal], loops: Sequence[str]
     ) -> tuple[Node, ...]:
-        """Close the loops through a bounded block; an integrator leaks."""
+        """Connect the inputs of the feedback blocks; an integrator becomes a leaky one."""
         for name in loops:
             scalars = [s for s in signals if s.shape == ()]
             last = scalars[-1 - int(self.random.integers(min(3, len(scalars))))]
@@ -546,7 +546,7 @@ def _accepted(nodes: Sequence[Node]) -> bool:
 
 
 def random_recipe(seed: int, size: int = 10) -> Recipe:
-    """The diagram of a seed; those that a builder refuses are made again from the next number."""
+    """Generate the diagram of a seed; a refused diagram is replaced by that of the next number."""
     for number in range(100):
         try:
             recipe = Maker(1000 * seed + number, size).recipe()
@@ -561,7 +561,7 @@ def random_recipe(seed: int, size: int = 10) -> Recipe:
 
 
 def reductions(recipe: Recipe) -> Iterator[Recipe]:
-    """Recipes that are smaller by one step: without a node, a source in its place, fewer parameters."""
+    """Yield recipes reduced by one step: fewer nodes, simpler nodes, or fewer parameters."""
     for nodes in _smaller(recipe.nodes):
         yield replace(recipe, nodes=nodes)
     if recipe.stop > 0.5:

@@ -1,7 +1,6 @@
-"""One block as numbers: its equations as functions between arrays.
+"""Numerical evaluation of one block: its equations as functions between arrays.
 
-Every equation of a block is one CasADi function of its own, over arrays that stand for the block's states,
-modes and inputs.
+Every equation of a block is one CasADi function. Arrays hold the states, modes and inputs of the block.
 """
 
 from __future__ import annotations
@@ -20,21 +19,21 @@ from armblocks.diagram import Block, shape_of
 from armblocks.equations import Shape, flatten, unflatten
 
 SMALLEST_JUMP = 2e-6
-"""Of a rate limiter's input, beside its size: above what integrating its rate adds up to here."""
+"""Smallest relative change of a rate limiter's input that counts as a jump; above the integration error."""
 
 
 class UnsupportedError(Exception):
-    """A diagram that the reference does not cover."""
+    """A diagram that the reference does not support."""
 
 
 def column(value: Any, shape: Shape) -> SX:
-    """The flat column of a value; a scalar is spread over the shape."""
+    """Return a value as a flat column; a scalar is broadcast to the shape."""
     value = SX(value)
     return SX.ones(math.prod(shape)) * value if value.numel() == 1 else flatten(value, shape)
 
 
 def read_symbols(expression: SX, symbols: Mapping[str, SX]) -> set[str]:
-    """Keys of the symbols that an expression reads an element of."""
+    """Return the keys of all symbols that occur in an expression."""
     read = {element.element_hash() for element in symvar(expression)}
     return {
         key
@@ -44,10 +43,11 @@ def read_symbols(expression: SX, symbols: Mapping[str, SX]) -> set[str]:
 
 
 def own_modes(block: Block, x: Mapping[str, SX], u: Mapping[str, SX], p: Mapping[str, SX]) -> dict[str, SX]:
-    """The law of a rate limiter: y follows u while its rate is allowed; else it goes towards u at a limit.
+    """Return the mode of a rate limiter: y equals u while its rate is allowed, and otherwise approaches u at
+    a limit.
 
-    With the mode m as it was, 1 rising, -1 falling, 0 following: where y has met u, or follows it, the rate
-    of u decides. A jump of u that is larger than what the block passes on has to be made up for.
+    The previous mode m is 1 (rising), -1 (falling) or 0 (following). If y has reached u, or follows it, the
+    rate of u decides. After a jump of u above ``SMALLEST_JUMP`` the output must approach u again.
     """
     if not isinstance(block, RateLimiting):
         return {}
@@ -60,7 +60,7 @@ def own_modes(block: Block, x: Mapping[str, SX], u: Mapping[str, SX], p: Mapping
 
 
 class BlockNumbers:
-    """One block: an array for every named quantity, and its equations as functions between the arrays."""
+    """One block: an array for every quantity, and its equations as functions between the arrays."""
 
     def __init__(
         self, name: str, block: Block, shapes: Mapping[str, Shape], outputs: Mapping[str, Shape]
@@ -108,7 +108,7 @@ class BlockNumbers:
         self._build(natural["x"], natural["u"], natural["p"], natural["e"])
 
     def _build(self, x: dict[str, SX], u: dict[str, SX], p: dict[str, SX], e: dict[str, SX]) -> None:
-        """All equations, as flat columns by kind and name."""
+        """Collect all equations as flat columns by kind and name."""
         block, t = self.block, self.symbols["t"]
         shape_of_state = {s.name: s.shape for s in (*self.states, *self.discrete)}
         given = block.outputs(t, x, u, p)
@@ -153,13 +153,13 @@ class BlockNumbers:
         self.fed = sorted(key[2:] for key in read if key.startswith("u:"))
 
     def needs(self, kind: str, name: str) -> set[str]:
-        """The arrays that an equation reads."""
+        """Return the keys of the arrays that an equation reads."""
         if (kind, name) not in self._needs:
             self._needs[kind, name] = read_symbols(self.expressions[kind, name], self.symbols)
         return self._needs[kind, name]
 
     def value(self, kind: str, name: str) -> np.ndarray:
-        """An equation at the present numbers. The array is overwritten by the next evaluation."""
+        """Evaluate an equation. The next evaluation overwrites the returned array."""
         if (kind, name) not in self.functions:
             self.functions[kind, name] = self._function(self.expressions[kind, name])
         run, result = self.functions[kind, name]
@@ -167,7 +167,7 @@ class BlockNumbers:
         return result
 
     def rate(self, port: str, rates: Mapping[str, np.ndarray]) -> np.ndarray:
-        """The time derivative of an output, modes standing still: d/dt + the sum of d/da da/dt."""
+        """Return the time derivative of an output with constant modes: d/dt + the sum of d/da da/dt."""
         if ("rate", port) not in self.functions:
             expression = self.expressions["out", port]
             along = [self.symbols[key] for key in rates]
@@ -195,7 +195,8 @@ class BlockNumbers:
         self._buffers.append(buffer)
         return run, result
 
-    # -- what the simulator does with one block ------------------------------------------------------------
+    # -- operations of the simulator on one block
+    # -------------------------------------------------------------
 
     def names(self, kind: str) -> list[str]:
         return [name for entry, name in self.expressions if entry == kind]
@@ -220,7 +221,7 @@ class BlockNumbers:
             self.arrays[f"x:{mode.before}"][:] = 0.0
 
     def remember(self) -> None:
-        """What a mode is now is what it was before, for what comes next; so is what goes with it."""
+        """Store modes with memory, and the discrete states that belong to them, as the previous values."""
         if not self.on:
             return
         for state in self.discrete:
@@ -230,7 +231,7 @@ class BlockNumbers:
             self.arrays[f"x:{mode.before}"][:] = self.arrays[f"x:{mode.name}"]
 
     def mode_values(self) -> dict[str, np.ndarray]:
-        """The modes that hold, by name."""
+        """Return the present modes by name."""
         return {mode.name: self.arrays[f"x:{mode.name}"].copy() for mode in self.modes}
 
     def set_modes(self, values: Mapping[str, np.ndarray]) -> None:
@@ -238,13 +239,13 @@ class BlockNumbers:
             self.arrays[f"x:{name}"][:] = value
 
     def update_modes(self) -> bool:
-        """Modes by the signals; whether one has changed."""
+        """Update the modes from the signals; return whether a mode has changed."""
         changed = False
         for _ in range(len(self.modes) + 2):
             again = False
             for mode in self.modes:
                 new, array = self.value("mode", mode.name), self.arrays[f"x:{mode.name}"]
-                if new.tolist() != array.tolist():  # for a few numbers faster than NumPy's comparison
+                if new.tolist() != array.tolist():  # faster than NumPy's comparison for a few numbers
                     array[:] = new
                     again = True
             if not again:
@@ -255,7 +256,7 @@ class BlockNumbers:
         )
 
     def modes_differ(self) -> bool:
-        """Whether the signals ask for other modes than those that hold."""
+        """Return whether the modes are inconsistent with the signals."""
         return any(
             self.value("mode", mode.name).tolist() != self.arrays[f"x:{mode.name}"].tolist()
             for mode in self.modes

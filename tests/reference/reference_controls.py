@@ -1,7 +1,7 @@
-"""The laws of conditional subsystems in plain Python: controls, held outputs, merged outputs.
+"""The semantics of conditional subsystems in plain Python: controls, held outputs, merged outputs.
 
-They stand for the blocks of the same names in a flat diagram, with the same ports, and share nothing with
-their equations.
+These classes replace the blocks of the same names in a flat diagram. They have the same ports and share no
+code with the equations of the blocks.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from armblocks.diagram.controls import EnableControl, HeldOutput, MergedOutput, 
 from armblocks.equations import Shape
 
 
-class _Law:
-    """What the network asks of every block."""
+class _ControlBlock:
+    """The interface that the network requires of every block."""
 
     clock = None
     period = 0.0
@@ -47,9 +47,9 @@ class _Law:
 
     on, restarts, fires = True, False, False
     ticking = False
-    """Whether the present values are those of a tick."""
+    """Whether the present evaluation is part of a tick."""
     begun = False
-    """Whether the block was restarted at this instant."""
+    """Whether the block has been restarted at this instant."""
 
     def begin(self) -> None: ...
     def restart(self) -> None: ...
@@ -60,7 +60,7 @@ class _Law:
         return ["held"] if kind == "capture" and "held" in self.memory else []
 
     def side(self) -> float:
-        """Whether the control signal is positive."""
+        """Return whether the control signal is positive."""
         return float(self.arrays["u:u"][0] > 0.0)
 
     def update_modes(self) -> bool:
@@ -86,10 +86,10 @@ class _Named:
         self.name = name
 
 
-class Enable(_Law):
-    """On while u is positive and the subsystem around is on; states start anew when it comes on, if asked.
+class Enable(_ControlBlock):
+    """Enabled while u is positive and the outer subsystem is on; states may restart on enabling.
 
-    At events its outputs wait until that has happened.
+    At events the outputs of the subsystem are updated after the restart.
     """
 
     memory = ("seen",)
@@ -114,10 +114,10 @@ class Enable(_Law):
         return bool(on != seen)
 
 
-class Trigger(_Law):
-    """Fires where the sign of u has changed in the right direction and the subsystem around is on.
+class Trigger(_ControlBlock):
+    """Fires when the sign of u has changed in the chosen direction and the outer subsystem is on.
 
-    It does not fire at an instant at which the subsystem around starts anew.
+    It does not fire at an instant at which the outer subsystem restarts.
     """
 
     memory = ("seen", "last")
@@ -151,10 +151,10 @@ class Trigger(_Law):
         return bool(side != seen)
 
 
-class Held(_Law):
-    """u while the subsystem works, else the last value before it stopped, or the initial one.
+class Held(_ControlBlock):
+    """The output is u while the subsystem executes, otherwise its last value or the initial one.
 
-    Where the subsystem around starts anew, the last value is the initial one.
+    When the outer subsystem restarts, the held value becomes the initial one.
     """
 
     memory = ("held",)
@@ -181,10 +181,10 @@ class Held(_Law):
         return False
 
 
-class Merged(_Law):
-    """The first input whose subsystem works, else what it was.
+class Merged(_ControlBlock):
+    """The output is the first input whose subsystem executes, otherwise the last value.
 
-    Where the subsystem around starts anew, that is the initial value.
+    When the outer subsystem restarts, the last value becomes the initial one.
     """
 
     memory = ("held",)

@@ -1,4 +1,4 @@
-"""What a signal was: a cubic polynomial for each step of a run, with jumps between them."""
+"""History of a signal: one cubic polynomial per step of a run, with jumps between them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ TO_COEFFICIENTS = np.linalg.inv(np.vander(PLACES, 4, increasing=True))
 
 
 class History:
-    """The past of a delayed signal. A *segment* lies between two jumps; segment 0 is before the start."""
+    """The history of a delayed signal. A *segment* is the part between two jumps; number 0 is before the
+    start."""
 
     def __init__(self, size: int) -> None:
         self.size = size
@@ -26,7 +27,7 @@ class History:
         self.first_step: list[int] = []
 
     def add(self, t: float, h: float, values: np.ndarray) -> None:
-        """A step from ``t`` of length ``h`` with the values (4, size) at its thirds."""
+        """Add a step from ``t`` of length ``h`` with the values (4, size) at its thirds."""
         if h <= 0.0:
             return
         if not self.steps or self._jumps(values[0]):
@@ -43,7 +44,7 @@ class History:
         return bisect.bisect_right(self.jumps, when * (1.0 + SAME) + 1e-300)
 
     def at(self, when: float, segment: int | None) -> np.ndarray:
-        """The value at a time; with a ``segment``, that of its polynomial, also a little beyond its ends."""
+        """Return the value at a time; ``segment`` selects a segment, whose polynomial may be extrapolated."""
         segment = self.segment_at(when) if segment is None else segment
         if segment == 0 or not self.steps:
             return self.before

@@ -1,4 +1,4 @@
-"""All blocks of a diagram as numbers: what :mod:`reference_simulator` evaluates at one time."""
+"""Numerical evaluation of all blocks of a diagram at one time, for :mod:`reference_simulator`."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ MOST_PASSES = 30
 Link = tuple[np.ndarray, np.ndarray]
 """The array of an input, and the array of the signal that drives it."""
 Work = Callable[[], bool]
-"""Evaluates a node; whether a mode has changed."""
+"""Evaluates a node and returns whether a mode has changed."""
 
 
 class Network:
-    """All blocks of a diagram, the present time's signals, and what an instant does to them."""
+    """All blocks of a diagram, their signals at the present time, and the operations of an instant."""
 
     def __init__(self, diagram: Diagram) -> None:
         self.diagram = flat = flat_diagram(diagram)
@@ -54,7 +54,7 @@ class Network:
     # -- structure -----------------------------------------------------------------------------------------
 
     def _place_states(self) -> None:
-        """One vector x of all continuous states, of which the blocks' arrays are views."""
+        """Allocate one vector x of all continuous states; the arrays of the blocks are views of it."""
         places = [(b, s) for b in self.blocks.values() for s in b.states]
         self.x = np.zeros(sum(math.prod(state.shape) for _, state in places))
         self.xdot = np.zeros_like(self.x)
@@ -97,7 +97,7 @@ class Network:
         return [float(b.value("break", k)[0]) for b in self.blocks.values() for k in b.names("break")]
 
     def signals(self) -> dict[str, np.ndarray]:
-        """Every output in its shape, by ``block/port``."""
+        """Return every output in its shape, by ``block/port``."""
         return {
             f"{name}/{port}": array.reshape(block.output_shapes[port]).copy()
             for name, block in self.blocks.items()
@@ -105,9 +105,9 @@ class Network:
         }
 
     def evaluate(self, t: float, frozen: bool = False, flowing: bool = False) -> None:
-        """All signals at a time; modes follow them, unless they are ``frozen`` as they are.
+        """Evaluate all signals at a time, and the modes unless they are ``frozen``.
 
-        ``flowing``: only signals that states, modes, guards and delays depend on.
+        ``flowing``: evaluate only signals on which states, modes, guards and delays depend.
         """
         self.t, self.frozen = t, frozen
         self.time[0] = t
@@ -121,7 +121,7 @@ class Network:
         raise UnsupportedError(f"modes and signals have no consistent values at {t}")
 
     def _link(self, block: Any, port: str) -> Link:
-        """The array of an input (with a prime: of its derivative), and the array that it is copied from."""
+        """Return the array of an input (with a prime: of its derivative), and the array of its source."""
         ref = self.drivers[block.name, port.removesuffix("'")]
         source = self.blocks[ref.block]
         if port.endswith("'"):
@@ -134,7 +134,7 @@ class Network:
             target[:] = source
 
     def _plan(self, frozen: bool, flowing: bool) -> list[Work]:
-        """What evaluates the nodes one after the other."""
+        """Return the functions that evaluate the nodes in order."""
         if (frozen, flowing) not in self.plans:
             groups = self.order.flowing if flowing else self.order.groups
             self.plans[frozen, flowing] = [
@@ -152,7 +152,7 @@ class Network:
         return work
 
     def _work(self, node: Node) -> Work:
-        """What evaluates one node, and says whether a mode has changed."""
+        """Return the function that evaluates one node."""
         kind, name, port = node
         block = self.blocks[name]
 
@@ -182,25 +182,25 @@ class Network:
             if held():
                 return False
             feed()
-            self._past(block)
+            self._read_histories(block)
             return block.update_modes()
 
         def take_output() -> bool:
             if block.clock is None or not held():
                 feed()
-                self._past(block)
+                self._read_histories(block)
                 block.outputs[port][:] = block.value("out", port)
             return False
 
-        def take_slope() -> bool:
+        def take_state_derivative() -> bool:
             feed()
             block.rates[f"x:{port}"] = block.value("xdot", port) * (1.0 if block.on else 0.0)
             return False
 
-        return {"modes": update_modes, "out": take_output}.get(kind, take_slope)
+        return {"modes": update_modes, "out": take_output}.get(kind, take_state_derivative)
 
     def _links_of(self, block: Any, node: Node) -> list[Link]:
-        """The inputs that a node reads."""
+        """Return the links of the inputs that a node reads."""
         if node not in self.links_of_node:
             kind, _, port = node
             keys: set[str] = set()
@@ -231,7 +231,7 @@ class Network:
         block.rates.setdefault(port, np.zeros_like(block.outputs[port]))[:] = block.rate(port, rates)
 
     def _solve(self, loop: tuple[Node, ...]) -> None:
-        """An algebraic loop, by Newton's method with differences on all its signals."""
+        """Solve an algebraic loop by Newton's method with difference quotients for all its signals."""
         outs = [self.blocks[name].outputs[port] for kind, name, port in loop if kind == "out"]
         if any(kind != "out" for kind, _, _ in loop):
             raise UnsupportedError("a loop through derivatives")
@@ -248,9 +248,9 @@ class Network:
                     found.append(block.outputs[port].copy())
                     continue
                 self._feed_some(block, (kind, name, port))
-                self._past(block)
+                self._read_histories(block)
                 result = block.value("out", port).copy()
-                # The equation of an implicit output is not its value but what has to be 0.
+                # For an implicit output the equation returns the residual, which must be zero.
                 found.append(result + block.outputs[port] if port in block.block.implicit_outputs else result)
             return np.concatenate(found) - v
 
@@ -269,8 +269,8 @@ class Network:
             raise UnsupportedError("an algebraic loop was not solved")
         residual(v)
 
-    def _past(self, block: Any) -> None:
-        """What delayed signals were."""
+    def _read_histories(self, block: Any) -> None:
+        """Read the delayed signals of a block from their histories."""
         for line in block.lines:
             needed = block.needs("delay", line.name)
             for key in needed:
@@ -284,7 +284,7 @@ class Network:
     # -- flow ----------------------------------------------------------------------------------------------
 
     def derivative(self, t: float) -> np.ndarray:
-        """dx/dt with the modes of the start of the step."""
+        """Return dx/dt with the modes of the start of the step."""
         self.evaluate(t, frozen=True, flowing=True)
         for block, name, here in self.places:
             if not block.on:
@@ -295,12 +295,12 @@ class Network:
         return self.xdot.copy()
 
     def modes_differ(self) -> bool:
-        """Whether the present signals ask for other modes than those that hold."""
+        """Return whether the modes are inconsistent with the present signals."""
         for block in self.followed:
             if not block.on:
                 continue
             for line in block.lines:
-                self._past(block)
+                self._read_histories(block)
                 when = self.t - float(block.value("delay", line.name)[0])
                 if block.history[line.name].segment_at(when) != block.history[line.name].segment:
                     return True
@@ -311,7 +311,7 @@ class Network:
         return False
 
     def fired(self) -> dict[tuple[str, str], np.ndarray]:
-        """Guards whose sign is the opposite of the one they had, in a direction that counts: +1 or -1."""
+        """Return guards whose sign has changed in their direction, with +1 (rising) or -1 (falling)."""
         found: dict[tuple[str, str], np.ndarray] = {}
         for (name, guard), before in self.signs.items():
             block = self.blocks[name]
@@ -338,7 +338,7 @@ class Network:
     # -- instants ------------------------------------------------------------------------------------------
 
     def capture(self, t: float) -> None:
-        """What keeps how things were just before this time."""
+        """Store the values just before this time in all blocks that need them."""
         if not any(block.names("capture") for block in self.blocks.values()):
             return
         self.evaluate(float(np.nextafter(t, 0.0)), frozen=True)
@@ -350,9 +350,9 @@ class Network:
                     block.arrays[f"x:{name}"][:] = value
 
     def tick(self, t: float, clocks: list[int]) -> None:
-        """Outputs of all blocks that tick, then their discrete states."""
+        """Evaluate the outputs of all blocks that tick, then update their discrete states."""
         self._mark(set(clocks))
-        for _ in range(2):  # a restart at this tick changes what is read
+        for _ in range(2):  # a restart at this tick changes the values that are read
             self.evaluate(t)
             again = [b for b in self.blocks.values() if b.clock in (None, *self.ticking) and b.restarts]
             if not again:
@@ -367,17 +367,17 @@ class Network:
         self._mark(set())
 
     def _mark(self, clocks: set[int]) -> None:
-        """These clocks tick now."""
+        """Set the clocks that tick at the present time."""
         self.ticking = clocks
         for block in self.blocks.values():
             if isinstance(block, Enable):
                 block.ticking = bool(clocks)
 
-    def turn(self, t: float, first: bool = False) -> bool:
-        """One turn of an instant; whether it has changed a state or a mode.
+    def iterate(self, t: float, first: bool = False) -> bool:
+        """Perform one iteration of an instant; return whether it has changed a state or a mode.
 
-        Guards and resets of a block see consistent signals at its inputs, but its own modes as they were
-        before: an event is where the old mode ends.
+        Guards and resets of a block use consistent signals at its inputs, but its previous modes: an event is
+        the end of the previous mode.
         """
         before = self.kept()
         eventful = [block for block in self.blocks.values() if block.has_events]
@@ -391,7 +391,7 @@ class Network:
             self.take_signs()
         new: list[tuple[np.ndarray, np.ndarray]] = []
         for block in eventful if fired or first else ():
-            # An event decides the new modes of its block; where there is none, the signals do.
+            # An event determines the new modes of its block; without an event the signals do.
             decides = first or any(name == block.name for name, _ in fired)
             if block.on:
                 new += self._reset(block, fired, set() if decides else set(old[block.name]))
@@ -409,7 +409,7 @@ class Network:
     def _reset(
         self, block: Any, fired: Mapping[tuple[str, str], np.ndarray], without: set[str]
     ) -> list[tuple[np.ndarray, np.ndarray]]:
-        """The arrays of a block that events change, but those ``without``, and their new values."""
+        """Return the arrays that events change, except those in ``without``, and their new values."""
         self._feed_all(block)
         for guard in block.guards:
             block.arrays[f"e:{guard.name}"][:] = fired.get((block.name, guard.name), 0.0)
@@ -417,13 +417,13 @@ class Network:
         return [(block.arrays[f"x:{name}"], block.value("reset", name).copy()) for name in names]
 
     def _updated(self, block: Any) -> list[tuple[np.ndarray, np.ndarray]]:
-        """The arrays of discrete states, and what a tick makes of them."""
+        """Return the arrays of discrete states and their values after a tick."""
         self._feed_all(block)
         names = block.names("update")
         return [(block.arrays[f"x:{name}"], block.value("update", name).copy()) for name in names]
 
     def _act(self, t: float, new: list[tuple[np.ndarray, np.ndarray]]) -> bool:
-        """Put new states into their places together with what the controls of subsystems ask for."""
+        """Assign the new states, and execute the restarts and triggers of subsystems."""
         starts: list[Any] = []
         for block in self.blocks.values():
             if block.restarts and block.clock not in self.ticking:
@@ -442,20 +442,20 @@ class Network:
         return acted
 
     def _remember(self) -> None:
-        """Modes with a hysteresis go on from what they are, and not from what they were on the way to it."""
+        """Store the consistent modes with hysteresis as the previous modes."""
         for block in self.blocks.values():
             self._feed_all(block)
             block.remember()
 
     def _begin_signs(self, block: Any) -> None:
-        """The guards of a block begin where they are, as at the start of a run."""
+        """Initialise the signs of the guards of a block, as at the start of a run."""
         self._feed_all(block)
         for name, guard in self.signs:
             if name == block.name:
                 self.signs[name, guard] = np.sign(block.value("guard", guard)) * block.on
 
     def end_instant(self) -> None:
-        """Guards of a subsystem that was restarted or switched on are watched from now on."""
+        """Start to monitor the guards of subsystems that were restarted or enabled at this instant."""
         self._remember()
         for name in {name for name, _ in self.signs}:
             block = self.blocks[name]
@@ -467,11 +467,11 @@ class Network:
 
     @property
     def delays(self) -> bool:
-        """Whether a block delays a signal."""
+        """Return whether a block delays a signal."""
         return any(block.lines for block in self.blocks.values())
 
-    def note(self, x: Mapping[float, np.ndarray], t: float, h: float) -> None:
-        """Keep the inputs of delays during a step, by the states at four places of it (0, 1/3, 2/3, 1)."""
+    def record_delays(self, x: Mapping[float, np.ndarray], t: float, h: float) -> None:
+        """Store the inputs of delays for a step, from the states at four points of it (0, 1/3, 2/3, 1)."""
         lines = [(block, line) for block in self.blocks.values() for line in block.lines]
         found: dict[int, list[np.ndarray]] = {k: [] for k in range(len(lines))}
         end = self.x.copy()
@@ -486,15 +486,15 @@ class Network:
         for k, (block, line) in enumerate(lines):
             block.history[line.name].add(t, h, np.array(found[k]))
 
-    def settle_delays(self) -> None:
-        """At an instant: which segment of the past is read from now on."""
+    def select_segments(self) -> None:
+        """Select the segment of each history that is read after this instant."""
         for block in self.blocks.values():
             for line in block.lines:
                 when = self.t - float(block.value("delay", line.name)[0])
                 block.history[line.name].segment = block.history[line.name].segment_at(when)
 
     def kept(self) -> tuple[bytes, ...]:
-        """States, modes and held outputs, to compare."""
+        """Return states, modes and held outputs for comparison."""
         found = [self.x]
         for block in self.blocks.values():
             found += [block.arrays[f"x:{s.name}"] for s in (*block.discrete, *block.modes)]
@@ -502,7 +502,7 @@ class Network:
         return tuple(array.tobytes() for array in found)
 
     def ended(self) -> bool:
-        """Whether a block ends the run."""
+        """Return whether a block ends the run."""
         found = False
         for block in self.blocks.values():
             for guard in block.guards:

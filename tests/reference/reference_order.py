@@ -1,4 +1,4 @@
-"""The structure of a network: which clock each block obeys, and in which order signals are evaluated."""
+"""The structure of a network: the clock of each block, and the evaluation order of signals."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from reference_block import BlockNumbers, UnsupportedError
 from armblocks.diagram import Diagram, PortRef
 
 Node = tuple[str, str, str]
-"""What is evaluated: ("out" | "rate" | "modes" | "xdot", block, port)."""
+"""Unit of evaluation: ("out" | "rate" | "modes" | "xdot", block, port)."""
 
 
 def assign_clocks(
     flat: Diagram, blocks: Mapping[str, Any], drivers: Mapping[tuple[str, str], PortRef]
 ) -> list[tuple[float, float]]:
-    """Periods and offsets; a block without a sample time takes the fastest clock that reaches it."""
+    """Return periods and offsets; a block without a sample time inherits the fastest connected clock."""
     sampled = [n for n, b in flat.blocks.items() if b.sampled and "?fire" not in flat.gates.get(n, {})]
     clock_of: dict[str, tuple[float, float]] = {}
     for name in sampled:
@@ -63,12 +63,12 @@ def _reached(
 
 
 class EvaluationOrder:
-    """In which order the nodes of a network are evaluated: what is needed comes first.
+    """The evaluation order of the nodes of a network.
 
-    ``groups``: nodes that are evaluated together, one by itself or the several of an algebraic loop.
-    ``flowing``: those groups that states, modes, guards, delays and gates depend on, and all loops, whose
-    solutions are followed; between instants nothing else is read. ``loops``: those groups that are loops.
-    ``late``: whether a mode is used before it is evaluated, so that a second pass is needed.
+    ``groups``: nodes that are evaluated together, either a single node or all nodes of an algebraic loop.
+    ``flowing``: the groups on which states, modes, guards, delays and gates depend, and all loops, whose
+    solutions are tracked; only these are evaluated between instants. ``loops``: the groups that are algebraic
+    loops. ``late``: whether a mode is used before it is evaluated, so that a second pass is necessary.
     """
 
     def __init__(
@@ -91,7 +91,7 @@ class EvaluationOrder:
             if node not in hard:
                 hard[node], soft[node] = self.needs(node)
                 pending += [*hard[node], *soft[node]]
-        # A mode that depends on the very signals that it decides is left to the next pass.
+        # A mode that depends on signals that it selects is evaluated in the next pass.
         both = {node: hard[node] | soft[node] for node in hard}
         reach = _closure(both)
         graph = {n: hard[n] | {m for m in soft[n] if n not in reach[m]} for n in hard}
@@ -112,7 +112,7 @@ class EvaluationOrder:
         self.flowing = [loop for loop in order if not read.isdisjoint(loop)]
 
     def _read_between_instants(self) -> set[Node]:
-        """The signals at the inputs of blocks that change or watch something during a step, and all gates."""
+        """Return the inputs of blocks with states, modes, guards or delays, and all gates."""
         found = {("out", ref.block, ref.port) for gate in self.gates.values() for ref in gate.values()}
         for block in self.blocks.values():
             if block.states or block.modes or block.guards or block.lines:
@@ -121,7 +121,7 @@ class EvaluationOrder:
         return found
 
     def needs(self, node: Node) -> tuple[set[Node], set[Node]]:
-        """What a node must wait for, and what it waits for where that is possible (its modes, a restart)."""
+        """Return the required predecessors of a node, and the preferred ones (its modes, a restart)."""
         kind, name, port = node
         block = self.blocks[name]
         if kind == "modes":
@@ -175,12 +175,12 @@ class EvaluationOrder:
 
 
 def _closure(graph: Mapping[Node, set[Node]]) -> dict[Node, set[Node]]:
-    """Everything that each node leads to, by one or more steps."""
+    """Return all nodes that are reachable from each node."""
     return {node: _closure_of(node, graph) for node in graph}
 
 
 def _closure_of(node: Node, graph: Mapping[Node, set[Node]]) -> set[Node]:
-    """Everything that a node leads to, by one or more steps."""
+    """Return all nodes that are reachable from a node."""
     reached: set[Node] = set()
     pending = list(graph[node])
     while pending:

@@ -1,6 +1,6 @@
-"""Executable semantics of a diagram: a slow simulator to check the native one against.
+"""Executable semantics of a diagram: a slow reference for the native simulator.
 
-It shares with the product the definitions of the blocks (``Block.outputs``, ``derivatives``, ``mode_values``,
+It shares with the package the definitions of the blocks (``Block.outputs``, ``derivatives``, ``mode_values``,
 ``resets`` …, evaluated one block at a time), the flattening of hierarchies and the inference of shapes. It
 does not use ``trace_diagram``, ``HybridSystem`` or the compiler.
 
@@ -22,19 +22,19 @@ step that is not accepted, to 1e-14; its end is an instant.
 **Instant.** An instant is t = 0, a tick, a breakpoint (a time at which a source jumps), a recorded time, or
 the time of an event. At an instant, in this order:
 
-1. left limits: what keeps a value "just before" (the held output of a subsystem that is switched off) takes
-   it from the signals with the old modes and states;
-2. ticks: the outputs of all blocks whose clock ticks are evaluated with the others, from discrete states as
-   they were before; then all their discrete states are updated at once;
-3. turns: modes are made consistent with the signals; guards whose sign has changed fire, and ``resets`` gives
-   new states; controls of conditional subsystems act. This is repeated until a turn changes nothing;
+1. left limits: values "just before" the instant, such as the held output of a subsystem that is disabled, are
+evaluated with the old modes and states;
+2. ticks: the outputs of all blocks whose clock ticks are evaluated with the others, from the previous
+discrete states; then all their discrete states are updated together;
+3. mode iteration: modes are made consistent with the signals; guards whose sign has changed fire, and
+``resets`` gives new states; controls of conditional subsystems act. This is repeated until nothing changes;
 4. the instant is recorded: signals are right-continuous.
 
-**Conditional subsystems.** While one is off, the states of its blocks stand still, and no guard fires; its
-outputs keep the last value they had while it was on, or return to ``initial``. A restart gives all states
-inside their start values. A trigger executes the blocks inside once, as a tick does.
+**Conditional subsystems.** While a subsystem is disabled, the states of its blocks are constant and no guard
+fires; its outputs keep their last value, or return to ``initial``. A restart sets all inner states to their
+start values. A trigger executes the inner blocks once, like a tick.
 
-What it does not cover raises ``UnsupportedError``.
+Unsupported diagrams raise ``UnsupportedError``.
 """
 
 from __future__ import annotations
@@ -49,19 +49,19 @@ from armblocks.diagram import Diagram
 
 __all__ = ["EndlessEventsError", "Network", "ReferenceRun", "UnsupportedError", "run_reference"]
 
-MOST_TURNS = 100
+MOST_ITERATIONS = 100
 JUST_AFTER = 1e-12
-"""s; the error of the first stage of a step is so long times its derivative."""
+"""Offset of the first stage of a step, s; its error is this time multiplied by the derivative."""
 SAME = 2.0**-50
-"""Times within this relative distance are one instant."""
+"""Times within this relative distance belong to the same instant."""
 
 
 class EndlessEventsError(Exception):
-    """An instant whose turns do not end, or more events than the run may have."""
+    """An instant whose mode iteration does not converge, or too many events in a run."""
 
 
 class ReferenceRun:
-    """One run of a diagram from 0 to ``stop``: ``record`` (N,) are the times to record, the first is 0."""
+    """One run of a diagram from 0 to ``stop``; ``record`` (N,) has the times to record, the first is 0."""
 
     def __init__(
         self, diagram: Diagram, record: np.ndarray, step: float = 0.01, most_events: int = 500
@@ -79,7 +79,7 @@ class ReferenceRun:
         self.stopped = False
 
     def run(self) -> dict[str, np.ndarray]:
-        """Signals ``(N, *shape)`` by ``block/port``; fewer rows where a block ended the run."""
+        """Return signals ``(N, *shape)`` by ``block/port``; fewer rows if a block ended the run."""
         network = self.network
         for t, clocks, recorded, jumps in self.instants():
             if t > 0.0:
@@ -97,7 +97,7 @@ class ReferenceRun:
     # -- time ----------------------------------------------------------------------------------------------
 
     def instants(self) -> list[tuple[float, list[int], bool, bool]]:
-        """All times known beforehand: which clocks tick, whether it is recorded, whether a source jumps."""
+        """Return all times known in advance, their clocks, and whether to record or a source jumps."""
         marks: list[tuple[float, str, int]] = [(float(t), "record", 0) for t in self.record]
         for number, (period, offset) in enumerate(self.network.clocks):
             count = int((self.stop - offset) / period) + 2
@@ -111,7 +111,7 @@ class ReferenceRun:
                 found.append((t, [], False, False))
             time, clocks, recorded, jumps = found[-1]
             clocks = [*clocks, number] if what == "tick" else clocks
-            # A jump is at the later of the times that are one instant, so that the source has jumped there.
+            # The latest time of an instant is used for a jump, so that the source has already jumped.
             time = max(time, t) if what == "jump" else time
             found[-1] = (time, clocks, recorded or what == "record", jumps or what == "jump")
         return found
@@ -119,7 +119,7 @@ class ReferenceRun:
     # -- flow ----------------------------------------------------------------------------------------------
 
     def flow(self, end: float, jumps: bool) -> None:
-        """One accepted step towards ``end``, and the instant of an event after it, if there is one."""
+        """Take one accepted step towards ``end``, and process the event after it, if there is one."""
         network = self.network
         latest = float(np.nextafter(end, 0.0)) if jumps else np.inf
         x = network.x.copy()
@@ -140,14 +140,14 @@ class ReferenceRun:
             h = high
             self.stepped(x, h, latest)
         if network.delays:
-            network.note(self.thirds(x, h), self.t, h)
+            network.record_delays(self.thirds(x, h), self.t, h)
         reached = end if h >= end - self.t else self.t + h
         self.t = reached
         if calm:
             network.evaluate(min(self.t, latest), frozen=True, flowing=True)
             network.take_signs()
             return
-        # Bounces may get shorter and shorter: no step leaps over one.
+        # Intervals between bounces may decrease: no step may cross a bounce.
         self.longest = min(self.step, max(1e-9, (self.t - self.event_time) / 16))
         self.event_time = self.t
         self.events += 1
@@ -157,9 +157,9 @@ class ReferenceRun:
             self.instant(self.t, [])
 
     def stepped(self, start: np.ndarray, h: float, latest: float, whole: bool = True) -> bool:
-        """Take one Runge-Kutta step with the modes of its start; whether they hold at all its stages.
+        """Take one Runge-Kutta step with the modes of its start; return whether they hold at all stages.
 
-        Unless the ``whole`` step is needed, it ends at the first stage at which they do not.
+        Unless the ``whole`` step is needed, it ends at the first stage with inconsistent modes.
         """
         network, t = self.network, self.t
         calm = True
@@ -171,7 +171,7 @@ class ReferenceRun:
             calm = calm and (place == 0.0 or not network.modes_differ())
             return found
 
-        # The right limit: a signal may have a value for the instant alone, as the height at a bounce.
+        # The right limit: a signal may differ at the instant itself, as the height does at a bounce.
         a = rate(0.0, min(h, JUST_AFTER) * rate(0.0, 0.0))
         b = rate(h / 2, h / 2 * a)
         if not (calm or whole):
@@ -186,7 +186,7 @@ class ReferenceRun:
         return calm and not network.modes_differ() and not network.fired()
 
     def thirds(self, start: np.ndarray, h: float) -> dict[float, np.ndarray]:
-        """The states at 0, 1/3, 2/3 and 1 of the step just taken, by Hermite's cubic."""
+        """Return the states at 0, 1/3, 2/3 and 1 of the last step by cubic Hermite interpolation."""
         end = self.network.x.copy()
         a, d = self.slopes
         found: dict[float, np.ndarray] = {}
@@ -198,7 +198,7 @@ class ReferenceRun:
     # -- instants ------------------------------------------------------------------------------------------
 
     def instant(self, t: float, clocks: list[int]) -> None:
-        """Left limits, ticks, turns."""
+        """Process one instant: left limits, ticks, and the mode iteration."""
         network = self.network
         if t > 0.0:
             network.capture(t)
@@ -206,17 +206,17 @@ class ReferenceRun:
         if clocks:
             network.tick(t, clocks)
         if t == 0.0:
-            # No guard has a sign yet: resets without events give the states that the signals ask for.
-            for _ in range(MOST_TURNS):
-                if not network.turn(0.0, first=True):
+            # Guards have no sign yet: resets without events give states consistent with the signals.
+            for _ in range(MOST_ITERATIONS):
+                if not network.iterate(0.0, first=True):
                     break
             network.take_signs()
-        for _ in range(MOST_TURNS):
-            if not network.turn(t):
+        for _ in range(MOST_ITERATIONS):
+            if not network.iterate(t):
                 break
         else:
             raise EndlessEventsError(f"the events at {t} do not end")
-        network.settle_delays()
+        network.select_segments()
         network.end_instant()
         self.stopped = network.ended()
 
@@ -224,5 +224,5 @@ class ReferenceRun:
 def run_reference(
     diagram: Diagram, record: Sequence[float], step: float = 0.01, most_events: int = 500
 ) -> dict[str, np.ndarray]:
-    """Signals ``(N, *shape)`` by ``block/port`` at the times ``record`` (N,), which begin with 0."""
+    """Return signals ``(N, *shape)`` by ``block/port`` at the times ``record`` (N,), which start at 0."""
     return ReferenceRun(diagram, np.asarray(record, dtype=np.float64), step, most_events).run()

@@ -1,4 +1,4 @@
-"""Random diagrams obey the laws: a small, seeded part of what ``scripts/fuzz.py`` does for hours."""
+"""Random diagrams obey the laws: a few fixed seeds of the computation of ``scripts/fuzz.py``."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from fuzzing import reduced
 from random_diagrams import Node, Recipe, random_recipe
 
 SEEDS = (0, 2, 3, 4, 5, 7, 8, 6)
-"""The last one's signals are not finite, in the reference either; all others are compared."""
+"""The diagram of the last seed has infinite signals, also in the reference; all others are compared."""
 ALWAYS = ("reference", "formulas", "equations")
 IN_TURN = tuple(name for name in LAWS if name not in ALWAYS)
 
 
 @pytest.mark.parametrize(("number", "seed"), list(enumerate(SEEDS)))
 def test_a_random_diagram_obeys_the_laws(number: int, seed: int) -> None:
-    """All laws that cost one run, and two of the others."""
+    """Check all laws that need one run, and two of the others."""
     turn = (IN_TURN[number % len(IN_TURN)], IN_TURN[(3 * number + 1) % len(IN_TURN)])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -36,8 +36,8 @@ def test_a_seed_always_gives_the_same_diagram() -> None:
     assert random_recipe(5) != random_recipe(6)
 
 
-def test_a_finding_is_reduced_to_the_block_that_it_needs() -> None:
-    """A judge that minds sines only, in a diagram of many blocks."""
+def test_a_finding_is_reduced_to_the_necessary_block() -> None:
+    """The judge of this test reports only sine waves, in a diagram of many blocks."""
     recipe = next(recipe for recipe in map(random_recipe, range(100)) if has(recipe.nodes, "SineWave"))
     judge = lambda smaller, laws: {"law": ["a sine"]} if has(smaller.nodes, "SineWave") else {}  # noqa: E731
     smallest, text = reduced(judge, recipe, "law", until=np.inf)
@@ -49,13 +49,13 @@ def has(nodes: tuple[Node, ...], kind: str) -> bool:
     return any(node.kind == kind or has(node.inside, kind) for node in nodes)
 
 
-def test_a_loop_without_a_solution_is_found() -> None:
-    """What a wrong simulator would give for u = if(u > 0, -1, 1) contradicts the equations of the block."""
+def test_a_loop_without_a_solution_contradicts_the_equations() -> None:
+    """u = if(u > 0, -1, 1) has no solution: it is refused, or its result contradicts the equations."""
     recipe = Recipe((Node("e", "Expression", {"formula": "if(u>0,-1,1)"}, {"u": "e/y"}),))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
             found = findings(recipe, ("equations",))
         except (InconclusiveError, ValueError):
-            return  # refused, as it should be
+            return  # the diagram is refused, which is correct
     assert "equations" in found

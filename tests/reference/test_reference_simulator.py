@@ -1,4 +1,4 @@
-"""The reference simulator against closed forms, and every block of the library against it."""
+"""The reference simulator compared with closed forms, and with the native run of every block."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ TIMES = np.arange(41) * 0.05
 
 
 def chain(source: Block, *blocks: Block) -> ab.Diagram:
-    """A source and blocks behind it, named ``u``, ``b1``, ``b2`` …"""
+    """Build a source and blocks in series after it, named ``u``, ``b1``, ``b2`` …"""
     builder = DiagramBuilder("chain")
     last = builder.add("u", source)
     for number, block in enumerate(blocks, 1):
@@ -31,8 +31,8 @@ def chain(source: Block, *blocks: Block) -> ab.Diagram:
 # -- closed forms ------------------------------------------------------------------------------------------
 
 
-def test_a_mode_follows_a_jump_from_its_border() -> None:
-    """The sawtooth reaches -1 exactly where it jumps to 1: the limiter is between its limits again."""
+def test_a_mode_is_consistent_after_a_jump_at_a_limit() -> None:
+    """The sawtooth reaches the limit -1 exactly when it jumps to 1: the limiter never limits."""
     wave = bl.SignalGenerator(waveform="sawtooth", frequency=2.652)
     found = run_reference(chain(wave, bl.Saturation(lower=-1.0, upper=1.0), bl.Integrator()), TIMES)
     phase = np.mod(TIMES * 2.652, 1.0)
@@ -42,7 +42,7 @@ def test_a_mode_follows_a_jump_from_its_border() -> None:
 
 
 def test_a_hysteresis_has_a_memory() -> None:
-    """On from sin t = 0.5 upwards to sin t = -0.5 downwards."""
+    """The relay is on from sin t = 0.5 (rising) to sin t = -0.5 (falling)."""
     t = np.arange(101) * 0.1
     found = run_reference(chain(bl.SineWave(), bl.Relay(), bl.Integrator()), t)
     on, off = math.pi / 6, 7 * math.pi / 6
@@ -51,7 +51,7 @@ def test_a_hysteresis_has_a_memory() -> None:
 
 
 def test_a_ball_bounces() -> None:
-    """Dropped from 1 m with e = 0.5: the times of the bounces are a geometric series."""
+    """A fall from 1 m with e = 0.5: the intervals between bounces form a geometric series."""
     builder = DiagramBuilder("ball")
     place = bl.SecondOrderIntegratorLimited(initial=1.0, lower=0.0, reinitialize=True)
     ball = builder.add("ball", place, builder.add("weight", bl.Constant(value=-9.81)))
@@ -69,13 +69,13 @@ def test_a_ball_bounces() -> None:
 
 
 def test_a_delayed_jump_arrives_on_time() -> None:
-    """A step at 0.31 s, 0.5 s later, into an integrator."""
+    """The integral of a step at 0.31 s after a delay of 0.5 s."""
     found = run_reference(chain(bl.Step(time=0.31), bl.TransportDelay(delay=0.5), bl.Integrator()), TIMES)
     np.testing.assert_allclose(found["b2/y"], np.maximum(TIMES - 0.81, 0.0), atol=1e-12)
 
 
-def test_what_is_held_is_the_value_from_just_before() -> None:
-    """A subsystem around t, on in (0, 1): its output stays 1, its integral stays 1/2."""
+def test_a_held_output_has_the_value_just_before_the_subsystem_is_disabled() -> None:
+    """A subsystem with input t, enabled in (0, 1): its output stays 1, its integral stays 1/2."""
     builder, inner = DiagramBuilder("outer"), DiagramBuilder("inner")
     entered = inner.input("u")
     inner.output("y", entered)
@@ -89,15 +89,15 @@ def test_what_is_held_is_the_value_from_just_before() -> None:
     np.testing.assert_allclose(found["sub/area/y"], np.minimum(TIMES, 1.0) ** 2 / 2, atol=1e-12)
 
 
-def test_ticks_work_from_what_was_before() -> None:
-    """z(k + 1) = z(k) + 0.1 k 0.1, read before it is changed."""
+def test_ticks_use_the_previous_discrete_state() -> None:
+    """z(k + 1) = z(k) + 0.1 k 0.1; the output is evaluated before the update."""
     found = run_reference(chain(bl.Clock(), bl.DiscreteIntegrator(sample_time=0.1)), TIMES)
     k = np.floor(TIMES / 0.1 + 1e-9)
     np.testing.assert_allclose(found["b1/y"], 0.01 * k * (k - 1) / 2, atol=1e-14)
 
 
 def test_an_algebraic_loop_is_solved() -> None:
-    """y = sin t - y^3."""
+    """The loop y = sin t - y^3."""
     builder = DiagramBuilder("loop")
     rest = builder.add("rest", bl.Sum(signs="+-"), builder.add("u", bl.SineWave()))
     builder.connect(builder.add("cube", bl.Expression(formula="u^3"), rest), rest["u2"])
@@ -105,12 +105,12 @@ def test_an_algebraic_loop_is_solved() -> None:
     np.testing.assert_allclose(y + y**3, np.sin(TIMES), atol=1e-12)
 
 
-def test_what_has_no_end_is_said() -> None:
+def test_too_many_events_raise_an_error() -> None:
     with pytest.raises(EndlessEventsError, match="more than 20 events"):
         run_reference(chain(bl.SineWave(frequency=1e3), bl.Sign()), TIMES, most_events=20)
 
 
-def test_what_is_not_covered_is_said() -> None:
+def test_an_unsupported_diagram_raises_an_error() -> None:
     with pytest.raises(UnsupportedError, match="differentiated twice"):
         run_reference(chain(bl.SineWave(), bl.Derivative(), bl.Derivative()), TIMES)
 
@@ -118,22 +118,22 @@ def test_what_is_not_covered_is_said() -> None:
 # -- every block of the library ----------------------------------------------------------------------------
 
 NOT_COVERED = {
-    "ArmPlant": "has a reference of its own, sticking_reference, and is slow here",
+    "ArmPlant": "sticking_reference covers it, and it is slow here",
     "CalledPythonFunction": "Python is called at ticks",
     "FromFile": "reads a table by index",
 }
 TRIALS = ((0.05, 11), (0.01, 11), (0.0005, 4))
-"""Step and count of recorded times. The first that agrees is enough: steps of 0.05 s for slow signals, the
-shortest for what is stiff, as a robot with a stiff controller."""
+"""Step and number of recorded times. One trial that agrees is sufficient: steps of 0.05 s for slow signals,
+the shortest steps for stiff systems, such as a robot with a stiff controller."""
 
 
 @pytest.mark.parametrize("kind", [name for name in BLOCKS if name not in NOT_COVERED])
-def test_a_native_run_is_what_the_reference_gives(kind: str) -> None:
-    """The block's worked example, natively with rtol 1e-9."""
+def test_a_native_run_agrees_with_the_reference(kind: str) -> None:
+    """The worked example of the block, simulated natively with rtol 1e-9."""
     diagram = worked_example(BLOCKS[kind])
     times = np.arange(11) * 0.1
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # a limit of a robot that is passed is not the subject here
+        warnings.simplefilter("ignore")  # warnings about exceeded joint limits are not tested here
         found = ab.simulate(diagram, stop_time=float(times[-1]), sample_time=0.1, rtol=1e-9, atol=1e-12)
     worst: dict[str, float] = {}
     for step, count in TRIALS:
@@ -145,15 +145,15 @@ def test_a_native_run_is_what_the_reference_gives(kind: str) -> None:
 
 
 def distance(found: np.ndarray, wanted: np.ndarray) -> float:
-    """The largest difference, relative to 1 + the largest value."""
+    """Return the largest difference, relative to 1 + the largest value."""
     if found.shape != wanted.shape:
         return math.inf
     return float(np.abs(found - wanted).max(initial=0.0) / (1.0 + np.abs(wanted).max(initial=0.0)))
 
 
 @pytest.mark.parametrize("kind", FORMULAS)
-def test_a_block_gives_its_formula(kind: str) -> None:
-    """At every recorded time of its worked example."""
+def test_a_block_agrees_with_its_formula(kind: str) -> None:
+    """The comparison uses every recorded time of the worked example."""
     diagram = worked_example(BLOCKS[kind])
     found = ab.simulate(diagram, stop_time=10.0, sample_time=0.05)
     assert broken_formulas(diagram, found, found.time) == {}
