@@ -1,12 +1,12 @@
 """Compare the bits of results between processors: AVX-512, AVX2 and SSE2 code, and ARM64 under qemu.
 
-``python3 scripts/bits.py`` compiles everything for each vector extension that this x86-64 processor has. The
-SSE2 run also keeps the C library, NumPy and OpenBLAS from using newer instructions, as on an old processor.
+``python3 scripts/bits.py`` compiles everything for each vector extension of this x86-64 processor. The SSE2
+run also prevents the C library, NumPy and OpenBLAS from using newer instructions, as on an old processor.
 
-``python3 scripts/bits.py --arm64`` compares with ARM64, too, and runs tests there. On Debian nothing has to
-be prepared and nothing is installed: ARM64 packages of the system's Python and, if absent, qemu-user-static
-come from the package sources of the system, ARM64 wheels from PyPI; all is unpacked into ``build/arm64``.
-Under emulation this takes about an hour.
+``python3 scripts/bits.py --arm64`` also compares with ARM64 and runs tests there. On Debian this needs no
+preparation and installs nothing: ARM64 packages of the system's Python and, if absent, qemu-user-static come
+from the package sources of the system, ARM64 wheels from PyPI; they are unpacked into ``build/arm64``. Under
+emulation this takes about an hour.
 
 Each run prints a hash for each group of numbers (``scripts/bits_hashes.py``). Exit code 1 if any two differ.
 """
@@ -37,7 +37,7 @@ X86_64 = (
     ("AVX2", "haswell", 4, "avx2", {}),
     ("SSE2", "x86-64", 2, "sse2", OLD_PROCESSOR),
 )
-"""Title, LLVM's name of the processor, doubles in a vector, feature that the code needs, environment."""
+"""Title, LLVM processor name, doubles per vector, required CPU feature, environment."""
 
 REQUIREMENTS = ("casadi", "llvmlite", "numpy")
 TEST_REQUIREMENTS = ("pytest", "hypothesis", "scipy")
@@ -50,7 +50,7 @@ ARM64_TESTS = (
 
 
 def output(command: Sequence[str | Path], environment: Mapping[str, str] = {}, cwd: Path = ROOT) -> str:
-    """What a command prints; ends this script where it fails."""
+    """Return the output of a command; exit the script if the command fails."""
     texts = [str(part) for part in command]
     found = subprocess.run(texts, cwd=cwd, env={**os.environ, **environment}, capture_output=True, text=True)
     if found.returncode:
@@ -59,13 +59,13 @@ def output(command: Sequence[str | Path], environment: Mapping[str, str] = {}, c
 
 
 def x86_64_hashes(groups: Sequence[str]) -> dict[str, str]:
-    """The hashes of each kind of code that this processor can run."""
+    """Return the hashes of each kind of code that this processor can run."""
     ask = "from llvmlite import binding; print(binding.get_host_cpu_features().flatten())"
     features = output([PYTHON, "-c", ask]).strip().split(",")
     found: dict[str, str] = {}
     for title, cpu, lanes, feature, environment in X86_64:
         if f"+{feature}" not in features:
-            say(f"== {title}: left out, this processor does not have it")
+            say(f"== {title}: skipped, not supported by this processor")
             continue
         with tempfile.TemporaryDirectory() as cache:
             given = {"ARMBLOCKS_CACHE_DIR": cache, "PYTHONPATH": str(ROOT / "src"), **environment}
@@ -75,7 +75,7 @@ def x86_64_hashes(groups: Sequence[str]) -> dict[str, str]:
 
 
 class Arm64:
-    """A Python for ARM64 with the packages that armblocks needs, under qemu."""
+    """A Python for ARM64 with the dependencies of armblocks, under qemu."""
 
     def __init__(self, folder: Path) -> None:
         self.folder, self.root, self.site = folder, folder / "root", folder / "site"
@@ -88,7 +88,7 @@ class Arm64:
         self.qemu = self._qemu()
 
     def _unpack_system(self) -> None:
-        """Python and all that it depends on, by a package list of its own: the system's is not touched."""
+        """Unpack Python and its dependencies, with a separate package list; the system is not changed."""
         say("== fetch ARM64 packages of Debian")
         state = self.folder / "apt"
         for part in ("state/lists/partial", "cache/archives/partial"):
@@ -114,7 +114,7 @@ class Arm64:
             output(["dpkg-deb", "-x", package, self.root])
 
     def _unpack_wheels(self) -> None:
-        """The versions that the x86-64 environment has."""
+        """Unpack the versions that the x86-64 environment has."""
         say("== fetch ARM64 wheels")
         names = (*REQUIREMENTS, *TEST_REQUIREMENTS)
         ask = f"from importlib.metadata import version; print(*(version(name) for name in {names}))"
@@ -127,7 +127,7 @@ class Arm64:
             output([PYTHON, "-m", "zipfile", "-e", wheel, self.site])
 
     def _python_version(self) -> tuple[int, int]:
-        """Of the newest Python that was unpacked."""
+        """The version of the newest unpacked Python."""
         found = [
             path.name for path in (self.root / "usr" / "bin").glob("python3.*") if path.name[8:].isdigit()
         ]
@@ -145,7 +145,7 @@ class Arm64:
         return own / "usr" / "bin" / "qemu-aarch64-static"
 
     def run(self, *arguments: str) -> str:
-        """What Python prints there; armblocks, the tests and their modules are importable."""
+        """Return the output of Python under qemu; armblocks, the tests and their modules are importable."""
         major, minor = self._python_version()
         places = [ROOT / "src", self.site, *(ROOT / "tests" / part for part in ("", "compiler", "reference"))]
         environment = {
@@ -158,7 +158,7 @@ class Arm64:
 
 
 def main() -> int:
-    """Print all hashes; 0 if they agree."""
+    """Print all hashes; return 0 if they agree."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -1,4 +1,4 @@
-"""Print one hash for each group of numbers that the documents promise to be the same on every machine.
+"""Print one hash for each group of results that the documents guarantee to be equal on every machine.
 
 ``python scripts/bits_hashes.py [--cpu NAME --lanes N]``, with armblocks importable; ``scripts/bits.py`` runs
 it for several processors and compares. ``--cpu`` compiles for that processor of LLVM's list.
@@ -19,23 +19,23 @@ from armblocks.compiler import target as targets
 
 Numbers = Iterator[tuple[str, np.ndarray]]
 ROWS = 37
-"""Samples of a batch: whole vectors of any length, and a rest."""
+"""Number of samples of a batch: complete vectors of any length, and a remainder."""
 OF_TWO = ("atan2", "hypot", "fmod", "remainder", "power")
 
 
 def compile_for(cpu: str, lanes: int) -> None:
-    """Make all code of this process for another processor; before anything else of armblocks is imported."""
+    """Compile all code of this process for another processor; call before importing the rest of armblocks."""
     chosen = replace(targets.host_target(), cpu=cpu, features="", lanes=lanes)
     targets.host_target = lambda: chosen  # pyright: ignore[reportAttributeAccessIssue]
 
 
 def spread(rng: np.random.Generator, count: int, exponents: int) -> np.ndarray:
-    """Numbers of both signs with binary exponents up to this; made without a function of the C library."""
+    """Numbers of both signs with binary exponents up to this limit, computed without the C library."""
     return np.ldexp(2.0 * rng.random(count) - 1.0, rng.integers(-exponents, exponents, count, endpoint=True))
 
 
 def elementary_functions() -> Numbers:
-    """Every function that kernels have, of arguments of all sizes, one by one and in batches."""
+    """Every function of the kernels, for arguments of all magnitudes, single and in batches."""
     import casadi
 
     from armblocks.compiler import compile_function
@@ -65,7 +65,7 @@ def elementary_functions() -> Numbers:
 
 
 def rounded_constants() -> Numbers:
-    """The functions that work out constants."""
+    """The functions that compute constants."""
     from armblocks.rounded_functions import FUNCTIONS
 
     rng = np.random.default_rng(10)
@@ -78,7 +78,7 @@ def rounded_constants() -> Numbers:
 
 
 def linear_algebra() -> Numbers:
-    """Linear equations and matrices times vectors, in batches and one by one."""
+    """Linear equations and matrix-vector products, in batches and single."""
     from casadi import mtimes
 
     from armblocks.compiler import compile_function
@@ -103,7 +103,7 @@ def linear_algebra() -> Numbers:
 
 
 def robots() -> Numbers:
-    """Every function of every robot, and of one with angles that are no quarter turns."""
+    """Every function of every robot, and of one with angles that are not multiples of 90 degrees."""
     import armblocks as ab
     from armblocks import dynamics
     from armblocks.compiler import compile_function
@@ -155,7 +155,7 @@ FORMULAS = (
 
 
 def constants() -> Numbers:
-    """Runs of diagrams with constants in formulas and in filters."""
+    """Runs of diagrams with constants in formulas and filters."""
     import armblocks as ab
     from armblocks.blocks import AnalogFilter, Clock, DigitalFilter, Expression, Integrator
 
@@ -223,14 +223,14 @@ GROUPS: dict[str, Callable[[], Numbers]] = {
 
 
 def canonical(numbers: np.ndarray) -> bytes:
-    """The bytes of numbers; every NaN has the same, because its sign and payload are promised to nobody."""
+    """The bytes of numbers; all NaNs have the same bytes, because sign and payload are not guaranteed."""
     array = np.array(numbers, dtype=np.float64)
     array[np.isnan(array)] = np.nan
     return array.tobytes()
 
 
 def main() -> None:
-    """Print a line for each group, and with ``--details`` one for each array."""
+    """Print one line for each group, and with ``--details`` one for each array."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cpu")
     parser.add_argument("--lanes", type=int, default=2)

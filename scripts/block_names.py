@@ -1,7 +1,7 @@
 """Write ``src/armblocks/blocks/__init__.pyi``: the names of all blocks, for type checkers and editors.
 
-The package finds its blocks in its folders when it is imported, which a type checker does not follow. A test
-fails while the file is not up to date.
+The package finds its blocks in its folders at import time, which a type checker cannot follow. A test fails
+if the file is not up to date.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ BANNER = "# Made by scripts/block_names.py: do not edit."
 
 
 def stub() -> str:
-    """The text of the file: each kind imported from the module that defines it."""
+    """Return the text of the file: each block class imported from the module that defines it."""
     imports = sorted((kind.__module__, name) for name, kind in BLOCKS.items())
     lines = [
         BANNER,

@@ -1,6 +1,6 @@
-"""Set up and run the main job: the paper's experiment, with a report of every picture and number.
+"""Set up the environment and run the experiment of the paper, with a report of all figures and numbers.
 
-The environment gets the core and the studio, whose page is built when ``armblocks studio`` is first started.
+The environment contains the core and the studio, whose page is built when ``armblocks studio`` first starts.
 
 ``python3 scripts/demo.py [armblocks run's own options]``, for instance ``--stop-time 5`` or ``--out DIR``.
 """
@@ -13,7 +13,7 @@ from environment import BINARIES, prepare, run
 
 
 def main() -> int:
-    """Run ``armblocks run kr180model`` in the project's environment; its exit code is this script's."""
+    """Run ``armblocks run kr180model`` in the project's environment; return its exit code."""
     prepare("studio")
     return run(BINARIES / "armblocks", "run", "kr180model", *sys.argv[1:])
 

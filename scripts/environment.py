@@ -1,6 +1,6 @@
-"""The project's own virtual environment, ``.venv``: made when absent, brought up to date when needed.
+"""The virtual environment of the project, ``.venv``: created if absent, updated if needed.
 
-Standard library only, so that ``python3 scripts/…`` works on a bare machine, on Linux, macOS and Windows.
+Standard library only, so that ``python3 scripts/…`` works without preparation on Linux, macOS and Windows.
 """
 
 from __future__ import annotations
@@ -21,24 +21,24 @@ PYTHON = BINARIES / ("python.exe" if os.name == "nt" else "python")
 STAMP = VENV / "armblocks-installed.json"
 OLDEST_PYTHON = (3, 11)
 ENVIRONMENT = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
-"""pip makes no bytecode here; with that of the first import a process starts three times as fast."""
+"""pip creates no bytecode; with the bytecode of the first import a process starts three times as fast."""
 
 
 def say(text: str) -> None:
-    """Print at once, so that the order holds when the output goes to a file."""
+    """Print and flush, so that the order is correct if the output is redirected to a file."""
     print(text, flush=True)
 
 
 def run(*command: str | Path, cwd: Path = ROOT) -> int:
-    """Run a command without standard input; its output goes straight through. Returns the exit code."""
+    """Run a command without standard input, with its output passed through; return the exit code."""
     done = subprocess.run([str(part) for part in command], cwd=cwd, env=ENVIRONMENT, stdin=subprocess.DEVNULL)
     return done.returncode
 
 
 def prepare(*extras: str) -> None:
-    """Make ``.venv`` hold armblocks (editable) with these extras of pyproject.toml.
+    """Install armblocks (editable) with these extras of pyproject.toml into ``.venv``.
 
-    A stamp in ``.venv`` remembers what was installed: nothing happens while pyproject.toml asks for the same.
+    A stamp in ``.venv`` records the installed extras: without a change of pyproject.toml nothing is done.
     Exits with a message if Python is too old or a step fails.
     """
     if sys.version_info < OLDEST_PYTHON:
@@ -55,7 +55,7 @@ def prepare(*extras: str) -> None:
     say(f"== install armblocks {target} (a minute or more the first time)")
     code = _pip_install("--editable", target)
     if code != 0:
-        sys.exit(f"pip could not install armblocks (exit code {code}); its own message stands above")
+        sys.exit(f"pip could not install armblocks (exit code {code}); see its message above")
     STAMP.write_text(json.dumps({"digest": wanted_by_pyproject, "extras": together}), encoding="utf-8")
 
 
@@ -63,9 +63,9 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 
 
 def prepare_browser() -> None:
-    """See that there is a browser for the journeys through the studio; on Debian and Ubuntu, install one.
+    """Check that a browser for the journeys through the studio exists; on Debian and Ubuntu, install one.
 
-    Exits with a message where there is none and none can be installed: a check that is left out is no check.
+    Exits with a message if there is none and none can be installed, so that the check is not skipped silently.
     """
     if any(shutil.which(name) for name in BROWSERS):
         return
@@ -79,7 +79,7 @@ def prepare_browser() -> None:
 
 
 def _runs() -> bool:
-    """Whether the environment is there and its interpreter still works (the system's may have moved on)."""
+    """Whether the environment exists and its interpreter works (the system may have upgraded Python)."""
     if not PYTHON.exists():
         return False
     command = [str(PYTHON), "-c", "import pip"]
@@ -91,17 +91,17 @@ def _create() -> None:
     if run(sys.executable, "-m", "venv", "--clear", VENV) != 0:
         sys.exit(
             f"Python could not make a virtual environment in {VENV}. "
-            "On Debian and Ubuntu its module is a package of its own: apt-get install python3-venv"
+            "On Debian and Ubuntu install its module: apt-get install python3-venv"
         )
 
 
 PIPS_STEPS = ("Downloading", "Using cached", "Installing collected packages")
-"""How the lines of pip begin that tell how far it is."""
+"""Beginnings of the lines in which pip reports its progress."""
 
 
 def _pip_install(*what: str) -> int:
-    """Run pip, and show each of its steps with the time at which it begins; returns the exit code."""
-    # Bytecode is made for what is imported, when it is: making it for all takes longer than all else.
+    """Run pip and show each of its steps with its start time; return the exit code."""
+    # Bytecode is created at import: creating it for all modules takes longer than the installation.
     command = [
         str(PYTHON),
         "-m",
@@ -132,8 +132,8 @@ def _pip_install(*what: str) -> int:
 
 
 def _digest() -> str:
-    """Changes whenever pyproject.toml asks for something else to be installed, or the checkout moved."""
-    import tomllib  # not at the top: an older Python must get as far as the message about its age
+    """A hash that changes with the dependencies in pyproject.toml and with the path of the checkout."""
+    import tomllib  # imported here, so that an older Python reaches the message about its version
 
     pyproject = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     project = pyproject["project"]

@@ -1,10 +1,10 @@
-"""Random diagrams against the reference simulator and other laws, for as long as wanted.
+"""Compare random diagrams with the reference simulator and check other laws, for a given time.
 
     python scripts/fuzz.py --minutes 60 --seed 7
 
-Prints each finding as a small diagram with a script that builds it, how many diagrams were judged, and
-why nothing can be said of some. The same seeds give the same diagrams. ``--laws`` picks some of the laws of
-``tests/reference/fuzz_laws.py``. The exit status is 1 where there was a finding.
+Prints each finding as a small diagram with a script that builds it, the number of judged diagrams, and why
+some diagrams cannot be judged. Equal seeds give equal diagrams. ``--laws`` selects laws of
+``tests/reference/fuzz_laws.py``. The exit code is 1 if there was a finding.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Make the pictures of README and docs anew from the paper's experiment, into docs/pictures.
+"""Create the pictures of README and docs from the experiment of the paper, in docs/pictures.
 
-``python3 scripts/pictures.py``; commit what it changes.
+Run ``python3 scripts/pictures.py`` and commit the changed files.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ TARGET = ROOT / "docs" / "pictures"
 
 
 def main() -> int:
-    """Run the experiment into a temporary folder and keep the pictures that the documents show."""
+    """Run the experiment into a temporary folder and copy the pictures that the documents show."""
     prepare()
     with tempfile.TemporaryDirectory() as folder:
         code = run(PYTHON, "-m", "armblocks", "run", "kr180model", "--out", folder)

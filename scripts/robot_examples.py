@@ -1,7 +1,7 @@
 """Build the shipped examples of robots and machines, and write their files.
 
-``python3 scripts/robot_examples.py`` writes ``examples/NAME.json`` for every diagram below; a test reads the
-files and compares them with what is built here.
+``python3 scripts/robot_examples.py`` writes ``examples/NAME.json`` for every diagram below; a test compares
+the files with the diagrams.
 """
 
 from __future__ import annotations
@@ -46,10 +46,10 @@ EXAMPLES = Path(__file__).parent.parent / "examples"
 
 
 def puma560_multirate() -> Diagram:
-    """Six axes with a position loop of 1 kHz around a current loop of 10 kHz in each motor.
+    """Six axes, each with a position loop of 1 kHz around a current loop of 10 kHz.
 
-    The current loop: PI with zero at R / L, crossing over at 3000 rad/s, of a supply of 40 V.
-    At the start the currents hold the arm against gravity.
+    The current loop is a PI controller with its zero at R / L, a crossover frequency of 3000 rad/s and a
+    supply of 40 V. At the start the currents hold the arm against gravity.
     """
     puma = load_robot("puma560")
     robot = puma.robot.nofriction(viscous=False)
@@ -117,7 +117,7 @@ def puma560_multirate() -> Diagram:
 
 
 def dc_motor_sampled_pid() -> Diagram:
-    """A DC motor brought to 100 rad/s by a PID that works each 10 ms, and loaded from 2 s on."""
+    """A DC motor at 100 rad/s under a PID controller with a sample time of 10 ms, loaded from 2 s on."""
     builder = DiagramBuilder(
         "dc_motor_sampled_pid",
         description="a DC motor's speed under a sampled PID, loaded at 2 s",
@@ -151,12 +151,12 @@ def dc_motor_sampled_pid() -> Diagram:
 
 
 def puma560_payload_drop() -> Diagram:
-    """A Puma whose controller, at 1 kHz, does not know of the 3 kg that it carries and drops at 4 s."""
+    """A Puma under a 1 kHz controller that does not model the payload of 3 kg, which is dropped at 4 s."""
     robot = load_robot("puma560").robot.nofriction(viscous=False)
     payload = (3.0, 0.0, 0.0, 0.1, 0.01, 0.01, 0.01, 0.0, 0.0, 0.0)
     builder = DiagramBuilder(
         "puma560_payload_drop",
-        description="a Puma drops a payload of which its controller knows nothing",
+        description="a Puma drops a payload that its controller does not model",
         settings=SimulationOptions(stop_time=6.0, sample_time=0.01),
     )
     path = builder.add("path", JTraj(q0=[0.0] * 6, qf=[0.7, 0.9, -0.8, 0.4, 0.9, 0.5], tmax=2.5))
@@ -198,7 +198,7 @@ def puma560_payload_drop() -> Diagram:
 
 
 def kr180_cell() -> Robot:
-    """The KR180 on a pedestal between two pallets and a wall, which are links that do not move."""
+    """The KR180 on a pedestal between two pallets and a wall, which are fixed links."""
     arm = load_robot("kr180").robot
     scene = (
         ("pedestal", Box(size=(0.7, 0.7, 2.4), material=Material.BASE), (0.0, 0.0, 1.2)),
@@ -224,11 +224,11 @@ def _moved(x: float, y: float, z: float) -> Pose:
 
 
 def kr180_pick_and_place() -> Diagram:
-    """A load of 60 kg from one pallet over a wall to the other, through points with rounded corners.
+    """Move a load of 60 kg from one pallet over a wall to the other, through points with rounded corners.
 
-    The second and third axis of the KR180 of the paper are one line: both tilt the arm by half of ``tilt``.
-    The fourth keeps the load's edges parallel to the pallets'. Two equal points in a row are a rest, in the
-    middle of which the load is gripped (2.7 s) and let go (10.7 s).
+    The second and third axis of the KR180 of the paper coincide: both tilt the arm by half of ``tilt``. The
+    fourth axis keeps the edges of the load parallel to those of the pallets. Two equal points in a row are a
+    pause; in the middle of the pauses the load is gripped (2.7 s) and released (10.7 s).
     """
     robot = load_robot("kr180_cell").robot
     stations = ((-50.0, 45.0), (-50.0, 0.0), (-50.0, 0.0), (-50.0, 45.0), (15.0, 50.0))
@@ -285,7 +285,7 @@ BUILDERS: tuple[Callable[[], Diagram], ...] = (
 
 
 def main() -> None:
-    """Write every file anew."""
+    """Write all files."""
     for build in BUILDERS:
         diagram = build()
         save_diagram(diagram, EXAMPLES / f"{diagram.name}.json")

@@ -1,7 +1,7 @@
 """Take the pictures of the studio that README and docs show: ``python3 scripts/studio_pictures.py [NAME …]``.
 
-A real studio is started and driven in Chromium as a user drives it. Every picture is one function below; with
-names, only those are taken. ``playwright`` (of the extra ``test``) and a Chromium or Chrome are needed.
+A real studio is started and operated in Chromium. Each function below takes one picture; names select some of
+them. Needs ``playwright`` (in the extra ``test``) and Chromium or Chrome.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ import armblocks as ab
 ROOT = Path(__file__).resolve().parent.parent
 PICTURES = ROOT / "docs" / "pictures"
 SCRIPT = ROOT / "tests" / "formats" / "kr180_as_printed.m"
-"""The paper's script, as it is printed."""
+"""The script of the paper as printed."""
 FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 PATIENCE_MS = 180_000
 MOMENTS = (0, 2.5, 5, 10)
-"""Instants of the motion, s, at which the arm is pictured."""
+"""Instants of the motion at which the arm is shown, s."""
 DROP = """([name, content]) => {
     const brought = new DataTransfer()
     const bytes = Uint8Array.from(atob(content), (letter) => letter.charCodeAt(0))
@@ -53,7 +53,7 @@ SHOW_WIDGET = """async ([script, state, samples]) => {
 
 @contextmanager
 def studio(model: str) -> Generator[str]:
-    """The login link of a studio in a folder of its own."""
+    """Start a studio in a temporary folder; return its login link."""
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "armblocks", "studio", model, "--no-browser", "--folder", folder]
         process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
@@ -73,7 +73,7 @@ def studio(model: str) -> Generator[str]:
 
 @contextmanager
 def shown(browser: Browser, theme: str, size: tuple[int, int], model: str = "kr180model") -> Generator[Page]:
-    """The page of a studio that shows a model, its arm in place."""
+    """Open a page of a studio that shows a model with its arm."""
     with studio(model) as link:
         page = browser.new_page(
             viewport={"width": size[0], "height": size[1]},
@@ -99,7 +99,7 @@ def run(page: Page) -> None:
 
 
 def at(page: Page, seconds: float, stop: float = 10.0) -> None:
-    """Put the time cursor to an instant with the keys, as the slider's step is a thousandth of the run."""
+    """Move the time cursor to an instant with the keys; the step of the slider is a thousandth of the run."""
     slider = page.get_by_role("slider", name="Time")
     slider.focus()
     slider.press("Home")
@@ -109,7 +109,7 @@ def at(page: Page, seconds: float, stop: float = 10.0) -> None:
 
 
 def taller(page: Page, by: int) -> None:
-    """Drag the edge above the scopes up, by so many pixels."""
+    """Drag the upper edge of the scopes upwards by some pixels."""
     top = page.locator(".scopes-panel, .dock .empty").last.bounding_box()
     assert top is not None
     edges = [one.bounding_box() for one in page.locator(".dv-sash").all()]
@@ -123,16 +123,16 @@ def taller(page: Page, by: int) -> None:
 
 
 def keep(shot: Page | Locator, name: str) -> None:
-    """Write a picture of 256 colours; all text in it is sharp on dense screens too."""
+    """Write a picture with 256 colours, in double resolution."""
     PICTURES.mkdir(exist_ok=True)
     shown = Image.open(io.BytesIO(shot.screenshot(animations="disabled"))).convert("RGB")
-    # The eye sees no difference, and the file, which a wheel brings, is half as large.
+    # 256 colours look the same, and the file, which is part of the wheel, is half as large.
     shown.quantize(256).save(PICTURES / f"{name}.png", optimize=True)
     print(f"docs/pictures/{name}.png")
 
 
 def whole(browser: Browser, theme: str) -> None:
-    """The paper's model after its run, with canvas, arm and scopes."""
+    """The model of the paper after its run, with canvas, arm and scopes."""
     with shown(browser, theme, (1440, 860)) as page:
         run(page)
         at(page, 4.5)
@@ -141,7 +141,7 @@ def whole(browser: Browser, theme: str) -> None:
 
 
 def script(browser: Browser) -> None:
-    """Figures 5 and 6: the paper's script, dropped on the page, and the window of the new model."""
+    """Figures 5 and 6: the script of the paper dropped on the page, and the window of the new model."""
     with shown(browser, "light", (1440, 820)) as page:
         page.evaluate(DROP, ["kr180.m", base64.b64encode(SCRIPT.read_bytes()).decode()])
         editor = page.locator(".robot-editor")
@@ -155,7 +155,7 @@ def script(browser: Browser) -> None:
 
 
 def robot_editor(browser: Browser, theme: str) -> None:
-    """The robot editor with the Puma, its dynamics, and joints that were moved."""
+    """The robot editor with the dynamics of the Puma and moved joints."""
     with shown(browser, theme, (1440, 860)) as page:
         page.get_by_role("button", name="Menu").click()
         page.get_by_role("menuitem", name="puma560", exact=True).click()
@@ -179,7 +179,7 @@ def library(browser: Browser) -> None:
 
 
 def dialog(browser: Browser) -> None:
-    """Figure 8: the parameters of jtraj; and the configuration parameters, a slide of the paper's."""
+    """Figure 8: the parameters of jtraj, and the configuration parameters of a slide of the paper."""
     with shown(browser, "light", (1280, 900)) as page:
         page.locator('.react-flow__node[data-id="jtraj"]').dblclick()
         opened = page.get_by_role("dialog")
@@ -203,7 +203,7 @@ def model(browser: Browser) -> None:
 
 
 def moments(browser: Browser) -> None:
-    """Figure 10: some moments of the motion; each is the robot view with the time cursor there."""
+    """Figure 10: the robot view at some instants of the motion."""
     with shown(browser, "light", (1440, 860)) as page:
         run(page)
         for seconds in MOMENTS:
@@ -222,13 +222,13 @@ def scopes(browser: Browser) -> None:
 
 
 def notebook(browser: Browser) -> None:
-    """The widget of a run, where a notebook would put it."""
+    """The widget of a run, as a notebook displays it."""
     diagram = ab.load_diagram("kr180model")
     widget = ab.run_widget(diagram, ab.simulate(diagram), height=520)
     state = widget.get_state(("title", "height", "_page", "_shown"))
     samples = base64.b64encode(widget.get_state("_frame")["_frame"]).decode()
     with tempfile.TemporaryDirectory() as folder:
-        # A page on disk: the widgets need no server.
+        # A local file, because the widgets need no server.
         (Path(folder) / "notebook.html").write_text("<!doctype html><body></body>", encoding="utf-8")
         page = browser.new_page(viewport={"width": 1160, "height": 560}, device_scale_factor=1.5)
         page.set_default_timeout(PATIENCE_MS)

@@ -1,7 +1,7 @@
-"""Write what the studio's page takes from Python: the types of the messages and the colours.
+"""Write the parts of the front end that are generated from Python: message types and colours.
 
 ``python3 scripts/studio_types.py`` writes ``frontend/src/protocol.ts`` and ``frontend/src/tones.css``; with
-``--check`` it only says whether they are as they should be.
+``--check`` it only reports whether they are up to date.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ BANNER = "/* Made from src/armblocks/studio/protocol/messages by scripts/studio_
 
 
 def types() -> str:
-    """The TypeScript types of all messages."""
+    """Return the TypeScript types of all messages."""
     with tempfile.TemporaryDirectory() as folder:
         schema = Path(folder) / "messages.json"
         schema.write_text(json.dumps(message_schema()), encoding="utf-8")
@@ -32,7 +32,7 @@ def types() -> str:
 
 
 def tones() -> str:
-    """The colours of all figures as custom properties, and the classes that drawings of blocks use."""
+    """Return the colours of all figures as custom properties, and the CSS classes of drawings of blocks."""
 
     def properties(theme: str) -> str:
         return "\n".join(

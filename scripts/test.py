@@ -1,11 +1,11 @@
-"""Set up and run every check: what a person runs before a commit, and what CI runs.
+"""Set up the environment and run every check; for use before a commit and in CI.
 
-``python3 scripts/test.py`` runs all steps, goes on after a failure so that one run tells all, and ends with
-exit code 1 if any step failed. ``python3 scripts/test.py format types`` runs only the steps named.
+``python3 scripts/test.py`` runs all steps, also after a failure, and ends with exit code 1 if any step
+failed. ``python3 scripts/test.py format types`` runs only the named steps.
 
-The static checks run one after the other while the tests run. What a step says is shown as if all of them ran
-one after the other: the output of the first step that is still running appears as it comes, and that of a
-later one is kept until its turn.
+The static checks run in sequence while the tests run. The output is displayed as if all steps ran in
+sequence: the first unfinished step is shown as it runs, and the output of later ones is buffered until their
+turn.
 """
 
 from __future__ import annotations
@@ -39,18 +39,18 @@ STEPS: dict[str, tuple[str | object, ...]] = {
     "tests": (PYTHON, "-m", "pytest", "-n", "auto", "--dist", "loadfile", "--no-loadscope-reorder"),
 }
 BEFORE_ALL = ("page",)
-"""Steps whose result the others need."""
+"""Steps whose results the others need."""
 STAGES = (
     (("types",), ("web types", "web lint", "web format", "web tests", "lint", "format", "layers", "docs")),
     (("tests",),),
 )
-"""Stages follow one another. In a stage, the steps of a row run one after the other, beside the other rows.
-The tests have the machine for themselves: journeys in a browser need it."""
+"""Stages run in sequence. In a stage, the rows run in parallel, and the steps of a row in sequence.
+The tests have a separate stage, because journeys in a browser need the whole machine."""
 GLANCE_SECONDS = 0.1
 
 
 class Step:
-    """One command, with its output in a file."""
+    """One command; its output is written to a file."""
 
     def __init__(self, name: str, folder: Path) -> None:
         self.name = name
@@ -63,7 +63,7 @@ class Step:
         self._process: subprocess.Popen[bytes] | None = None
 
     def run(self) -> None:
-        """Run the command to its end, without standard input."""
+        """Run the command without standard input until it ends."""
         start = time.perf_counter()
         try:
             with self._output.open("wb") as output:
@@ -84,7 +84,7 @@ class Step:
             self._ended.set()
 
     def follow(self) -> None:
-        """Show the output so far, and what is added until the command ends."""
+        """Show the output so far, and new output until the command ends."""
         say(f"== {self.name}: {' '.join(self.command).replace(f'{ROOT}/', '')}")
         with self._output.open("rb") as output:
             while True:
@@ -96,13 +96,13 @@ class Step:
                     return
 
     def end(self) -> None:
-        """Stop the command if it is still running."""
+        """Stop the command if it is running."""
         if self._process is not None and self._process.poll() is None:
             self._process.terminate()
 
 
 def run_steps(names: Sequence[str]) -> list[Step]:
-    """Run these steps, each once, and show what they say in the order of ``STEPS``."""
+    """Run these steps, each once, and show their output in the order of ``STEPS``."""
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor() as pool:
         steps = {name: Step(name, Path(folder)) for name in names}
 
@@ -133,7 +133,7 @@ def run_steps(names: Sequence[str]) -> list[Step]:
 
 
 def main() -> int:
-    """Run the steps asked for; 0 if all passed."""
+    """Run the requested steps; return 0 if all passed."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

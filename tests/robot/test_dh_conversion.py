@@ -39,7 +39,7 @@ def arms() -> list[Robot]:
 
 
 @pytest.mark.parametrize("robot", arms(), ids=lambda robot: f"{robot.name}-{robot.joint_letters}")
-def test_the_converted_arm_is_the_same_arm(robot: Robot) -> None:
+def test_conversion_keeps_kinematics_and_dynamics(robot: Robot) -> None:
     modified = converted(robot, MODIFIED)
     assert {link.dh.convention for link in modified.links if link.dh} == {MODIFIED}
     assert converted(modified, MODIFIED) is modified
@@ -49,16 +49,16 @@ def test_the_converted_arm_is_the_same_arm(robot: Robot) -> None:
             for name, inputs in (("fkine", (q,)), ("jacob0", (q,)), ("rne", (q, qd, qdd))):
                 expected = evaluate(robot, name, *inputs)
                 scale = max(1.0, float(np.abs(expected).max()))
-                # Frames are built by other products of the same turns: some tens of roundings.
+                # Frames are products of the same rotations in another order: some tens of rounding errors.
                 assert_allclose(evaluate(told, name, *inputs), expected, rtol=0, atol=2e-13 * scale)
     for link, again in zip(robot.links, back.links):
-        # What was left over went to the tool on the way there and stays there on the way back.
+        # The first conversion moves a constant transform to the tool; the second one leaves it there.
         if link is not robot.links[-1]:
             assert again.dh == link.dh
             assert_allclose(again.I, link.I, rtol=0, atol=1e-14)
 
 
-def test_shapes_stay_where_they_are_in_the_world() -> None:
+def test_conversion_keeps_the_world_poses_of_shapes() -> None:
     boxed = load_robot("kr180").with_link("link3", geometry=(Box(size=(1.0, 1.0, 1.0)),))
     told = converted(boxed, MODIFIED)
     q = [0.1, 0.2, 0.3, 0.4]
@@ -70,7 +70,7 @@ def test_shapes_stay_where_they_are_in_the_world() -> None:
     )
 
 
-def test_reading_the_same_numbers_by_the_other_convention_is_another_arm() -> None:
+def test_the_same_rows_in_the_other_convention_are_another_arm() -> None:
     robot = load_robot("kr180")
     other = reread(robot, MODIFIED)
     assert [replace(link.dh, convention=STANDARD) for link in other.links if link.dh] == [
@@ -80,7 +80,7 @@ def test_reading_the_same_numbers_by_the_other_convention_is_another_arm() -> No
     assert reread(other, STANDARD) == robot
 
 
-def test_what_is_no_chain_of_rows_is_refused() -> None:
+def test_robots_that_are_not_a_chain_of_dh_rows_are_refused() -> None:
     robot = load_robot("puma560")
     tree = replace(robot, links=(*robot.links, standard_dh("finger", parent="link2")))
     loose = replace(robot, links=(*robot.links, Link(name="plate", parent=robot.links[-1].name)))

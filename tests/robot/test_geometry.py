@@ -15,7 +15,7 @@ _TETRAHEDRON = Mesh(
     vertices=((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)), faces=((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
 )
 SHAPES: dict[str, tuple[Shape, float]] = {
-    # A regular polygon of SIDES corners stands in for each circle.
+    # A regular polygon of SIDES corners approximates each circle.
     "cylinder": (Cylinder(radius=0.5, length=2.0), 2.0 * SIDES / 2 * 0.25 * math.sin(2 * math.pi / SIDES)),
     "box": (Box(size=(1.0, 2.0, 3.0)), 6.0),
     "box as housing": (Housing(start=(1, 2), end=(1, 2), length=0.5, roundness=1.0), math.pi),
@@ -25,32 +25,32 @@ SHAPES: dict[str, tuple[Shape, float]] = {
 
 
 def volume(mesh: TriangleMesh) -> float:
-    """Of a closed surface, by the divergence theorem."""
+    """The volume of a closed surface, by the divergence theorem."""
     a, b, c = (mesh.corners[:, k] for k in range(3))
     return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
 
 
 @pytest.mark.parametrize("name", SHAPES)
-def test_a_surface_encloses_its_volume_with_the_outside_out(name: str) -> None:
+def test_a_surface_encloses_its_volume_with_outward_faces(name: str) -> None:
     shape, expected = SHAPES[name]
-    # Facets cut 1 % off a round cross-section and 2 % off a ball.
+    # Facets reduce the area of a circle by 1 % and the volume of a ball by 2 %.
     assert volume(triangles(shape)) == pytest.approx(expected, rel=0.025)
 
 
 @pytest.mark.parametrize("name", SHAPES)
-def test_normals_are_units_that_look_outwards(name: str) -> None:
+def test_normals_are_outward_unit_vectors(name: str) -> None:
     mesh = triangles(SHAPES[name][0])
     assert np.linalg.norm(mesh.normals, axis=2) == pytest.approx(1.0)
     flat = np.cross(mesh.corners[:, 1] - mesh.corners[:, 0], mesh.corners[:, 2] - mesh.corners[:, 0])
     assert (np.einsum("ik,ijk->ij", flat, mesh.normals) > 0).all()
 
 
-def test_a_bevel_takes_material_away() -> None:
+def test_a_bevel_reduces_the_volume() -> None:
     plain, bevelled = Cylinder(radius=1.0, length=1.0), Cylinder(radius=1.0, length=1.0, bevel=0.2)
     assert volume(triangles(bevelled)) < volume(triangles(plain))
 
 
-def test_a_pose_moves_a_shape() -> None:
+def test_a_shape_is_placed_by_its_pose() -> None:
     pose = ((0.0, -1.0, 0.0, 5.0), (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
     corners = triangles(Box(size=(2.0, 4.0, 6.0), pose=pose)).corners.reshape(-1, 3)
     assert corners.min(axis=0) == pytest.approx([3.0, -1.0, -3.0])
@@ -58,7 +58,7 @@ def test_a_pose_moves_a_shape() -> None:
     assert triangles(Box(size=(2.0, 4.0, 6.0), pose=IDENTITY)).corners.max() == 3.0
 
 
-def test_every_robot_gets_bodies_of_finite_size_in_every_frame(robot: Robot) -> None:
+def test_every_robot_has_bodies_of_finite_size_in_every_frame(robot: Robot) -> None:
     shapes = robot_shapes(robot)
     assert len(shapes) == len(robot.links) + 2
     size = reach(robot)
@@ -79,7 +79,7 @@ def test_frames_equal_the_traced_link_poses(robot: Robot) -> None:
 
 
 def test_bodies_lie_along_a_and_d(kr180: Robot) -> None:
-    """The third link runs 1.6 m along x from the joint before it, the fourth 2.6 m along z."""
+    """The third link extends 1.6 m along x from the previous joint, the fourth 2.6 m along z."""
     for row, axis, length in ((3, 0, 1.6), (4, 2, 2.6)):
         corners = np.concatenate([b.mesh.corners.reshape(-1, 3) for b in robot_bodies(kr180) if b.row == row])
         assert corners[:, axis].min() == pytest.approx(-length, abs=0.35)
@@ -88,7 +88,7 @@ def test_bodies_lie_along_a_and_d(kr180: Robot) -> None:
         assert np.abs(others).max() < 0.6
 
 
-def test_a_links_own_geometry_is_drawn_instead() -> None:
+def test_the_geometry_of_a_link_replaces_the_default_bodies() -> None:
     own = (Box(size=(0.1, 0.1, 0.1)),)
     robot = Robot(
         name="own", links=(Link(name="a", joint=Revolute(), after=transl(1, 0, 0), mass=1.0, geometry=own),)
@@ -96,7 +96,7 @@ def test_a_links_own_geometry_is_drawn_instead() -> None:
     assert robot_shapes(robot)[1] == own
 
 
-def test_a_sliding_joint_runs_on_a_rail_as_long_as_its_range() -> None:
+def test_a_prismatic_joint_has_a_rail_as_long_as_its_range() -> None:
     links = [
         standard_dh("column", d=0.5),
         standard_dh("slide", sigma=1, limits=JointLimits(position=(0.0, 2.0))),

@@ -20,7 +20,7 @@ def refused(text: str):
     return pytest.raises(RobotError, match=re.escape(text))
 
 
-def test_tree_must_be_one():
+def test_links_must_form_a_tree():
     with refused("robot 'arm': it has no links. Allowed: 1 link or more"):
         make()
     with refused("robot 'arm': it has 1001 links. Allowed: at most 1000"):
@@ -39,7 +39,7 @@ def test_tree_must_be_one():
         make(Link(name="a", parent="a"))
 
 
-def test_a_thousand_links_are_taken():
+def test_a_thousand_links_are_accepted():
     links = [Link(name=str(i), parent=str(i - 1) if i else None) for i in range(1000)]
     assert make(*reversed(links)).n == 1000
 
@@ -64,7 +64,7 @@ def test_a_thousand_links_are_taken():
         ({"dh": DhRow(d=np.nan)}, "D-H d is nan"),
     ],
 )
-def test_numbers_that_are_not_finite_are_named(changes: dict[str, object], field: str):
+def test_errors_for_non_finite_numbers_name_the_field(changes: dict[str, object], field: str):
     with refused(f"robot 'arm', link 'l': {field}. Allowed: a finite number"):
         make(replace(Link(name="l"), **changes))
 
@@ -105,7 +105,7 @@ def test_frames_and_gravity_must_be_finite():
         (replace(standard_dh("l", a=1.0), joint=Prismatic()), "the D-H row disagrees"),
     ],
 )
-def test_contradictions_in_a_link_are_named(link: Link, text: str):
+def test_inconsistent_links_are_refused(link: Link, text: str):
     with refused(f"robot 'arm', link 'l': {text}"):
         make(link)
 
@@ -114,14 +114,14 @@ def test_contradictions_in_a_link_are_named(link: Link, text: str):
     "motor",
     [Motor(viscous_friction=-1e-3), Motor(coulomb_friction=(-0.1, -0.1)), Motor(coulomb_friction=(0.1, 0.1))],
 )
-def test_friction_that_drives_is_warned_of(motor: Motor):
+def test_driving_friction_issues_a_warning(motor: Motor):
     with pytest.warns(
         ArmblocksWarning, match="robot 'arm', link 'l': friction accelerates the joint instead"
     ):
         make(Link(name="l", motor=motor))
 
 
-def test_sound_friction_is_not_warned_of():
+def test_dissipative_friction_issues_no_warning():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         make(Link(name="l", motor=Motor(viscous_friction=1e-3, coulomb_friction=(0.1, -0.2))))

@@ -1,4 +1,4 @@
-"""Descriptions are values: equal and hashable by content, arrays in, tuples inside."""
+"""Descriptions are values: equal and hashable by content; arrays are converted to tuples."""
 
 from dataclasses import FrozenInstanceError, replace
 
@@ -23,7 +23,7 @@ from armblocks.spatial import Transform, transl
 from robots_for_tests import build_puma560
 
 
-def test_equal_content_is_equal_and_hashes_alike():
+def test_equal_content_is_equal_and_has_equal_hashes():
     one, two = build_puma560(), build_puma560()
     assert one == two
     assert hash(one) == hash(two)
@@ -59,7 +59,7 @@ def test_arrays_become_tuples():
     np.testing.assert_array_equal(link.r, (1, 2, 3))
 
 
-def test_inertia_in_three_forms():
+def test_inertia_is_accepted_in_three_forms():
     assert inertia_matrix((1, 2, 3)) == inertia_matrix(np.diag((1, 2, 3)))
     assert inertia_matrix((1, 2, 3, 4, 5, 6)) == ((1, 4, 6), (4, 2, 5), (6, 5, 3))
     with pytest.raises(
@@ -70,7 +70,7 @@ def test_inertia_in_three_forms():
         inertia_matrix([[1, 2, 0], [0, 1, 0], [0, 0, 1]], link="l")
 
 
-def test_motor_takes_one_or_two_coulomb_numbers():
+def test_a_motor_has_one_or_two_coulomb_friction_values():
     assert Motor(coulomb_friction=(0.3, -0.2)).coulomb_friction == (0.3, -0.2)
     assert Motor(inertia=2e-3, gear_ratio=-10).reflected_inertia == pytest.approx(0.2)
     with pytest.raises(RobotError, match="the Coulomb friction of a motor has 3 numbers"):
@@ -119,7 +119,7 @@ def test_nofriction_keeps_the_rotors(puma560: Robot):
     assert puma560.nofriction(coulomb=False).motors[0].coulomb_friction == (0.395, -0.435)
 
 
-def test_pose_of_a_link_is_before_motion_after():
+def test_the_pose_of_a_link_is_the_product_before_motion_after():
     link = standard_dh("l", alpha=np.pi / 2, a=0.3, d=0.2, offset=0.1)
     expected = link.before @ link.joint.motion(0.5 + 0.1) @ link.after
     assert link.pose(0.5) == expected

@@ -1,4 +1,4 @@
-"""The numbered tree, and a joint type that only this file knows."""
+"""The numbered kinematic tree, and a joint type that is defined in this file."""
 
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -14,7 +14,7 @@ from robots_for_tests import evaluate, random_inertia, random_states, random_tra
 
 @dataclass(frozen=True, kw_only=True)
 class Screw(Joint):
-    """Turns and advances 5 cm a radian: what a newcomer's file would hold."""
+    """Rotates and advances 5 cm per radian, like a joint type in a user's file."""
 
     letter: ClassVar[str] = "H"
     unit: ClassVar[str] = "rad"
@@ -28,7 +28,7 @@ class Screw(Joint):
         return 0.05
 
 
-def test_bodies_are_numbered_parents_first_and_know_their_joint():
+def test_bodies_are_numbered_parents_first_and_refer_to_their_joint():
     robot = Robot(
         name="r",
         links=(
@@ -52,7 +52,7 @@ def test_bodies_are_numbered_parents_first_and_know_their_joint():
 @pytest.mark.parametrize(
     "axis", [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1), (0.6, 0, 0.8), (1, 2, 3)]
 )
-def test_any_axis_turns_as_described(axis: tuple[float, float, float]):
+def test_joints_move_about_or_along_any_axis(axis: tuple[float, float, float]):
     for kind in (Revolute, Prismatic, Screw):
         arm = Robot(name="arm", links=(Link(name="l", joint=kind(axis=axis, offset=0.3)),))
         expected = arm.links[0].pose(0.5).matrix
@@ -93,7 +93,7 @@ def test_a_new_joint_type_works_in_every_algorithm():
             assert_allclose(evaluate(screws, "jacob0", q)[:3, j], velocity, rtol=0, atol=1e-8)
 
 
-def test_gravity_is_told_in_base_axes(puma560: Robot):
+def test_gravity_of_the_tree_is_in_base_axes(puma560: Robot):
     T = random_transform(np.random.default_rng(3))
     tree = KinematicTree.of(replace(puma560, base=T))
     assert_allclose(tree.gravity, T.R.T @ (0, 0, -9.81), rtol=0, atol=1e-15)

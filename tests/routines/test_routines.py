@@ -1,4 +1,4 @@
-"""Routines mean in machine code what their structured form means in plain Python, and what Python means."""
+"""Routines give the same results in machine code, in the tree interpreter and in Python."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ CTYPES = {float: ctypes.c_double, int: ctypes.c_int64, list: ctypes.c_void_p, No
 
 
 def both(write: Callable[..., Any], *arguments: Any, result: type | None = None, lanes: int = 1) -> Any:
-    """Run a function in machine code and in the interpreter; gives what both give, lists written in place.
+    """Run a function in machine code and in the interpreter; return their equal results.
 
-    A list of tuples is an array of rows of lanes.
+    Lists are changed in place. A list of tuples is an array with one row of lanes for each tuple.
     """
     program = Program(lanes)
     program.define(write, "run", public=True)
@@ -57,7 +57,7 @@ def both(write: Callable[..., Any], *arguments: Any, result: type | None = None,
 
 
 def aligned(numbers: list[Any]) -> np.ndarray:
-    """The numbers as an array; rows of lanes lie at multiples of their size."""
+    """The numbers as an array; rows of lanes are aligned to their size."""
     if not isinstance(numbers[0], tuple):
         return np.array(numbers, dtype=type(numbers[0]))
     lanes = len(numbers[0])
@@ -68,7 +68,7 @@ def aligned(numbers: list[Any]) -> np.ndarray:
     return array
 
 
-def test_arithmetic_is_that_of_doubles() -> None:
+def test_arithmetic_equals_that_of_python_floats() -> None:
     def run(r: Routine, a: Real, b: Real, out: Reals) -> None:
         values = [
             a + b,
@@ -133,7 +133,7 @@ def test_integers_wrap_around_and_divide_toward_zero() -> None:
 
 
 @pytest.mark.parametrize("lanes", [1, 2, 4, 8])
-def test_lanes_compute_apart_and_share_control_flow(lanes: int) -> None:
+def test_lanes_compute_independently_and_share_control_flow(lanes: int) -> None:
     """The larger of ``x`` and its reciprocal, doubled until no lane is below 10 (at most 20 times)."""
 
     def run(r: Routine, x: LaneArray, one: Real, out: LaneArray) -> Integer:
@@ -164,7 +164,7 @@ def test_lanes_compute_apart_and_share_control_flow(lanes: int) -> None:
 
 
 @pytest.mark.parametrize("n", [0, 1, UNROLL, UNROLL + 1, 30])
-def test_each_counts_the_same_written_out_and_as_a_loop(n: int) -> None:
+def test_unrolled_and_looped_iterations_are_equal(n: int) -> None:
     def run(r: Routine, x: Reals, y: Reals) -> Real:
         total = r.real(0.0)
         for i in r.each(n):
@@ -178,8 +178,8 @@ def test_each_counts_the_same_written_out_and_as_a_loop(n: int) -> None:
     assert y[:n] == [2.0 * value for value in x[:n]]
 
 
-def test_a_loop_is_left_and_repeated_from_inside() -> None:
-    """Numbers up to ``n`` without those that 3 divides, until their sum passes 100."""
+def test_break_and_continue_in_a_loop() -> None:
+    """Sum the numbers up to ``n`` that are not divisible by 3, until the sum exceeds 100."""
 
     def run(r: Routine, n: Integer) -> Integer:
         total, k = r.integer(0), r.integer(0)
@@ -202,7 +202,7 @@ def test_a_loop_is_left_and_repeated_from_inside() -> None:
         assert both(run, n, result=int) == total
 
 
-def test_parts_nest_and_an_outer_one_is_left_from_an_inner_one() -> None:
+def test_an_outer_region_is_left_from_a_nested_one() -> None:
     def run(r: Routine, x: Reals, wanted: Real) -> Integer:
         place = r.integer(-1)
         with r.part() as search:
@@ -222,7 +222,7 @@ def test_parts_nest_and_an_outer_one_is_left_from_an_inner_one() -> None:
     assert [both(run, x, wanted, result=int) for wanted in (5.0, -2.0, 9.0, 8.0)] == [1, 200, -20, 8]
 
 
-def test_stages_are_entered_at_any_of_them_and_follow_one_another() -> None:
+def test_stages_can_be_entered_at_each_stage_and_continue_with_the_next() -> None:
     def run(r: Routine, first: Integer, out: Integers) -> None:
         count = r.integer(0)
 
@@ -275,7 +275,7 @@ def test_functions_call_one_another_and_read_tables() -> None:
     assert x == [10.0, 100.0, 100.0]
 
 
-def test_functions_that_stand_elsewhere_are_called_by_their_names() -> None:
+def test_external_functions_are_called_by_name() -> None:
     @external
     def derivative(r: Routine, t: Real, x: Reals) -> Real: ...
 
@@ -289,7 +289,7 @@ def test_functions_that_stand_elsewhere_are_called_by_their_names() -> None:
     assert "call double @derivative(double %v" in definitions(program)["run"]
 
 
-def test_functions_have_several_results_and_rare_cases() -> None:
+def test_functions_have_several_results_and_rarely_taken_branches() -> None:
     def run(r: Routine, x: Real, n: Integer, out: Reals) -> Integer:
         def parts(r: Routine, x: Real, n: Integer) -> tuple[Real, Integer, Boolean]:
             with r.when(x < 0.0, rarely=True):
@@ -306,8 +306,8 @@ def test_functions_have_several_results_and_rare_cases() -> None:
         assert out == [value]
 
 
-def test_functions_of_any_number_of_arrays_take_shares_of_the_work() -> None:
-    """Sums of three elements a turn, by steps, until the shared count of ``job`` is used up."""
+def test_functions_with_many_arrays_divide_the_work_by_a_shared_counter() -> None:
+    """Sum blocks of three elements until the shared counter in ``job`` reaches its end."""
 
     def run(r: Routine, job: Integers, out: Reals, x: Reals) -> Integer:
         def add(r: Routine, start: Integer, *arrays: Reals) -> None:
@@ -329,7 +329,7 @@ def test_functions_of_any_number_of_arrays_take_shares_of_the_work() -> None:
 
 
 def test_fields_of_structures_are_read_by_their_offsets() -> None:
-    """The sum of a vector whose length stands in the upper half of a word, its start in the word before."""
+    """The sum of a vector: its length is in the upper half of a word, its address in the word before."""
 
     def run(r: Routine, structure: Address, out: Integers) -> Real:
         room = r.integer_room(3)
@@ -364,7 +364,7 @@ def test_fields_of_structures_are_read_by_their_offsets() -> None:
 
 
 def test_functions_are_called_by_their_addresses() -> None:
-    """C's ``int`` in and out, and a table of addresses that is filled in after loading."""
+    """Parameters and result of C's type ``int``, and a table of addresses that is filled after loading."""
 
     @external
     def scaled(r: Routine, x: Real, by: Int32) -> Int32: ...
@@ -402,7 +402,7 @@ def test_null_addresses_and_repeated_declarations() -> None:
     assert text["llvm.fabs.f64"] == "declare double @llvm.fabs.f64(double)"
 
 
-def test_python_does_not_decide_on_a_value_of_the_routine() -> None:
+def test_a_routine_value_as_a_python_condition_raises_an_error() -> None:
     def run(r: Routine, a: Real) -> Real:
         return -a if a > 0.0 else a
 
@@ -422,7 +422,7 @@ def test_otherwise_needs_a_when() -> None:
         Program().define(run)
 
 
-def test_a_loop_that_python_leaves_is_noticed() -> None:
+def test_a_python_break_in_a_routine_loop_raises_an_error() -> None:
     def run(r: Routine, n: Integer) -> None:
         for _ in r.range(0, n):
             break
@@ -432,7 +432,7 @@ def test_a_loop_that_python_leaves_is_noticed() -> None:
 
 
 @pytest.mark.parametrize("k", [2, 3, 5, 8])
-def test_inverse_root_is_right_to_the_last_place_over_all_magnitudes(k: int) -> None:
+def test_the_inverse_root_is_accurate_to_one_unit_in_the_last_place(k: int) -> None:
     def run(r: Routine, a: Real) -> Real:
         return inverse_root(a, k)
 
@@ -442,7 +442,7 @@ def test_inverse_root_is_right_to_the_last_place_over_all_magnitudes(k: int) -> 
     code = load_code(("inverse root test", text), lambda: text)
     root = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)(code.address("run"))
     numbers = np.concatenate([np.logspace(-300, 300, 601), np.random.default_rng(1).uniform(0.5, 20.0, 400)])
-    # In exact arithmetic, so that only the root itself is judged: one unit in its last place, k times.
+    # In exact arithmetic, so that only the error of the root counts: one unit in its last place, k times.
     worst = max(abs(Fraction(a) * Fraction(root(a)) ** k - 1) for a in numbers.tolist())
     assert worst < 1.5 * k * 2.0**-52
     for a in numbers[::97].tolist():

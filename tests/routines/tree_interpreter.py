@@ -1,8 +1,8 @@
-"""Runs the structured form of a routine in plain Python: the second opinion on its back ends.
+"""Executes the structured form of a routine in Python, as a reference for the back ends.
 
-Memory is lists of numbers; an address is a list and a place in it, which lies between two numbers where it
-counts halves of them, or a Python function. What has lanes is a tuple. A jump is an exception that the region
-around it catches.
+Memory consists of lists of numbers. An address is a list and a position in it (between two numbers if the
+position counts half words), or a Python function. A value with lanes is a tuple. A jump is an exception that
+the enclosing region catches.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ def _fma(a: float, b: float, c: float) -> float:
 
 
 class Interpreter:
-    """Calls functions of a program. ``functions`` are those that it only names, over lists of arguments."""
+    """Calls functions of a program. ``functions`` are its external functions, called with argument lists."""
 
     def __init__(self, program: Program, **functions: Callable[..., Any]) -> None:
         self.program = program

@@ -1,4 +1,4 @@
-"""The shipped diagrams of robots and machines against closed forms and integrations written here."""
+"""The shipped diagrams of robots and machines, compared with closed forms and separate integrations."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ BUILDERS = {build.__name__: build for build in SCRIPT_NAMES["BUILDERS"]}
 
 
 @pytest.mark.parametrize("name", BUILDERS)
-def test_the_file_is_what_the_script_builds(name: str) -> None:
+def test_example_files_equal_the_diagrams_of_the_script(name: str) -> None:
     assert ab.load_diagram(name) == BUILDERS[name]()
 
 
-def test_the_cell_is_what_the_script_builds_around_the_kr180() -> None:
+def test_the_robot_cell_file_equals_the_robot_of_the_script() -> None:
     assert ab.load_robot("kr180_cell").robot == SCRIPT_NAMES["kr180_cell"]()
 
 
-def test_dc_motor_sampled_pid_is_the_exact_recurrence() -> None:
-    """Between two ticks the motor is linear: x(k+1) = exp(A T) x(k) + what voltage and load add."""
+def test_dc_motor_sampled_pid_equals_the_exact_recurrence() -> None:
+    """Between two ticks the motor is linear: x(k+1) = exp(A T) x(k) + terms of voltage and load."""
     found = ab.simulate("dc_motor_sampled_pid", rtol=1e-10, atol=1e-12)
     R, L, k, J, b, T = 1.2, 5e-3, 0.25, 8e-3, 1e-3, 0.01
     A = np.array([[-R / L, -k / L, 1 / L, 0], [k / J, -b / J, 0, -1 / J], [0, 0, 0, 0], [0, 0, 0, 0]])
@@ -47,7 +47,7 @@ def test_dc_motor_sampled_pid_is_the_exact_recurrence() -> None:
         x = (step @ [*x, v, 0.5 if tick >= 200 else 0.0])[:2]
     np.testing.assert_allclose(found["motor/w"][::5], speeds, rtol=0, atol=1e-7)
     np.testing.assert_allclose(found["motor/i"][::5], currents, rtol=0, atol=1e-7)
-    # at rest of the error: the current carries friction and load, the voltage current and back-EMF
+    # in steady state the current balances friction and load, the voltage resistance and back-EMF
     i = (b * 100.0 + 0.5) / k
     assert found["motor/w"][-1] == pytest.approx(100.0, abs=0.02)
     assert found["motor/i"][-1] == pytest.approx(i, abs=0.01)
@@ -55,8 +55,9 @@ def test_dc_motor_sampled_pid_is_the_exact_recurrence() -> None:
     assert found["controller/y"].max() == 48.0
 
 
-def test_puma560_payload_drop_leaves_the_error_that_theory_says() -> None:
-    """At rest M(q) Kp e = the payload's gravity torque, by the mass matrix without it; then e dies out."""
+def test_puma560_payload_drop_has_the_theoretical_position_error() -> None:
+    """In steady state M(q) Kp e is the gravity torque of the payload, M(q) of the arm without payload; after
+    the drop e decays."""
     found = ab.simulate("puma560_payload_drop", rtol=1e-9, atol=1e-12)
     arm, error, t = ab.load_robot("puma560"), found["error/y"], found.time
     before = int(np.flatnonzero(t == 4.0)[0]) - 1
@@ -66,7 +67,7 @@ def test_puma560_payload_drop_leaves_the_error_that_theory_says() -> None:
     loaded = np.ravel(ab.dynamics.trace_rne_loaded(arm.robot)(q, zeros, zeros, zeros, payload)[0])
     expected = np.linalg.solve(arm.inertia(q), loaded - arm.gravload(q)) / 225.0
     assert np.abs(expected).max() > 0.01
-    # from 2.5 s to 4 s the loop's slowest root, 4 / s with the payload, has died out to exp(-6)
+    # from 2.5 s to 4 s the slowest mode of the loop, 4 / s with the payload, decays to exp(-6)
     np.testing.assert_allclose(error[before], expected, rtol=0, atol=2e-3 * np.abs(expected).max())
     # e'' + 30 e' + 225 e = 0 from the drop on, sampled at 1 ms
     since = t[t >= 4.0] - 4.0
@@ -81,11 +82,11 @@ def test_puma560_payload_drop_leaves_the_error_that_theory_says() -> None:
 
 
 CELL = 0.08
-"""m: edge of the cubes whose centres stand for the surface within them."""
+"""Edge length of the cubes whose centres represent the surface within them, m."""
 
 
 def surface_points(robot: Robot, gap: float) -> dict[int, np.ndarray]:
-    """Points by row of ``link_poses``, so that none of a body's surface is further than gap from one."""
+    """Points by row of ``link_poses`` such that every surface point is within ``gap`` of one of them."""
     rows: dict[int, list[np.ndarray]] = {}
     longest = gap - np.sqrt(3.0) / 2.0 * CELL
     for body in robot_bodies(robot):
@@ -106,11 +107,12 @@ def distance_to_box(points: np.ndarray, centre: np.ndarray, size: np.ndarray) ->
     return np.linalg.norm(np.maximum(np.abs(points - centre) - size / 2, 0.0), axis=-1)
 
 
-def test_kr180_pick_and_place_touches_nothing() -> None:
-    """Every body of the arm and the load keep clear of wall, pallets and floor: proved between samples too.
+def test_kr180_pick_and_place_has_no_collisions() -> None:
+    """All bodies of the arm and the load stay clear of wall, pallets and floor, also between samples.
 
-    The motion is looked at each 10 ms at points that leave no gap of more than 15 cm; a point that is further
-    away than that gap plus what it moves in half of 10 ms proves that nothing in between touches.
+    The motion is sampled every 10 ms, at surface points with gaps of at most 15 cm. A point whose distance
+    exceeds the gap plus its motion in 5 ms proves that no surface point near it collides before the next
+    sample.
     """
     gap, dt = 0.15, 0.01
     found = ab.simulate("kr180_pick_and_place", sample_time=dt)
@@ -149,8 +151,8 @@ def test_kr180_pick_and_place_touches_nothing() -> None:
     assert least["load", "wall"] < 1.0, "the wall is in the way of a straight path"
 
 
-def test_kr180_pick_and_place_sets_the_load_down_where_it_should() -> None:
-    """The load's lowest corner is 1 cm above the pallet where it is gripped and let go, and never lower."""
+def test_kr180_pick_and_place_puts_the_load_on_the_pallet() -> None:
+    """The lowest corner of the load is 1 cm above the pallet at grip and release, and never lower."""
     found = ab.simulate("kr180_pick_and_place", sample_time=0.005)
     cell, t = ab.load_robot("kr180_cell").robot, found.time
     tool = found["plot/poses"][:, -1]
@@ -163,13 +165,13 @@ def test_kr180_pick_and_place_sets_the_load_down_where_it_should() -> None:
         (box,) = cell.link(name).geometry
         centre = np.array(box.pose)[:2, 3]
         assert (np.abs(places[k, :, :2] - centre) < np.array(box.size[:2]) / 2).all()
-        assert not found["path/qd"][k].any(), "it rests where the load comes and goes"
+        assert not found["path/qd"][k].any(), "the arm is at rest at grip and release"
         np.testing.assert_allclose(tool[k, :3, 2], (0, 0, -1), atol=1e-12)
-        # the load's edges lie along those of the pallet
+        # the edges of the load are parallel to those of the pallet
         assert np.abs(tool[k, :2, :2]).max(axis=0) == pytest.approx(1.0, abs=1e-9)
 
 
-def test_kr180_pick_and_place_keeps_the_limits_and_feels_its_load() -> None:
+def test_kr180_pick_and_place_stays_within_limits_and_includes_the_load_torque() -> None:
     found = ab.simulate("kr180_pick_and_place")
     robot, t = ab.load_robot("kr180").robot, found.time
     q, qd = found["path/q"], found["path/qd"]
@@ -187,8 +189,8 @@ def test_kr180_pick_and_place_keeps_the_limits_and_feels_its_load() -> None:
     assert grip[1] == pytest.approx(60.0 * 9.81 * 1.6, rel=1e-9)
 
 
-def test_puma560_multirate_is_the_sampled_loops_written_out() -> None:
-    """Twenty ms by hand: position loop each 1 ms, current loop each 0.1 ms, DOP853 in between."""
+def test_puma560_multirate_equals_a_separate_simulation_of_its_loops() -> None:
+    """20 ms: position loop every 1 ms, current loop every 0.1 ms, DOP853 in between."""
     diagram = ab.load_diagram("puma560_multirate")
     arm = ab.load_robot("puma560").nofriction("coulomb")
     motors, path = diagram.blocks["motors"], diagram.blocks["path"]
@@ -219,20 +221,20 @@ def test_puma560_multirate_is_the_sampled_loops_written_out() -> None:
         x = solve_ivp(flow, (t, t + 1e-4), x, method="DOP853", rtol=1e-12, atol=1e-14).y[:, -1]
     q, qd, i = np.split(x, 3)
     result = ab.simulate(diagram, stop_time=0.02, rtol=1e-10, atol=1e-13)
-    # the windings' 1 ms time constant over 200 steps of 1e-10
+    # time constant of 1 ms of the windings, 200 steps with an error of 1e-10
     np.testing.assert_allclose(result["motors/i"][-1], i, rtol=0, atol=1e-9)
     np.testing.assert_allclose(result["arm/q"][-1], q, rtol=0, atol=1e-12)
     np.testing.assert_allclose(result["arm/qd"][-1], qd, rtol=0, atol=1e-10)
 
 
-def test_puma560_multirate_follows_its_path_and_rests_at_its_end() -> None:
-    """The held torque delays the loop by some 1 ms: the error stays small, and dies out after 4 s."""
+def test_puma560_multirate_follows_its_path_and_stops_at_its_end() -> None:
+    """The held torque delays the loop by about 1 ms: the error stays small and decays after 4 s."""
     result = ab.simulate("puma560_multirate")
     error = np.abs(result["position error/y"])
     assert error.max() < 1e-4
     assert error[-1].max() < 1e-9
     assert result.run.ticks == 100_001
-    # at rest the current holds gravity alone
+    # at rest the current balances gravity only
     arm = ab.load_robot("puma560")
     motors = ab.load_diagram("puma560_multirate").blocks["motors"]
     hold = arm.gravload(result["arm/q"][-1]) / (arm.robot.gear_ratios * np.array(motors.parameter_value("k")))

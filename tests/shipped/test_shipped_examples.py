@@ -1,4 +1,4 @@
-"""The shipped diagrams, run as a user runs them, against closed forms and other people's integrators."""
+"""The shipped diagrams compared with closed forms and other integrators."""
 
 from __future__ import annotations
 
@@ -31,21 +31,21 @@ def example(request: pytest.FixtureRequest) -> Diagram:
     return load_diagram(request.param, BLOCKS)
 
 
-def test_the_promised_examples_are_shipped() -> None:
+def test_the_documented_examples_are_shipped() -> None:
     assert set(list_examples()) >= PROMISED
 
 
-def test_example_is_named_as_its_file_and_every_block_is_placed(example: Diagram) -> None:
+def test_examples_have_the_name_of_their_file_and_all_blocks_are_placed(example: Diagram) -> None:
     assert example.name in list_examples()
     assert set(example.layout) == set(example.blocks)
-    assert diagram_views(example), "something is to be seen"
+    assert diagram_views(example), "no view"
 
 
-def test_what_an_example_shows_is_read_without_building_it(example: Diagram) -> None:
+def test_the_description_of_an_example_is_read_without_building_it(example: Diagram) -> None:
     assert example_descriptions()[example.name] == example.description
 
 
-def test_blocks_do_not_lie_on_one_another(example: Diagram) -> None:
+def test_blocks_do_not_overlap(example: Diagram) -> None:
     corners = sorted((place.x, place.y) for place in example.layout.values())
     for i, (x, y) in enumerate(corners):
         for other_x, other_y in corners[i + 1 :]:
@@ -83,8 +83,8 @@ PAPER = {
 }
 
 
-def test_kr180model_moves_as_computed_independently() -> None:
-    """Reference: a plain NumPy computation, printed to 12 digits; the promise is 1e-9 m."""
+def test_kr180model_agrees_with_a_separate_computation() -> None:
+    """Reference: a NumPy computation, printed to 12 digits; documented accuracy 1e-9 m."""
     result = ab.simulate("kr180model")
     for t, expected in PAPER.items():
         (i,) = np.flatnonzero(result.time == t)
@@ -104,7 +104,7 @@ PENDULUM = {
 
 
 def test_falling_pendulum_follows_the_elliptic_function() -> None:
-    """Exact: modulus sin(pi/4), period 4 K(1/2) / sqrt(9.81); rtol 1e-10 grows to some 1e-8 in 10 s."""
+    """Exact: modulus sin(pi/4), period 4 K(1/2) / sqrt(9.81); at rtol 1e-10 the error is 1e-8 after 10 s."""
     result = ab.simulate("falling_pendulum")
     for t, (x, z) in PENDULUM.items():
         (i,) = np.flatnonzero(result.time == t)
@@ -114,8 +114,8 @@ def test_falling_pendulum_follows_the_elliptic_function() -> None:
     np.testing.assert_allclose(energy, 0, atol=1e-6)
 
 
-def test_computed_torque_makes_the_error_obey_its_own_equation() -> None:
-    """The loop is e'' + 20 e' + 100 e = 0 with e(0) = -0.1: e = -0.1 (1 + 10 t) exp(-10 t)."""
+def test_the_computed_torque_error_obeys_its_linear_equation() -> None:
+    """The error obeys e'' + 20 e' + 100 e = 0 with e(0) = -0.1: e = -0.1 (1 + 10 t) exp(-10 t)."""
     result = ab.simulate("puma560_computed_torque")
     t = result.time[:, np.newaxis]
     exact = -0.1 * (1 + 10 * t) * np.exp(-10 * t)
@@ -131,12 +131,12 @@ def test_van_der_pol_with_pid_agrees_with_scipy() -> None:
     reference = solve_ivp(equations, (0, 100), [1, 0, 0], method="DOP853", rtol=1e-11, atol=1e-12)
     result = ab.simulate("van_der_pol_pid")
     found = [result["x1/y"][-1], result["x2/y"][-1]]
-    # 100 s on a limit cycle at rtol 1e-6: the phase has drifted by some 1e-5 s.
+    # 100 s on a limit cycle at rtol 1e-6: the phase error is about 1e-5 s.
     np.testing.assert_allclose(found, reference.y[:2, -1], atol=2e-4)
 
 
 def test_robertson_kinetics_agrees_with_published_values_and_radau() -> None:
-    """At 40 s and 400 s the values that CVODE's example program prints, to their four digits."""
+    """At 40 s and 400 s: the values printed by CVODE's example program, to their four digits."""
     result = ab.simulate("robertson_kinetics")
     for t, values in {40: (7.158e-1, 9.185e-6, 2.842e-1), 400: (4.505e-1, 3.223e-6, 5.495e-1)}.items():
         (i,) = np.flatnonzero(np.isclose(result.time, t, atol=1e-9))
@@ -153,17 +153,17 @@ def test_robertson_kinetics_agrees_with_published_values_and_radau() -> None:
     np.testing.assert_allclose(result["total"], 1.0, rtol=1e-13)
 
 
-def test_every_example_says_what_it_shows(example: Diagram) -> None:
+def test_every_example_has_a_description(example: Diagram) -> None:
     assert 10 <= len(example.description) <= 60
 
 
-def test_the_ball_bounces_at_the_published_times_and_then_lies_still() -> None:
+def test_the_ball_bounces_at_the_published_times_and_comes_to_rest() -> None:
     """Impacts and end of the FMI reference ball: h0 = 1 m, e = 0.7, g = 9.81 m/s2."""
     result = ab.simulate("bouncing_ball")
     t, x, dx = result.time, result["ball/x"], result["ball/dx"]
     for impact, before in ((0.451523640985731, 0.0), (1.08365673836575, 0.451523640985731)):
         after = int(np.searchsorted(t, impact))
-        # a recorded speed tells exactly when the flight began or will end
+        # the recorded speed determines the start and end of the flight exactly
         speed = 0.7 ** (1 if before == 0.0 else 2) * 9.81 * 0.451523640985731
         assert dx[after] == pytest.approx(speed - 9.81 * (t[after] - impact), abs=1e-8)
     rests = t > 2.55863396558581
@@ -173,7 +173,7 @@ def test_the_ball_bounces_at_the_published_times_and_then_lies_still() -> None:
     assert x.min() >= 0.0
 
 
-def test_the_mass_breaks_away_and_stops_with_its_known_period() -> None:
+def test_stick_slip_has_its_analytical_period() -> None:
     """m x'' = k (v t - x) - Fc from F = Fs: a slip takes 2 (pi - atan((Fs - Fc) w / (k v))) / w."""
     result = ab.simulate("stick_slip")
     w = np.sqrt(2.0)

@@ -1,4 +1,4 @@
-"""The shipped robots: complete, canonical, and what their sources say."""
+"""The shipped robots: complete, canonical, and equal to their published data."""
 
 from __future__ import annotations
 
@@ -25,41 +25,41 @@ def shipped(request: pytest.FixtureRequest) -> Robot:
     return load_robot(request.param)
 
 
-def test_the_promised_robots_are_shipped() -> None:
+def test_the_documented_robots_are_shipped() -> None:
     assert {"kr180", "puma560", "twolink", "planar3r"} <= set(list_robots())
 
 
-def test_file_is_canonical_and_follows_the_schema(shipped: Robot) -> None:
+def test_robot_files_are_canonical_and_follow_the_schema(shipped: Robot) -> None:
     text = (FOLDER / shipped.source / "robot.json").read_text(encoding="utf-8")
     document = json.loads(text)
     jsonschema.Draft202012Validator(json.loads(SCHEMA.read_text())).validate(document)
     notes = document.pop("notes")
-    assert len(notes) > 80, "the notes say where the numbers come from"
+    assert len(notes) > 80, "the notes state the source of the data"
     written = [line for line in text.splitlines() if not line.startswith('  "notes": ')]
-    # Without the notes the comma of the line before may be missing.
+    # Without the notes, the previous line may end without a comma.
     assert [line.rstrip(",") for line in written] == [
         line.rstrip(",") for line in write_robot(shipped).decode().splitlines()
     ]
 
 
-def test_robot_can_be_said_again_as_a_value(shipped: Robot) -> None:
+def test_a_robot_that_is_loaded_again_is_equal(shipped: Robot) -> None:
     assert load_robot(shipped.source) == shipped
     assert hash(replace(shipped, comment=shipped.comment)) == hash(shipped)
 
 
-def test_puma560_is_corkes_set(puma560: Robot) -> None:
-    """Against the same numbers written out in Python."""
+def test_puma560_has_the_parameters_of_corke(puma560: Robot) -> None:
+    """Comparison with the same numbers written in Python."""
     assert replace(load_robot("puma560"), name="puma560") == puma560
 
 
-def test_published_impossible_inertias_are_known() -> None:
+def test_links_with_impossible_published_inertias_are_found() -> None:
     found = {name: [finding.link for finding in inertia_findings(load_robot(name))] for name in list_robots()}
     assert found["kr180"] == found["puma560"] == ["link1", "link3"]
     assert found["twolink"] == found["planar3r"] == []
 
 
 def test_twolink_hangs_in_the_vertical_plane() -> None:
-    """Holding it out straight: 9.81 (0.5 + 1.5) N m at the shoulder, 9.81 0.5 N m at the elbow."""
+    """Static torques of the horizontal arm: 9.81 (0.5 + 1.5) N m (shoulder), 9.81 0.5 N m (elbow)."""
     arm = load_robot("twolink")
     np.testing.assert_allclose(evaluate(arm, "gravload", np.zeros(2)), [19.62, 4.905], rtol=1e-14)
     tip = evaluate(arm, "fkine", np.array([np.pi / 2, 0.0]))[:3, 3]
@@ -69,7 +69,7 @@ def test_twolink_hangs_in_the_vertical_plane() -> None:
     np.testing.assert_allclose(M, [[5 / 3 + 0.5, 1 / 3 + 0.25], [1 / 3 + 0.25, 1 / 3]], rtol=1e-14)
 
 
-def test_planar3r_feels_no_gravity() -> None:
+def test_planar3r_has_no_gravity_torques() -> None:
     arm = load_robot("planar3r")
     np.testing.assert_allclose(evaluate(arm, "gravload", np.array([0.1, 0.2, 0.3])), 0, atol=1e-15)
     tip = evaluate(arm, "fkine", np.array([0.0, np.pi / 2, -np.pi / 2]))[:3, 3]

@@ -8,7 +8,7 @@ from robots_for_tests import random_transform
 
 
 def cloud_inertia(points: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
-    """Mass, first and second moment of unit masses, straight from their definitions."""
+    """Mass, first and second moment of unit masses, computed from their definitions."""
     second = sum((p @ p) * np.eye(3) - np.outer(p, p) for p in points)
     return float(len(points)), points.sum(axis=0), second
 
@@ -22,7 +22,7 @@ def assert_is(inertia: RigidInertia, points: np.ndarray) -> None:
     assert_allclose(matrix, second, atol=1e-13)
 
 
-def test_moves_like_the_points_of_the_body():
+def test_transformed_inertia_equals_that_of_the_transformed_points():
     random = np.random.default_rng(1)
     points = random.normal(size=(5, 3))
     centre = points.mean(axis=0)

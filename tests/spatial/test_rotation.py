@@ -1,4 +1,4 @@
-"""Rotations: exact at quarter turns, and proper everywhere."""
+"""Rotations: exact at quarter turns, proper at all angles."""
 
 import math
 
@@ -31,18 +31,18 @@ def test_quarter_turns_are_exact(quarters: int):
 
 
 @given(ANGLES)
-def test_other_angles_are_the_library_functions(angle: float):
-    # Next to a quarter turn the exact value differs by the rounding of the angle itself.
+def test_other_angles_use_the_library_functions(angle: float):
+    # Near a quarter turn the exact value differs by the rounding error of the angle.
     assert cos_exact(angle) == pytest.approx(math.cos(angle), rel=0, abs=1e-13)
     assert sin_exact(angle) == pytest.approx(math.sin(angle), rel=0, abs=1e-13)
 
 
-def test_tiny_angles_are_not_zero():
+def test_tiny_angles_are_not_rounded_to_zero():
     assert sin_exact(1e-17) == 1e-17
 
 
 @given(ANGLES)
-def test_rotations_about_coordinate_axes_are_those_about_any_axis(angle: float):
+def test_rotations_about_coordinate_axes_equal_rotations_about_general_axes(angle: float):
     axes = {(1.0, 0.0, 0.0): rotation_x, (0.0, 1.0, 0.0): rotation_y, (0.0, 0.0, 1.0): rotation_z}
     for axis, rotation in axes.items():
         assert_allclose(rotation(angle), rotation_about(axis, angle), rtol=0, atol=1e-15)
@@ -60,7 +60,7 @@ def test_rotation_keeps_lengths_and_its_axis(angle: float, direction: tuple[floa
     assert np.trace(R) == pytest.approx(1 + 2 * math.cos(angle), abs=1e-13)
 
 
-def test_arrays_become_tuples_and_others_are_refused():
+def test_arrays_become_tuples_and_invalid_values_are_refused():
     assert vector3(np.array([[1], [2], [3]])) == (1.0, 2.0, 3.0)
     assert matrix3(np.eye(3)) == ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     with pytest.raises(InputError, match=r"there: 2 numbers are given\. Allowed: 3 numbers x y z"):

@@ -1,4 +1,4 @@
-"""Transforms form a group, are values, and say why a matrix is none."""
+"""Transforms form a group, are immutable values, and name the error of an invalid matrix."""
 
 import numpy as np
 import pytest
@@ -20,13 +20,13 @@ def test_composition_is_the_matrix_product():
     assert_allclose(A.apply((1.0, 2.0, 3.0)), (A.matrix @ (1, 2, 3, 1))[:3], rtol=0, atol=1e-15)
 
 
-def test_inverse_undoes():
+def test_a_transform_times_its_inverse_is_the_identity():
     assert_allclose((A @ A.inverse()).matrix, np.eye(4), rtol=0, atol=1e-15)
     assert Transform().is_identity
     assert not A.is_identity
 
 
-def test_is_a_value():
+def test_transforms_are_equal_and_hashable_by_content():
     again = Transform.from_matrix(A.matrix)
     assert again == A
     assert hash(again) == hash(A)
@@ -42,7 +42,7 @@ def test_quarter_turns_stay_exact_through_products():
     assert transl(1, 2, 3).p.tolist() == [1, 2, 3]
 
 
-def test_matrix_that_is_no_pose_is_refused():
+def test_a_matrix_that_is_not_a_pose_is_refused():
     with pytest.raises(InputError, match=r"a transform has shape \(3, 3\)\. Allowed: shape \(4, 4\)"):
         Transform.from_matrix(np.eye(3))
     with pytest.raises(InputError, match=r"the last row of a transform is \[0.0, 0.0, 0.0, 2.0\]"):
@@ -55,7 +55,7 @@ def test_matrix_that_is_no_pose_is_refused():
         Transform(rotation=np.diag((1, 1, -1)))
 
 
-def test_roll_pitch_yaw_build_the_rotation_again_and_are_those_of_the_symbols():
+def test_roll_pitch_yaw_reproduce_the_rotation_and_equal_the_symbolic_angles():
     turns = [random_transform(RANDOM) for _ in range(40)]
     turns += [
         trotz(yaw) @ troty(pitch) @ trotx(0.3) for yaw in (-2.0, 0.4) for pitch in (np.pi / 2, -np.pi / 2)

@@ -1,4 +1,4 @@
-"""The quintic against the toolbox's own coefficients, and as numbers against symbols."""
+"""The quintic, compared with the formula of the toolbox, and numbers compared with symbols."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ T = np.array(4.0)
 
 
 def toolbox_jtraj(t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """jtraj as its manual gives it: powers of normalised time."""
+    """jtraj according to its manual: powers of normalised time."""
     s = (t / T)[:, None]
     rise = QF - Q0
     A = 6 * rise - 3 * (QD1 + QD0) * T
@@ -28,12 +28,12 @@ def toolbox_jtraj(t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return q, qd, qdd
 
 
-def test_equals_the_toolbox_formula():
+def test_the_quintic_equals_the_toolbox_formula():
     t = np.linspace(0, 4, 41)
     motion = Quintic(q0=Q0, qf=QF, tmax=T, qd0=QD0, qd1=QD1).at(t)
     for ours, theirs in zip(motion, toolbox_jtraj(t)):
         assert ours.shape == (41, 3)
-        # Two orders of the same sums of terms up to 60: a few hundred roundings.
+        # Sums of terms up to 60 in two orders: a few hundred rounding errors.
         assert_allclose(ours, theirs, rtol=0, atol=1e-13)
 
 
@@ -49,14 +49,14 @@ def test_rates_at_both_ends_are_exact():
 
 
 @pytest.mark.parametrize(("t", "stand"), [(-1.0, Q0), (5.0, QF)])
-def test_stands_still_outside_the_interval(t: float, stand: np.ndarray):
+def test_the_trajectory_is_at_rest_outside_the_interval(t: float, stand: np.ndarray):
     motion = Quintic(q0=Q0, qf=QF, tmax=T, qd0=QD0, qd1=QD1).at(np.array(t))
     assert_allclose(motion.q, stand, rtol=1e-15)
     assert_array_equal(motion.qd, np.zeros(3))
     assert_array_equal(motion.qdd, np.zeros(3))
 
 
-def test_symbols_give_the_numbers_and_rates_are_derivatives():
+def test_symbolic_evaluation_equals_numbers_and_rates_are_derivatives():
     t = SX.sym("t")
     motion = Quintic(q0=SX(Q0), qf=SX(QF), tmax=SX(T), qd0=SX(QD0), qd1=SX(QD1)).at(t)
     f = Function("f", [t], [*motion, jacobian(motion.q, t), jacobian(motion.qd, t)])
