@@ -65,7 +65,7 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 def prepare_browser() -> None:
     """Check that a browser for the journeys through the studio exists; on Debian and Ubuntu, install one.
 
-    Exits with a message if there is none and none can be installed, so that the check is not skipped silently.
+    Exits with a message if no browser can be found or installed, so that the check is not skipped silently.
     """
     if any(shutil.which(name) for name in BROWSERS):
         return
