@@ -183,10 +183,11 @@ def expect_well_posed(case: Case, run: Signals) -> None:
     for name in sorted(case.reference.keys() & run.keys()):
         values = np.stack([neighbour[name] for neighbour in neighbours])
         least, most = values.min(axis=0), values.max(axis=0)
-        near = 1e-5 * (1.0 + np.abs(values).max(initial=0.0))
+        margins = 1e-5 * (1.0 + np.abs(values).max(initial=0.0)) + 10.0 * case.uncertainty[name]
+        near = margins.reshape(-1, *(1,) * (values.ndim - 2))
         beyond = (run[name] < least - near) | (run[name] > most + near)
         outside = outside or beyond.reshape(len(beyond), -1).any(axis=1).sum() > 2
-        differs = rows_of(run[name], case.reference[name]) > near
+        differs = rows_of(run[name], case.reference[name]) > margins
         row = int(np.argmax(differs)) if differs.any() else len(differs)
         if row <= first and row < len(differs):
             scatters = bool((most - least > near)[row].any())
