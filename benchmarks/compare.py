@@ -1,11 +1,11 @@
-"""Two or more checkouts beside each other, turn by turn: is a run, or a batch of a robot, slower than before?
+"""Compare the run times of two or more checkouts, measured in alternation.
 
     python benchmarks/compare.py OLD NEW [--turns 40] [--only multirate]
 
-``OLD`` and ``NEW`` are folders of checkouts. Each gets a process of its own, which compiles every model once.
-Then the processes work one after the other, some 20 ms each, turn by turn. Times are processor time (user and
-system, all threads), so that other work on the machine counts only by what it does to caches and clocks.
-Compare the smallest and the lower quartile; the ratio is the old one over the new one, above 1 is faster.
+``OLD`` and ``NEW`` are folders of checkouts. Each has its own process, which compiles every model once. The
+processes then work in alternation, about 20 ms each. Times are processor time (user and system, all threads),
+so that other load on the machine affects them only through caches and clock frequency. Compare the minimum
+and the lower quartile; the ratio is old over new, so above 1 the new one is faster.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ TURN_SECONDS = 0.02
 
 
 def five_blocks() -> ab.Diagram:
-    """A second-order system. What is imported is the checkout's, in the process that measures it."""
+    """A second-order system. The imports are those of the measured checkout."""
     import armblocks as ab
     from armblocks.blocks import Gain, Integrator, Step, Sum
 
@@ -42,7 +42,7 @@ def five_blocks() -> ab.Diagram:
 
 
 def works() -> dict[str, Callable[[], object]]:
-    """What is measured, by name; all of it compiled."""
+    """The measured functions by name, compiled."""
     import numpy as np
 
     import armblocks as ab
@@ -77,7 +77,7 @@ def works() -> dict[str, Callable[[], object]]:
 
 
 def serve() -> None:
-    """The process of one checkout: for each line with a name, one turn of that work."""
+    """The process of one checkout: measure one turn of each function named on standard input."""
     import armblocks
 
     found = works()
@@ -97,7 +97,7 @@ def serve() -> None:
 
 
 class Checkout:
-    """The process of a checkout, seen from outside."""
+    """The process of a checkout, as seen by the comparing process."""
 
     def __init__(self, folder: Path) -> None:
         command = [sys.executable, str(Path(__file__).resolve()), "--serve"]
@@ -108,7 +108,7 @@ class Checkout:
         self.place, self.names = self._answer()
 
     def turn(self, name: str) -> float:
-        """Seconds of one unit of the work, in one turn."""
+        """Return the seconds of one call, measured in one turn."""
         assert self._process.stdin is not None
         self._process.stdin.write(json.dumps(name) + "\n")
         self._process.stdin.flush()
@@ -131,7 +131,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("checkouts", nargs="*", type=Path)
     parser.add_argument("--turns", type=int, default=40)
-    parser.add_argument("--only", default="", help="names that hold this text")
+    parser.add_argument("--only", default="", help="names that contain this text")
     parser.add_argument("--serve", action="store_true", help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.serve:

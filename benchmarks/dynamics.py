@@ -1,4 +1,4 @@
-"""Robot kernels beside Pinocchio, in one process: batches, single calls, operation counts."""
+"""Robot kernels compared with Pinocchio in one process: batches, single calls, operation counts."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SINGLE = 2_000
 
 @dataclass(frozen=True)
 class Comparison:
-    """One row: what was done, the peer's time, ours, in seconds per evaluation."""
+    """One row: name, time of the other library, time of armblocks, in seconds per evaluation."""
 
     what: str
     peer: str
@@ -38,7 +38,7 @@ class Agreement:
 
 
 class Case:
-    """One robot, frictionless (Pinocchio has no friction), with the same random states for both."""
+    """One robot without friction (Pinocchio has none), with the same random states for both libraries."""
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -59,7 +59,7 @@ class Case:
         self.q, self.qd, self.qdd = draw
         self.tau = self.arm.rne(self.q, self.qd, self.qdd)
 
-    # ---- what Pinocchio gives for one state ------------------------------------------------------------
+    # ---- results of Pinocchio for one state ------------------------------------------------------------
     def tip_pose(self, q: np.ndarray) -> np.ndarray:
         pin.forwardKinematics(self.model, self.data, q)
         return pin.updateFramePlacement(self.model, self.data, self.tip).homogeneous
@@ -206,7 +206,7 @@ class Case:
 
 
 def share(case: Case, name: str, peak: float, repeats: int) -> list[str]:
-    """Operations of one kernel, its batch time per evaluation, its share of the arithmetic peak."""
+    """Operations of one kernel, its batch time per evaluation, and its fraction of the arithmetic peak."""
     kernel = getattr(case.arm, name)
     count = case.arm.operation_count(name)
     inputs = {

@@ -1,4 +1,4 @@
-"""How the benchmarks measure: repeats in turn, medians, and what machine it was."""
+"""Measurement: alternating repeats, medians, and a description of the machine."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 TURN_SECONDS = 0.03
-"""A turn repeats its work for about as long, so that a short work is not only met with the other's cache."""
+"""Duration of one turn, s; short functions are repeated, so that cold caches affect only the first call."""
 
 
 @dataclass(frozen=True)
 class Timing:
-    """Seconds of one unit of work, turn by turn."""
+    """Seconds per call in each turn."""
 
     turns: tuple[float, ...]
 
@@ -38,14 +38,14 @@ class Timing:
         return Timing(tuple(turn / count for turn in self.turns))
 
     def times_faster_than(self, other: Timing) -> float:
-        """Median of the ratios turn by turn: each pair was measured within the same fraction of a second."""
+        """Median of the ratios of the turns; both times of a ratio are from the same fraction of a second."""
         return statistics.median(b / a for a, b in zip(self.turns, other.turns, strict=True))
 
 
 def in_turn(
     works: Sequence[Callable[[], object]], repeats: int, warm: int = 1, turn_seconds: float = TURN_SECONDS
 ) -> list[Timing]:
-    """Time the works A B A B …, so that a drift of the machine hits all of them alike."""
+    """Time the functions in the order A B A B …, so that a drift of the machine affects all equally."""
     runs: list[int] = []
     for work in works:
         for _ in range(warm):
@@ -66,7 +66,7 @@ def in_turn(
 def process_in_turn(
     commands: Sequence[Sequence[str]], repeats: int, env: dict[str, str] | None = None
 ) -> list[Timing]:
-    """Wall time of whole processes, in turn."""
+    """Wall time of complete processes, in alternation."""
 
     def run(command: Sequence[str]) -> Callable[[], object]:
         return lambda: subprocess.run(
@@ -77,7 +77,7 @@ def process_in_turn(
 
 
 def reachable_peak() -> float:
-    """Multiplies and adds per second that one core reaches in a large matrix product (a fma is two)."""
+    """Multiplications and additions per second of one core in a large matrix product (a fma is two)."""
     n = 1024
     a, b = (np.random.default_rng(seed).standard_normal((n, n)) for seed in (0, 1))
     with threadpool_limits(1):
@@ -94,7 +94,7 @@ def cpu_name() -> str:
 
 
 def machine_lines(packages: Sequence[str]) -> list[str]:
-    """The machine and the versions, for the head of the table."""
+    """Description of the machine and the package versions, for the head of the results."""
     versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in packages)
     return [
         f"{cpu_name()}, {os.cpu_count()} cores, {platform.system()} {platform.release()}, "

@@ -1,9 +1,9 @@
-"""The paper's diagram beside Drake: the same signals, each in its own best form.
+"""The diagram of the paper compared with Drake: the same signals, each in the best form of its program.
 
 Drake: TrajectorySource, InverseDynamics and filters are native systems; forward kinematics is a Python leaf
 system around MultibodyPlant, because Drake has no native one. runge_kutta5, accuracy 1e-3, steps of at most
-10 ms, torque and filtered derivative logged each 10 ms. armblocks: the shipped example as it stands, 10 ms,
-all of its signals recorded; its derivatives are exact, so no filter state is integrated.
+10 ms, torque and filtered derivative logged every 10 ms. armblocks: the shipped example, 10 ms, all of its
+signals recorded; its derivatives are exact, so no filter state is integrated.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import armblocks as ab
 
 
 def drake_run() -> float:
-    """Build Drake's diagram once more and return the seconds that AdvanceTo(10 s) takes."""
+    """Build Drake's diagram and return the seconds of AdvanceTo(10 s)."""
     logging.getLogger("drake").setLevel(logging.ERROR)
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import MultibodyPlant
@@ -101,7 +101,7 @@ def drake_run() -> float:
 
 
 def compare(repeats: int) -> tuple[Timing, Timing]:
-    """Seconds for the 10 s run without compile: Drake's, and ours through the public ``simulate``."""
+    """Seconds of the 10 s run without compilation: Drake, and armblocks through the public ``simulate``."""
     diagram = ab.load_diagram("kr180model")
     ab.simulate(diagram)
     theirs: list[float] = []

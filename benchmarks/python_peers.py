@@ -1,23 +1,23 @@
-"""bdsim and PathSim, in a process and an environment of their own; `python python_peers.py` answers lines.
+"""Runs of bdsim and PathSim in a separate process and environment, controlled through standard input.
 
     python -m venv peers && peers/bin/pip install bdsim==1.4.0 pathsim==0.27.1 roboticstoolbox-python==1.5.0
     ARMBLOCKS_PEERS=peers/bin/python python benchmarks/run.py
 
-A line `TOOL MODEL` is answered by a JSON line: the seconds of the run alone, its steps and the end of its
-states. Every time the model is built anew; graphics and progress are off.
+For each line `TOOL MODEL` of the input, a JSON line is printed: the seconds of the run alone, its number of
+steps and its final states. The model is built again for each line; graphics and progress output are disabled.
 
 - `computed_torque`: Puma 560 without friction, quintic reference in 10 s, computed torque (KP 100, KD 20),
-  off by 0.1 rad at the start; Runge-Kutta 5(4), rtol 1e-6, atol 1e-8.
+  initial error 0.1 rad; Runge-Kutta 5(4), rtol 1e-6, atol 1e-8.
 - `van_der_pol`: the van der Pol oscillator under PI control with velocity feedback, 100 s, rtol 1e-6, atol
   1e-9, Runge-Kutta 5(4).
 - `five_blocks`: step, sum, gain, second-order plant of two integrators, 10 s; fixed steps of 1 ms, RK4.
 - `multirate`: the first 0.1 s of the shipped `puma560_multirate`: computed torque at 1 kHz (KP 900, KD 60)
   around PI control of the currents at 10 kHz, windings of six motors, the arm with viscous friction;
-  Runge-Kutta 5(4), rtol 1e-6, atol 1e-9. A sampled block of bdsim shows at a tick what it was given at the
-  one before, so that the P part takes back what the integral has already of this tick.
+    Runge-Kutta 5(4), rtol 1e-6, atol 1e-9. A sampled block of bdsim outputs at a tick its input of the
+    previous tick, so the P part is corrected by the contribution of this tick to the integral.
 """
 
-# The peers have no types.
+# bdsim and PathSim have no type annotations.
 # pyright: basic, reportMissingImports=false
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ KP, KD, T = 100.0, 20.0, 10.0
 
 
 class _MendedBdsim(MetaPathFinder):
-    """bdsim 1.4.0 cannot start beside roboticstoolbox 1.5.0: one line of it is mended while it is loaded."""
+    """Corrects one line of bdsim 1.4.0 at import, which otherwise fails with roboticstoolbox 1.5.0."""
 
     def find_spec(self, name: str, path: Sequence[str] | None, target: Any = None) -> Any:
         if name != "bdsim.run_sim":
@@ -51,7 +51,7 @@ class _MendedBdsim(MetaPathFinder):
 class _MendedSource(importlib.machinery.SourceFileLoader):
     def get_data(self, path: str) -> bytes:
         if not path.endswith(".py"):
-            raise OSError("compiled anew, because the source is mended")
+            raise OSError("compiled again, because the source is corrected")
         return super().get_data(path).replace(b'dict["type"].get', b'dict.get("type", {}).get')
 
 
@@ -126,7 +126,7 @@ def _bdsim_five_blocks(bd: Any) -> dict[str, Any]:
     bd.connect(gain, speed)
     bd.connect(speed, place, e[2])
     bd.connect(place, e[1])
-    # bdsim has SciPy's adaptive methods only; steps of at most 1 ms with loose tolerances are steps of 1 ms.
+    # bdsim has only SciPy's adaptive methods; loose tolerances and a maximum step of 1 ms give steps of 1 ms.
     return {"T": 10.0, "max_step": 1e-3, "solver_args": {"rtol": 1.0, "atol": 1.0, "first_step": 1e-3}}
 
 
@@ -251,7 +251,7 @@ PATHSIM: dict[str, Callable[[], tuple[Any, ...]]] = {
 
 def main() -> None:
     sys.meta_path.insert(0, _MendedBdsim())
-    answers, sys.stdout = sys.stdout, sys.stderr  # what the peers print is no answer
+    answers, sys.stdout = sys.stdout, sys.stderr  # other output goes to standard error
     for line in sys.stdin:
         tool, model = line.split()
         run = {"bdsim": bdsim_run, "pathsim": pathsim_run}[tool]

@@ -1,11 +1,11 @@
-"""Run every measure beside the peers and write RESULTS.md.
+"""Run all measurements in comparison with other programs and write RESULTS.md.
 
     python benchmarks/run.py [--quick]
         [--only dynamics,diagram,simulations,multirate,growth,stiff,startup,studio]
 
-Needs the ``test`` and ``benchmark`` extras (Pinocchio, Drake, bdsim, PathSim; the latter two in an
-environment of their own if you like, see `python_peers.py`). Peers and armblocks run in turn, in one run.
-With ``--only`` the sections of the other parts stay as they are; the new ones say their own date and load.
+Needs the extras ``test`` and ``benchmark`` (Pinocchio, Drake, bdsim, PathSim; the latter two optionally in a
+separate environment, see `python_peers.py`). armblocks and the other programs run in alternation. With
+``--only`` the other sections of the file are unchanged; the new ones state their date and load.
 """
 
 # pyright: basic
@@ -191,7 +191,7 @@ PARTS = {
 
 
 def replaced(text: str, section: Sequence[str]) -> str:
-    """``text`` with the section of that heading replaced, or added."""
+    """Return ``text`` with the section of that heading replaced or added."""
     parts = text.split("\n## ")
     heading = section[0].removeprefix("## ")
     body = "\n".join([heading, *section[1:]]).rstrip() + "\n"

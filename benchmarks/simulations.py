@@ -1,14 +1,15 @@
-"""Whole simulations beside Drake, bdsim and PathSim, and how diagrams of many blocks grow.
+"""Complete simulations compared with Drake, bdsim and PathSim, and run times of diagrams of many blocks.
 
-Computed torque: the shipped `puma560_computed_torque`; bdsim does the same with Robotics Toolbox blocks (its
-inverse dynamics in C), Drake with InverseDynamicsController, TrajectorySource and MultibodyPlant, all native.
-Van der Pol: the shipped `van_der_pol_pid`, 100 s; in Drake the plant is a SymbolicVectorSystem. All runs are
-adaptive, of order 5, at rtol 1e-6 (Drake: accuracy 1e-6), without compile; ours record 1001 and 2001 instants
-of all signals. Five blocks: step, sum, gain and two integrators, 10 s in steps of 1 ms; RK4 but for bdsim,
-which has only SciPy's adaptive methods and is held to steps of 1 ms of 5(4), and Drake (runge_kutta3, fixed).
-Multirate: the shipped `puma560_multirate`, 10 s, 100 000 ticks; bdsim would take minutes, so it runs the
-first 0.1 s, 1000 ticks, and its time is multiplied by 100. Ends are compared at 0.1 s; where both clocks
-tick, bdsim's current loop sees the new torque one tick later.
+Computed torque: the shipped `puma560_computed_torque`; bdsim uses Robotics Toolbox blocks (its inverse
+dynamics in C), Drake InverseDynamicsController, TrajectorySource and MultibodyPlant, all native. Van der Pol:
+the shipped `van_der_pol_pid`, 100 s; in Drake the plant is a SymbolicVectorSystem. All runs use adaptive
+methods of order 5 at rtol 1e-6 (Drake: accuracy 1e-6), without compilation; armblocks records 1001 and 2001
+instants of all signals. Five blocks: step, sum, gain and two integrators, 10 s in steps of 1 ms; RK4, except
+for bdsim, which has only SciPy's adaptive methods (5(4) with a maximum step of 1 ms), and Drake
+(runge_kutta3, fixed).
+Multirate: the shipped `puma560_multirate`, 10 s, 100 000 ticks; bdsim would need minutes, so it runs the
+first 0.1 s, 1000 ticks, and its time is multiplied by 100. The states at 0.1 s are compared; where both
+clocks tick, bdsim's current loop reads the new torque one tick later.
 """
 
 # Drake's stubs do not fit what its functions take.
@@ -41,7 +42,7 @@ QF = np.array([0.5, 0.9, -0.8, 0.6, -0.4, 1.0])
 
 @dataclass(frozen=True)
 class Run:
-    """One run of one tool: seconds without compile, steps, and the values it ends with."""
+    """One run of one program: seconds without compilation, steps, and final values."""
 
     seconds: float
     steps: int
@@ -56,7 +57,7 @@ class Row:
     ours: Timing
     target: float
     difference: float
-    """Largest difference of the ends of both."""
+    """Largest difference of the final values."""
 
     @property
     def ratio(self) -> float:
@@ -64,7 +65,7 @@ class Row:
 
 
 class PythonPeers:
-    """bdsim and PathSim in their own process: see `python_peers.py`."""
+    """bdsim and PathSim in a separate process; see `python_peers.py`."""
 
     def __init__(self) -> None:
         python = os.environ.get("ARMBLOCKS_PEERS", sys.executable)
@@ -82,7 +83,7 @@ class PythonPeers:
         self._process.stdin.flush()
         line = self._process.stdout.readline()
         if not line:
-            raise SystemExit("bdsim and PathSim are not there: see benchmarks/python_peers.py")
+            raise SystemExit("bdsim and PathSim are not installed: see benchmarks/python_peers.py")
         return Run(**json.loads(line))
 
     def close(self) -> None:
@@ -231,8 +232,8 @@ FIXED = {"stop_time": 10.0, "step": 1e-3, "solver": "rk4", "sample_time": 0.01}
 
 @dataclass(frozen=True)
 class Peer:
-    """Another tool's run of the same model. ``ends``: which of its values are compared; ``times``: how many
-    times its run is as long as what it stands for."""
+    """Another program's run of the same model. ``ends``: the compared final values; ``times``: factor by
+    which its run time is multiplied."""
 
     name: str
     run: Callable[[], Run]
@@ -243,8 +244,8 @@ class Peer:
 
 @dataclass(frozen=True)
 class Case:
-    """A model: our run, signals whose ends are compared, the peers; ``compared``: the run to compare, if
-    not the one that is timed."""
+    """A model: run of armblocks, compared signals, other programs; ``compared``: the run whose values are
+    compared, if it differs from the timed one."""
 
     what: str
     ours: Callable[[], ab.SimulationResult]
@@ -306,7 +307,7 @@ def cases(peers: PythonPeers) -> dict[str, list[Case]]:
 
 
 def rows(group: str, repeats: int) -> list[Row]:
-    """Every comparison of a group, turn by turn: A B C A B C …"""
+    """Every comparison of a group, in the order A B C A B C …"""
     logging.getLogger("drake").setLevel(logging.ERROR)
     peers = PythonPeers()
     found: list[Row] = []

@@ -1,4 +1,4 @@
-"""What a user waits for at the start: import, first result, the whole report."""
+"""Start-up times: import, first result, complete report."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ FIRST_RNE = "import armblocks as ab; arm = ab.load_robot('puma560'); arm.rne([0]
 
 
 def imports(repeats: int) -> tuple[Timing, Timing]:
-    """Whole processes: ``import numpy``, and the same with ``armblocks`` on top."""
+    """Complete processes: ``import numpy``, and the same with ``armblocks``."""
     numpy, armblocks = process_in_turn(
         [[PYTHON, "-c", "import numpy"], [PYTHON, "-c", "import numpy, armblocks"]], repeats
     )
@@ -21,7 +21,7 @@ def imports(repeats: int) -> tuple[Timing, Timing]:
 
 
 def first_result(repeats: int) -> tuple[Timing, Timing]:
-    """Process start → first rne of the Puma: with an empty cache each time, and with a warm one."""
+    """Process start to first rne of the Puma: with an empty cache each time, and with a filled one."""
     cold = []
     for _ in range(repeats):
         with tempfile.TemporaryDirectory() as folder:
@@ -32,14 +32,14 @@ def first_result(repeats: int) -> tuple[Timing, Timing]:
 
 
 def first_use(folder: str) -> float:
-    """Seconds of one process that finds its cache empty."""
+    """Seconds of one process with an empty cache."""
     begin = time.perf_counter()
     subprocess.run([PYTHON, "-c", FIRST_RNE], check=True, env={**os.environ, "ARMBLOCKS_CACHE_DIR": folder})
     return time.perf_counter() - begin
 
 
 def whole_report(repeats: int) -> Timing:
-    """``armblocks run kr180model`` with all figures, from process start to the end, caches warm."""
+    """``armblocks run kr180model`` with all figures, from process start to the end, with filled caches."""
     with tempfile.TemporaryDirectory() as folder:
         command = [PYTHON, "-m", "armblocks", "run", "kr180model", "--out", f"{folder}/report"]
         [timing] = process_in_turn([command], repeats)

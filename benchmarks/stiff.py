@@ -1,12 +1,12 @@
-"""Stiff problems, beside SciPy's implicit solvers and SUNDIALS.
+"""Stiff problems compared with SciPy's implicit solvers and SUNDIALS.
 
     python benchmarks/stiff.py [--quick]
 
-All get the exact Jacobian: SciPy as a function (sparse where the problem is), CVODES inside CasADi by
-CasADi's own differentiation and with its own sparse linear solver, all in C. scikit-sundae's CVODE, if it is
-installed, calls back into Python for the rates, which are this package's compiled ones. The error is the
-largest relative one at the end, beside `rodas5p` at 1e-11 (its own agrees with Radau at 1e-10 to 8 digits or
-more). Wall time is that of a run without compile, the best of the turns.
+All solvers use the exact Jacobian: SciPy as a function (sparse if the problem is), CVODES in CasADi by
+CasADi's differentiation and with its sparse linear solver, all in C. scikit-sundae's CVODE, if it is
+installed, calls Python for the derivatives, which are the compiled ones of this package. The error is the
+largest relative error at the end, with `rodas5p` at 1e-11 as reference (which agrees with Radau at 1e-10 to 8
+digits or more). Wall time is that of a run without compilation, the minimum of the turns.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ RTOL = 1e-6
 
 @dataclass(frozen=True, kw_only=True)
 class Problem:
-    """``y' = rates(y)`` from ``start`` to ``stop`` s; ``atol`` is that of all solvers at ``RTOL``."""
+    """``y' = rates(y)`` from ``start`` to ``stop`` s; all solvers use ``atol`` and ``RTOL``."""
 
     name: str
     rates: Callable[[ca.SX], ca.SX]
@@ -110,7 +110,7 @@ def compiled(problem: Problem) -> CompiledSystem:
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """One solver on one problem. ``seconds`` of the best turn."""
+    """One solver on one problem; ``seconds`` is the minimum of the turns."""
 
     solver: str
     steps: int
@@ -119,7 +119,7 @@ class Outcome:
 
 
 Solve = Callable[[], tuple[np.ndarray, int]]
-"""Gives the end and the count of steps."""
+"""Returns the final state and the number of steps."""
 
 
 def ours(system: CompiledSystem, problem: Problem, solver: str, rtol: float = RTOL) -> Solve:
@@ -139,7 +139,7 @@ def ours(system: CompiledSystem, problem: Problem, solver: str, rtol: float = RT
 
 
 def python_functions(problem: Problem) -> tuple[Callable[..., Any], Callable[..., Any]]:
-    """Rates and Jacobian as CasADi's own virtual machine gives them to Python."""
+    """Derivatives and Jacobian as Python functions, evaluated by CasADi's virtual machine."""
     y = ca.SX.sym("y", problem.start.size)
     rates = problem.rates(y)
     f, J = ca.Function("f", [y], [rates]), ca.Function("J", [y], [ca.jacobian(rates, y)])
@@ -207,7 +207,7 @@ def sundaes(system: CompiledSystem, problem: Problem) -> Solve | None:
 
 
 def outcomes(problem: Problem, repeats: int) -> list[Outcome]:
-    """All solvers on one problem, in turn."""
+    """All solvers on one problem, in alternation."""
     system = compiled(problem)
     reference, _ = ours(system, problem, "rodas5p", 1e-11)()
     solvers: dict[str, Solve | None] = {
@@ -225,7 +225,7 @@ def outcomes(problem: Problem, repeats: int) -> list[Outcome]:
     for turn in range(repeats + 1):
         for name, solve in present.items():
             if turn > 2 and best[name] > 0.5:
-                continue  # slow enough to be known
+                continue  # too slow to be repeated
             started = time.perf_counter()
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
@@ -245,7 +245,7 @@ def outcomes(problem: Problem, repeats: int) -> list[Outcome]:
 
 
 def stiff_part(repeats: int) -> list[str]:
-    """A table for each problem, as Markdown."""
+    """One table for each problem, as Markdown."""
     lines = ["## Stiff systems", "", f"At rtol {RTOL:g}.", ""]
     lines += ["| problem | solver | steps | error | time | beside rodas5p |", "|---|---|---|---|---|---|"]
     for problem in PROBLEMS:

@@ -1,11 +1,10 @@
-"""The studio as its user meets it: a real server, and a real browser without a screen.
+"""The studio measured end to end: a real server and a real headless browser.
 
-What is measured: from the command to a page with its model; from Ctrl+Enter to the first samples on the
-screen and to all of them; loading and editing 1000 blocks; typing while 16 channels arrive at 10
-kHz; what the first page weighs; and 20 sessions on one server. Instants inside the page are taken by the page
-itself.
+Measured: start of the command to a page with its model; Ctrl+Enter to the first samples on the screen and to
+all of them; loading and editing 1000 blocks; typing while 16 channels arrive at 10 kHz; size of the first
+download; and 20 sessions on one server. Times inside the page are measured by the page.
 
-Chromium draws here with its software renderer, on the same cores that simulate.
+Chromium renders in software here, on the same cores that simulate.
 """
 
 # pyright: basic
@@ -75,10 +74,10 @@ FIRST_AND_LAST = """() => new Promise((done) => {
 
 @contextmanager
 def served(folder: str, model: str) -> Iterator[tuple[str, float]]:
-    """The login link of a studio, and the seconds until it was printed."""
+    """Yield the login link of a studio, and the seconds until it was printed."""
     begin = time.perf_counter()
     environment = {**os.environ, "COLUMNS": "300"}
-    environment.pop("PYTHONDONTWRITEBYTECODE", None)  # an installation has its bytecode
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)  # an installed package has bytecode
     process = subprocess.Popen(
         [sys.executable, "-m", "armblocks", "studio", model, "--no-browser", "--folder", folder],
         stdout=subprocess.PIPE,
@@ -111,14 +110,14 @@ def page_of(browser: Browser) -> Iterator[Page]:
 
 
 def until(page: Page, expression: str) -> None:
-    """Until a JavaScript expression is true; looked at with every picture that the page draws."""
+    """Wait until a JavaScript expression is true; it is evaluated in every animation frame."""
     look = f"() => (({expression}) ? done() : requestAnimationFrame(look))"
     page.evaluate(f"() => new Promise((done) => {{ const look = {look}; look() }})")
 
 
 @contextmanager
 def opened(browser: Browser, model: str, hear: Callable | None = None) -> Iterator[Page]:
-    """The page of a studio of its own that shows a shipped model; ``hear`` gets every answer."""
+    """Open a page of a separate studio with a shipped model; ``hear`` receives every reply."""
     with (
         tempfile.TemporaryDirectory() as folder,
         served(folder, model) as (link, _),
@@ -132,7 +131,7 @@ def opened(browser: Browser, model: str, hear: Callable | None = None) -> Iterat
 
 
 def start(browser: Browser) -> float:
-    """Seconds from the command to the page that shows its model, with a browser that is open already."""
+    """Seconds from the command to the page with its model, in an open browser."""
     with tempfile.TemporaryDirectory() as folder, page_of(browser) as page:
         begin = time.perf_counter()
         with served(folder, "kr180model") as (link, _):
@@ -143,21 +142,21 @@ def start(browser: Browser) -> float:
 
 
 def run_times(browser: Browser, repeats: int) -> list[tuple[float, float, float]]:
-    """Seconds to the first samples on the screen, to all of them, and until the first came to the page.
+    """Seconds to the first samples on the screen, to all of them, and to the arrival of the first ones.
 
-    Run after run of one page; the first run is not counted.
+    Repeated runs in one page; the first run is discarded.
     """
     with opened(browser, "kr180model") as page:
         page.locator(".robot canvas").wait_for()
         found = []
         for _ in range(repeats + 1):
-            page.wait_for_timeout(1500)  # the next worker gets ready, as between two runs of a user
+            page.wait_for_timeout(1500)  # the next worker starts, as between two runs of a user
             found.append(tuple(milliseconds / 1e3 for milliseconds in page.evaluate(FIRST_AND_LAST)))
         return found[1:]
 
 
 def many_blocks(folder: str) -> str:
-    """A model of 1000 blocks in chains of 25, arranged by itself."""
+    """A model of 1000 blocks in chains of 25, with automatic layout."""
     builder = ab.DiagramBuilder("thousand")
     for row in range(BLOCKS // 25):
         signal_ = builder.add(f"source {row}", kinds.SineWave())
@@ -170,7 +169,7 @@ def many_blocks(folder: str) -> str:
 
 
 def first_thousand(browser: Browser) -> float:
-    """Seconds from a studio that has just started to its first page, with 1000 blocks on it."""
+    """Seconds from a started studio to its first page, with 1000 blocks."""
     with (
         tempfile.TemporaryDirectory() as folder,
         served(folder, many_blocks(folder)) as (link, _),
@@ -184,7 +183,7 @@ def first_thousand(browser: Browser) -> float:
 
 
 def thousand(browser: Browser, repeats: int) -> tuple[float, list[float], list[float]]:
-    """Seconds to open 1000 blocks in a page that is open; to an edit's answer; to its picture."""
+    """Seconds to open 1000 blocks in an open page, to the reply to an edit, and to its drawing."""
     with tempfile.TemporaryDirectory() as folder:
         many_blocks(folder)
         with served(folder, "kr180model") as (link, _), page_of(browser) as page:
@@ -203,7 +202,7 @@ def thousand(browser: Browser, repeats: int) -> tuple[float, list[float], list[f
             page.locator('.react-flow__node[data-id="b 20 12"]').click()
             answers, pictures = [], []
             for k in range(2 * repeats):
-                # A nudge and its undo: one block moves, and the wires at it.
+                # Moving one block and its wires, and the undo of it.
                 key = ["ArrowRight", "Control+z"][k % 2]
                 page.evaluate("heard.length = 0; window.pressed = 0")
                 page.evaluate(
@@ -223,7 +222,7 @@ def thousand(browser: Browser, repeats: int) -> tuple[float, list[float], list[f
 
 
 def live(browser: Browser) -> tuple[int, int, list[float]]:
-    """Samples that came, samples expected, and seconds from keys to the next picture while they came."""
+    """Numbers of received and expected samples, and seconds from key presses to the next frame meanwhile."""
     builder = ab.DiagramBuilder(
         "live", settings=ab.SimulationOptions(stop_time=SECONDS, solver="rk4", sample_time=1 / RATE)
     )
@@ -254,7 +253,7 @@ def live(browser: Browser) -> tuple[int, int, list[float]]:
                 typed += 1
                 page.wait_for_timeout(150)
             came = page.evaluate("heard.reduce((sum, { count = 0 }) => sum + count, 0)")
-            # A key's event is listed from 16 ms on: what is not listed was quicker.
+            # Events are recorded from 16 ms on; unrecorded key presses were faster.
             keys = "latency.filter(({ name }) => name === 'keydown').map(({ duration }) => duration)"
             slow = page.evaluate(keys)
             found = [duration / 1e3 for duration in slow]
@@ -262,7 +261,7 @@ def live(browser: Browser) -> tuple[int, int, list[float]]:
 
 
 def download(browser: Browser) -> tuple[float, float, float]:
-    """kB, compressed: what the first page needs, its fonts, what comes later: 3-D, dialogs and scopes."""
+    """Compressed kB: code of the first page, its fonts, and deferred parts (3-D, dialogs, scopes)."""
     weights: dict[str, float] = {}
 
     def weigh(answer) -> None:
@@ -281,7 +280,7 @@ def download(browser: Browser) -> tuple[float, float, float]:
 
 
 async def session(uri: str, cookie: str, origin: str, ended: list[str], waits: list[float]) -> None:
-    """One user: opens a model of its own, runs it at real time, and edits all the while."""
+    """One user: opens a separate model, runs it in real time, and edits it during the run."""
     async with websockets.connect(
         uri, additional_headers={"Cookie": cookie}, origin=origin, max_size=None
     ) as socket:
@@ -335,7 +334,7 @@ async def session(uri: str, cookie: str, origin: str, ended: list[str], waits: l
 
 
 def sessions() -> tuple[list[str], list[float]]:
-    """How the runs of 20 sessions ended, and seconds of each answer to an edit."""
+    """The final states of the runs of 20 sessions, and the seconds of each reply to an edit."""
     ended: list[str] = []
     waits: list[float] = []
 

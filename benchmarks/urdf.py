@@ -1,4 +1,4 @@
-"""Write a serial armblocks robot as URDF, so that the peers compute with the same numbers."""
+"""Write a serial armblocks robot as URDF, so that other programs compute with the same numbers."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def _pose(T: np.ndarray) -> str:
 
 
 def _link(name: str, link: Link, after: np.ndarray) -> str:
-    """A URDF link frame is the joint frame: masses move there through the transform behind the joint."""
+    """A URDF link frame is the joint frame, so masses are moved by the constant transform after the joint."""
     R, p = after[:3, :3], after[:3, 3]
     centre = R @ np.asarray(link.centre_of_mass) + p
     inertia = R @ np.asarray(link.inertia) @ R.T
@@ -29,7 +29,7 @@ def _link(name: str, link: Link, after: np.ndarray) -> str:
 
 
 def to_urdf(robot: Robot) -> str:
-    """Links l1…, joints j1…, frame ``tip`` at the tool. Base and gravity stay with the caller."""
+    """Links l1…, joints j1…, frame ``tip`` at the tool. The caller sets base and gravity."""
     parts = [f'<robot name="{robot.name}">', '<link name="base"/>']
     behind, parent = np.eye(4), "base"
     for number, link in enumerate(robot.links, start=1):
