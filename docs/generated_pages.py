@@ -14,6 +14,7 @@ from robot_pages import robots_page
 import armblocks as ab
 from armblocks.drawing import diagram_picture
 from armblocks.integration.butcher_tableau import ButcherTableau
+from armblocks.matlab.functions import TABLE
 from armblocks.pictures.svg import svg_inline
 from armblocks.simulation.tableaux import TABLEAUX
 
@@ -24,6 +25,7 @@ def write_generated_pages(folder: Path) -> None:
         "examples.md": examples_page(),
         "robots.md": robots_page(),
         "solver-table.txt": solver_table(),
+        "function-tables.txt": function_tables(),
         "arm.txt": arm_page(),
         "public-names.txt": public_names(),
         "static/pictures.css": style_sheet(),
@@ -81,6 +83,20 @@ def public_names() -> str:
 def _first_sentence(thing: object) -> str:
     paragraph = inspect.cleandoc(thing.__doc__ or "").partition("\n\n")[0].replace("\n", " ")
     return re.split(r"(?<=[.:]) (?=[A-Z])|::$", paragraph)[0].rstrip(":")
+
+
+def function_tables() -> str:
+    """All functions and constants of formulas and scripts, one table a group."""
+    groups = dict.fromkeys(function.group for function in TABLE.values())
+    lines: list[str] = []
+    for group in groups:
+        lines += [f"### {group}", "", "| | |", "|---|---|"]
+        for name, function in TABLE.items():
+            if function.group == group:
+                call = f"{name}({function.arguments})" if function.most else name
+                lines.append(f"| `{call}` | {function.meaning} |")
+        lines.append("")
+    return "\n".join(lines)
 
 
 def solver_table() -> str:

@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from armblocks.blocks import Expression
-from armblocks.diagram.expression_language import Formula
 from armblocks.errors import ArmblocksError, DiagramError, InputError, UnknownNameError
+from armblocks.matlab.formula import Formula
 
 U = np.array([0.3, -1.2, 2.5])
 
@@ -75,7 +75,6 @@ def test_a_long_sum_does_not_exceed_the_nesting_limit() -> None:
         "[1, 2",
         "[u; 1]",
         "[1 2; 3 4]",
-        "u[1:2]",
         "u[0]",
         "u[4]",
         "u[u]",
@@ -85,7 +84,6 @@ def test_a_long_sum_does_not_exceed_the_nesting_limit() -> None:
         "1 < u < 3",
         "u @ u",
         "u // 2",
-        "u & 1",
         "1j",
         "True",
         "f'{u}'",
@@ -99,7 +97,7 @@ def test_a_long_sum_does_not_exceed_the_nesting_limit() -> None:
         "1e999",
         "9" * 400,
         "(" * 300 + "u" + ")" * 300,
-        "-" * 1000 + "u",
+        "~" * 1000 + "u",
         "u" * 5000,
         "\x00",
     ],
@@ -113,24 +111,31 @@ def test_other_syntax_is_refused(formula: str) -> None:
 def test_messages_name_the_position_and_a_fix() -> None:
     with pytest.raises(
         InputError,
-        match=r"'sin\(u' is not a formula: .*Allowed: numbers, names.*correct the formula",
+        match=r"Expression.formula: '\(' is never closed, in column 4: sin‸\(u. Allowed: brackets in pairs",
     ):
         Expression(formula="sin(u")
+    with pytest.raises(
+        InputError, match=r"a value is expected, in column 4: u \+‸. Allowed: numbers.*correct the formula"
+    ):
+        Expression(formula="u +")
     with pytest.raises(DiagramError, match=r"block 'block' .*there is no name named 'v'"):
         evaluate(Expression(formula="v + u"), U)
     with pytest.raises(UnknownNameError, match=r"there is no function named 'sinn'.*did you mean 'sin'"):
         Formula("sinn(u)", "here").trace({})
     with pytest.raises(UnknownNameError, match=r"there is no name named 'gian'.*did you mean 'gain'"):
         Formula("gian", "here").trace({"gain": SX(1.0)})
-    with pytest.raises(DiagramError, match=r"'u\[4\]' does not exist. Allowed: u\[1\] to u\[3\]"):
+    with pytest.raises(
+        DiagramError,
+        match=r"index 4 is not possible here, in column 2: u‸\[4\]. Allowed: u\(1\) to",
+    ):
         evaluate(Expression(formula="u[4]"), U)
-    with pytest.raises(DiagramError, match=r"'u\[u\]' has no constant index"):
+    with pytest.raises(DiagramError, match=r"'u' has no constant index"):
         evaluate(Expression(formula="u[u]"), U)
-    with pytest.raises(DiagramError, match=r"atan2 has 1 arguments. Allowed: 2"):
+    with pytest.raises(DiagramError, match=r"atan2 is called with 1 argument, .*Allowed: 2"):
         evaluate(Expression(formula="atan2(u)"), U)
     with pytest.raises(DiagramError, match=r"the function 'sin' has no arguments"):
         evaluate(Expression(formula="sin"), U)
-    with pytest.raises(InputError, match=r"'u @ u' is not allowed in a formula"):
+    with pytest.raises(InputError, match=r"function handles \('@'\) are not supported"):
         evaluate(Expression(formula="u @ u"), U)
     with pytest.raises(DiagramError, match=r"vectors of 2 and 3 elements are combined"):
         evaluate(Expression(formula="u1 + u2", inputs=2), U, [1.0, 2.0])
@@ -138,8 +143,8 @@ def test_messages_name_the_position_and_a_fix() -> None:
         evaluate(Expression(), np.eye(2))
     with pytest.raises(InputError, match=r"the formula has 5000 characters. Allowed: at most 4000"):
         Expression(formula="u" * 5000)
-    with pytest.raises(InputError, match=r"the formula is nested too deeply"):
-        Formula("-" * 200 + "u", "here").trace({"u": SX(1.0)})
+    with pytest.raises(InputError, match=r"the expression is nested too deeply"):
+        Formula("~" * 300 + "u", "here").trace({"u": SX(1.0)})
     with pytest.raises(InputError, match=r"is too large a number"):
         Formula("1e999", "here").trace({})
     with pytest.raises(InputError, match=r"'t' cannot be the name of a constant"):

@@ -54,7 +54,7 @@ HOSTILE: dict[str, tuple[str | bytes, str]] = {
     "a name with a slash": (document({"a/b": block("Constant")}), "'/'"),
     "code in a formula": (
         document({"c": block("Clock"), "f": block("Expression", formula="open('x','w')")}, "c/y -> f/u"),
-        "formula",
+        "no function named 'open'",
     ),
     "code in a file": (
         document({"c": block("Clock"), "f": block("PythonFunction", function="evil.py:f")}, "c/y -> f/u"),

@@ -120,7 +120,7 @@ DIAGRAMS: list[tuple[str, Callable[[ab.DiagramBuilder], None], str]] = [
     ("a name with a right-to-left mark", named("a\u202eb"), r"contains '\u202e'"),
     ("a name of 10 000 characters", named("a" * 10_000), "has 10000 characters"),
     ("an empty name", named(" "), "a block has an empty name"),
-    ("a formula that is code", code, "is not a formula"),
+    ("a formula that is code", code, "no function named '__import__'"),
     ("101 nested subsystems", deep, "subsystems are nested more than 100 levels deep"),
     ("2^60 blocks", doubled_sixty_times, f"Allowed: at most {MOST_BLOCKS}"),
 ]

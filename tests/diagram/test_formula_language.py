@@ -56,6 +56,18 @@ def value(text: str, rule: Parameter = ANY_ARRAY) -> object:
         ("[]", []),
         ("if(k > 1, v, -v)", [1, 2, 3]),
         ("!(k < 1) && on", 1),
+        ("A(1, 2) + A(3) + v(end)", 7),
+        ("v(2:end)", [2, 3]),
+        ("A(:, 2)", [2, 4]),
+        ("v([3 1])", [3, 1]),
+        ("1:n", [1, 2, 3]),
+        ("[1 2\n3 4]", [[1, 2], [3, 4]]),
+        ("A.T - A'", [[0, 0], [0, 0]]),
+        ("A.^2", [[1, 4], [9, 16]]),
+        ("(v == 2) | (v > 2) & on", [0, 1, 1]),
+        ("k*...\n  n # product", 6),
+        ("(k\n+ n)", 5),
+        ("\n k \n", 2),
     ],
 )
 def test_values_are_those_of_linear_algebra(text: str, expected: object) -> None:
@@ -77,6 +89,7 @@ def test_values_are_those_of_linear_algebra(text: str, expected: object) -> None
         "k.T.__class__",
         "exec(k)",
         "v[-1]",
+        "v % 2",
     ],
 )
 def test_code_is_no_formula(text: str) -> None:
@@ -89,21 +102,34 @@ def test_code_is_no_formula(text: str) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("[1 2", r"a bracket '\[' is not closed.*one '\]' for each"),
-        ("[" * 40 + "]" * 40, "brackets are nested too deeply"),
+        ("[1 2", r"'\[' is never closed, in column 1: ‸\[1 2.*add '\]'"),
+        ("[" * 80 + "]" * 80, "lies too deep in other brackets"),
         ("[1 2; 3]", "the rows of an array have 2, 1 numbers"),
         ("[A 1]", "a matrix is inside brackets"),
         ("A*v", "a matrix of 2 x 2 is multiplied by one of 3 x 1.*as many columns"),
         ("A + v", "arrays of 2 x 2 and 3 x 1 numbers are combined"),
         ("A^2", "powers of matrices are not supported"),
         ("v/A", r"the divisor is a matrix.*inv\(A\)"),
-        ("A[1]", r"'A\[1\]' is an element of a matrix"),
+        ("A[5]", r"the index 5 is not possible here, in column 2: A‸\[5\].*Allowed: A\(1\) to A\(4\)"),
+        ("A(1, 2, 3)", "3 indices are given"),
+        ("v(k/3)", "the index 0.666667 is not possible"),
         ("inv([1 2 3; 4 5 6])", "a 2 x 3 matrix has no inverse"),
         ("eye(1.5)", "eye: 1.5 is not a number of elements"),
-        ("zeros(1000, 1000)", "1e.06 is not a number of elements"),
-        ("eye(1, 2)", "eye: 2 numbers are given"),
+        ("zeros(1000, 1000)", r"zeros: an array would have 1e\+06 elements; the most are 100000"),
+        ("eye(1, 2, 3)", "eye is called with 3 arguments.*Allowed: 0 to 2"),
         ("[0:0:1]", "a range: the steps do not lead"),
-        ("eye(v)", "the size of an array made by eye is not constant"),
+        ("eye(v)", "eye: 3 numbers are given as a size"),
+        ("{1}", "a cell array is no number"),
+        ("v{1}", "cell arrays are not supported in formulas"),
+        ("v.mass", "a number has no field 'mass'"),
+        ("k + 'deg'", "the text 'deg' is no number"),
+        ("k % 2", r"'%' starts a comment in MATLAB.*write mod\(a, b\)"),
+        ("k = 2", r"'=' is not understood here, in column 3: k ‸= 2.*compare with '=='"),
+        ("k if on else n", r"'if' is not understood here.*write if\(condition, yes, no\)"),
+        ("k; n", r"';' is not understood here"),
+        ("3i", "'3i' is an imaginary number"),
+        ("2*(k +\n* n)", r"'\*' is not understood here, expected a value, in line 2, column 1: ‸\* n"),
+        ("a = @sin", "function handles"),
         ("word*2", "'word' is str, which is not a number.*write word alone"),
     ],
 )
@@ -130,4 +156,6 @@ def test_kinds_follow_the_parameter() -> None:
         value("2.5", rule(ParameterKind.INTEGER))
     with pytest.raises(UnknownNameError, match=r"there is no mask parameter named 'kk'.*did you mean 'k'"):
         value("2*kk")
+    with pytest.raises(UnknownNameError, match=r"function or mask parameter named 'sni'.*mean 'sin'"):
+        value("sni(k)")
     assert formula_names("sin(2*pi*k) + v(1) + [a b]") == {"k", "v", "a", "b"}

@@ -188,7 +188,11 @@ def mistakes() -> list[tuple[object, type[Exception], str]]:
             "block 'block' .Constant., parameter 'value': there is no "
             "mask parameter named 'gian'.*did you mean 'gain'",
         ),
-        (add(lambda: Gain(gain=formula("2*"))), InputError, "'2.*' is not a formula"),
+        (
+            add(lambda: Gain(gain=formula("2*"))),
+            InputError,
+            "the formula ends where a value is expected",
+        ),
         (
             add(lambda: Ramp(start=formula("[gain gain]"))),
             DiagramError,

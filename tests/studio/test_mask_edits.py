@@ -14,9 +14,9 @@ from test_studio_hub import Told, talk
 import armblocks as ab
 from armblocks.blocks import BLOCKS, Constant, Gain, Scope
 from armblocks.diagram import Diagram, DiagramBlock, DiagramBuilder, formula
-from armblocks.diagram.expression_language import Formula
 from armblocks.errors import ArmblocksError, DiagramError, InputError, UnknownNameError
 from armblocks.formats import diagram_from_bytes, diagram_to_bytes, load_diagram, load_robot
+from armblocks.matlab.formula import Formula
 from armblocks.studio.protocol.messages.sheet_edits import BreakLink, MaskParameter, SetMask, SetParameters
 from armblocks.studio.sheet.document import Document
 from armblocks.studio.sheet.mask_edits import mask_of, renamed_in
@@ -142,7 +142,7 @@ def test_removing_a_parameter_that_a_formula_reads_is_refused(document: Document
         ([declared("k", was="nothing")], "unknown mask parameter|no mask parameter"),
         ([declared("k", was="k"), declared("k")], "declared twice"),
         ([declared("2k", was="k")], "cannot be the name"),
-        ([declared("k", "++", was="k")], "not a formula|no value"),
+        ([declared("k", "++", was="k")], "the formula ends where a value is expected"),
         ([declared("k", "maybe", was="k", kind="boolean")], "the value is 'maybe'"),
         ([declared("k", was="k"), declared("mode", "c", kind="choice", choices=["a", "b"])], "one of a, b"),
     ],

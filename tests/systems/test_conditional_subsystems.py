@@ -465,7 +465,7 @@ def test_wrong_conditions_and_merges_are_refused() -> None:
     with pytest.raises(DiagramError, match="'c/y', which is not an output of a conditional subsystem"):
         builder.add("merge", Merge(inputs=1), builder.add("c", Clock()))
         builder.build()
-    with pytest.raises(InputError, match="is not a formula"):
+    with pytest.raises(InputError, match="the formula ends where a value is expected"):
         If(expressions="u >")
     with pytest.raises(DiagramError, match="the condition 'u > 0' has 2 values"):
         builder = DiagramBuilder("if")

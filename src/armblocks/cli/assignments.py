@@ -1,7 +1,7 @@
 """The grammar of ``--set block.parameter=value``: parsed, never evaluated by Python.
 
 The parameter follows the last dot before ``=``. A value is a formula of numbers
-(:mod:`armblocks.diagram.expression_language`), ``2``, ``3*pi/4`` or ``[1 2; 3 4]``; a row without brackets,
+(:mod:`armblocks.matlab.formula`), ``2``, ``3*pi/4`` or ``[1 2; 3 4]``; a row without brackets,
 ``1,2,3``; ``true`` or ``false``; or a text in quotes, or a single word.
 """
 

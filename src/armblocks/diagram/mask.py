@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import dataclasses
 import keyword
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, cast
@@ -22,17 +22,16 @@ from typing import Any, cast
 import numpy as np
 from casadi import SX, evalf
 
-from armblocks.diagram.expression_language import Formula
-from armblocks.diagram.formula_functions import CONSTANTS, FUNCTIONS, MAKERS, MATRIX_FUNCTIONS
 from armblocks.diagram.parameter import Parameter, ParameterKind, Value, kind_of
 from armblocks.errors import InputError, UnknownNameError
+from armblocks.matlab.formula import Formula
+from armblocks.matlab.functions import RESERVED, TABLE
 
 Scope = Mapping[str, Value]
 """The scope of a formula: the values of a mask by name."""
 
 _NUMBERS = (ParameterKind.NUMBER, ParameterKind.ARRAY, ParameterKind.INTEGER, ParameterKind.BOOLEAN)
 _KINDS = (*_NUMBERS, ParameterKind.CHOICE, ParameterKind.STRING, ParameterKind.ROBOT)
-_RESERVED = frozenset((*CONSTANTS, *FUNCTIONS, *MATRIX_FUNCTIONS, *MAKERS))
 LONGEST = 100_000
 """Maximum number of characters of a formula as a parameter value, which may be a table."""
 
@@ -51,7 +50,7 @@ def formula(text: str) -> Any:
     """A formula of mask parameters as the value of a block parameter: ``Gain(gain=formula("2*k"))``.
 
     It may use the parameters that the enclosing diagram declares, ``pi``, ``e``, ``deg``, arrays ``[1 2; 3
-    4]``, and the functions of :mod:`armblocks.diagram.formula_functions`. Raises ``InputError`` where the
+    4]``, and the functions of :mod:`armblocks.matlab.functions`. Raises ``InputError`` where the
     text is not a formula.
     """
     _parsed(text, "")
@@ -77,7 +76,7 @@ def checked_mask(mask: Sequence[Parameter], where: str) -> tuple[Parameter, ...]
     found: list[Parameter] = []
     for rule in mask:
         name = rule.name
-        if not name.isidentifier() or keyword.iskeyword(name) or name in _RESERVED:
+        if not name.isidentifier() or keyword.iskeyword(name) or name in RESERVED:
             raise InputError(
                 f"'{name}' cannot be the name of a mask parameter",
                 where=where,
@@ -108,8 +107,16 @@ def checked_mask(mask: Sequence[Parameter], where: str) -> tuple[Parameter, ...]
 
 
 def formula_names(text: str, where: str = "") -> frozenset[str]:
-    """The parameters that a formula reads. Raises ``InputError`` where the text is not a formula."""
+    """The parameters that a formula needs. Raises ``InputError`` where the text is not a formula."""
     return _parsed(text, where).names
+
+
+def parameters_read(text: str, known: Iterable[str], where: str = "") -> frozenset[str]:
+    """The known parameters that a formula reads, including those that hide a function of the same name.
+
+    Raises ``InputError`` where the text is not a formula.
+    """
+    return _parsed(text, where).readable_names.intersection(known)
 
 
 def formula_number(text: str, where: str) -> float | list[Any]:
@@ -130,8 +137,11 @@ def formula_value(rule: Parameter, text: str, scope: Scope, where: str) -> Value
     place = f"{where}, parameter '{rule.name}'"
     found = _parsed(text, place)
     for name in sorted(found.names):
-        if name not in scope:
-            raise UnknownNameError("mask parameter", name, scope, where=place)
+        if name in scope:
+            continue
+        if name in found.unknown_functions:
+            raise UnknownNameError("function or mask parameter", name, {*scope, *TABLE}, where=place)
+        raise UnknownNameError("mask parameter", name, scope, where=place)
     bare = text.strip()
     if bare in scope:
         return rule.check(scope[bare], place)
@@ -142,7 +152,7 @@ def formula_value(rule: Parameter, text: str, scope: Scope, where: str) -> Value
             allowed="the name of a mask parameter, as the value is " + rule.describe(),
             fix="use the name of a mask parameter with such a value",
         )
-    used = tuple((name, scope[name]) for name in sorted(found.names))
+    used = tuple((name, scope[name]) for name in sorted(parameters_read(text, scope, place)))
     return rule.check(_of_kind(rule.kind, _evaluated(text, used, place)), place)
 
 

@@ -11,7 +11,7 @@ from armblocks.diagram.block import Block
 from armblocks.diagram.diagram import Diagram
 from armblocks.diagram.hierarchy import flat_diagram
 from armblocks.diagram.levels import joined, levels_of
-from armblocks.diagram.mask import as_symbols, formula_names, formula_symbols
+from armblocks.diagram.mask import as_symbols, formula_symbols, parameters_read
 from armblocks.diagram.parameter import Parameter, Value, shape_of
 from armblocks.diagram.structure import DiagramBlock
 from armblocks.equations import HybridSystem, Slot, substituted, unflatten
@@ -116,7 +116,7 @@ def _follow(path: str, level: Diagram, moved: Mapping[str, SX], found: Followers
     for name, block in level.blocks.items():
         inner: dict[str, SX] = {}
         for parameter, text in block.formulas:
-            if not formula_names(text) & set(moved):
+            if not parameters_read(text, moved):
                 continue
             if isinstance(block, DiagramBlock) and parameter in block.diagram.mask_values:
                 if as_symbols(block.diagram.mask_values[parameter]) is None:

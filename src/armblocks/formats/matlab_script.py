@@ -43,13 +43,13 @@ def read_script(
     # Here and not above: half of what loading a shipped robot would cost, without a script anywhere.
     from armblocks.formats.matlab.interpreter import Interpreter
     from armblocks.formats.matlab.page_layout import without_page_breaks
-    from armblocks.formats.matlab.parser import parse
     from armblocks.formats.matlab.records import RobotRecord
     from armblocks.formats.matlab.robot_records import finished_robot
-    from armblocks.formats.matlab.source import decode
+    from armblocks.formats.matlab.script_text import decode
+    from armblocks.matlab.statements import parse_script
 
     source, uncommented = without_page_breaks(decode(data, name))
-    statements = parse(source)
+    statements = parse_script(source)
     interpreter = Interpreter(source)
     interpreter.run(statements)
     if broken := sorted({*uncommented, *interpreter.joined_lines}):

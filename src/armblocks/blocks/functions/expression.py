@@ -21,9 +21,13 @@ from armblocks.diagram import (
     parameter,
     shape_of,
 )
-from armblocks.diagram.expression_language import CONSTANTS, FUNCTIONS, Formula
 from armblocks.diagram.signs import FaceSign, Words
 from armblocks.errors import InputError, UnknownNameError
+from armblocks.matlab.formula import Formula
+from armblocks.matlab.functions import RESERVED, TABLE
+
+_TAKEN = frozenset(name for name in RESERVED if TABLE[name].most == 0 or TABLE[name].elementwise)
+"""Names that no constant may have; a constant may hide a function of whole arrays, such as ``sum``."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +62,7 @@ class Expression(Block):
     def check(self) -> None:
         Formula(self.formula, "Expression.formula")
         names = self._names()
-        taken = {*CONSTANTS, *FUNCTIONS, "t", *(port.name for port in self.input_ports())}
+        taken = {*_TAKEN, "t", *(port.name for port in self.input_ports())}
         wrong = [name for name in names if not name.isidentifier() or name in taken or names.count(name) > 1]
         if wrong:
             raise InputError(

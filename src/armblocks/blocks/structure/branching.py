@@ -10,8 +10,8 @@ from casadi import SX, fabs, floor, if_else, logic_or, vertcat
 
 from armblocks.blocks.elementwise import numbered_ports
 from armblocks.diagram import Block, Guard, Port, Shapes, Signals, State, WorkedExample, made, parameter
-from armblocks.diagram.expression_language import Formula
 from armblocks.errors import InputError
+from armblocks.matlab.formula import Formula
 
 JUST = 1e-300
 """An offset below any signal resolution: it assigns the border itself to one side."""

@@ -1,6 +1,6 @@
-"""A safe interpreter of the MATLAB subset for straight-line robot scripts.
+"""Statements, links and robots of the toolbox's scripts, in the language of :mod:`armblocks.matlab`.
 
-``source`` (lines and places) → ``page_layout`` → ``lexer`` → ``parser`` (``syntax``) → ``interpreter``
-(``values``, ``functions``, ``records`` and the toolbox's objects). Nothing is evaluated by Python, and
-unsupported code is a ``FormatError`` with file, line and text.
+``script_text`` and ``page_layout`` (lines) → :mod:`armblocks.matlab` (statements) → ``interpreter``, with the
+``script_values`` of expressions (``values``, ``records`` and the toolbox's objects). Nothing is evaluated by
+Python, and unsupported code is a ``FormatError`` with file, line and text.
 """

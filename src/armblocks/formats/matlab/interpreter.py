@@ -2,59 +2,32 @@
 
 from __future__ import annotations
 
-import difflib
-import math
+from dataclasses import replace
 
 import numpy as np
 
-from armblocks.formats.matlab.functions import FUNCTIONS, call_function
-from armblocks.formats.matlab.lexer import COMMANDS
-from armblocks.formats.matlab.link_constructors import CONSTRUCTORS
 from armblocks.formats.matlab.link_fields import VECTORS, link_field, set_link_field
 from armblocks.formats.matlab.records import LinkRecord, RobotRecord
-from armblocks.formats.matlab.robot_records import make_robot, make_serial_link, robot_field, set_robot_field
-from armblocks.formats.matlab.source import Place, Source
-from armblocks.formats.matlab.syntax import (
+from armblocks.formats.matlab.robot_records import robot_field, set_robot_field
+from armblocks.formats.matlab.script_values import ScriptValues, single_index
+from armblocks.formats.matlab.values import MOST_LINKS, Cell, LinkArray, Value, copied
+from armblocks.matlab.arrays import Budget, empty, kind_of, number_of, with_element
+from armblocks.matlab.evaluation import Evaluator
+from armblocks.matlab.lexer import COMMANDS
+from armblocks.matlab.source import Place, Source
+from armblocks.matlab.syntax import (
     Assignment,
     Braces,
-    CellLiteral,
-    Chain,
     Command,
     Evaluation,
     Expression,
     Field,
     Matrix,
     Name,
-    Negative,
-    Number,
     Parentheses,
     Postfix,
-    Range,
     Statement,
-    Step,
     Target,
-    Text,
-    Transpose,
-)
-from armblocks.formats.matlab.values import (
-    MOST_ELEMENTS,
-    MOST_LINKS,
-    Array,
-    Budget,
-    Cell,
-    LinkArray,
-    Value,
-    array_of,
-    concatenate,
-    copied,
-    empty,
-    index_of,
-    kind_of,
-    number_of,
-    operate,
-    part_of,
-    scalar,
-    with_element,
 )
 
 QUIET = ("disp",)
@@ -72,11 +45,14 @@ class Interpreter:
         self.variables: dict[str, Value] = {}
         self.budget = Budget()
         self.joined_lines: list[int] = []
+        self._evaluator: Evaluator[Value] = Evaluator(
+            source, ScriptValues(self.budget, self.variables), self.variables
+        )
 
     def run(self, statements: tuple[Statement, ...]) -> None:
         """Execute all statements in order. Raises ``FormatError`` at the first that cannot be."""
         for statement in statements:
-            self.budget.spend(self.source.place(statement.line), 10)
+            self.budget.spend(self.source.place(statement.at), 10)
             match statement:
                 case Assignment():
                     self._assign(statement)
@@ -84,18 +60,18 @@ class Interpreter:
                     if (shown := self._evaluation(value)) is not None:
                         self.variables["ans"] = shown
                 case Command(words=words):
-                    self._command(self.source.place(statement.line), words)
+                    self._command(self.source.place(statement.at), words)
 
     # -- statements ----------------------------------------------------------------------------------------
 
     def _evaluation(self, value: Expression) -> Value | None:
         """An expression alone; ``None`` where it is a command in the form of a call."""
         match value:
-            case Postfix(base=Name(name=name), steps=(Parentheses(arguments=arguments),), line=line) if (
+            case Postfix(base=Name(name=name), steps=(Parentheses(arguments=arguments),), at=at) if (
                 name not in self.variables and name in (*COMMANDS, *QUIET)
             ):
-                place = self.source.place(line)
-                given = [self._value(argument) for argument in arguments]
+                place = self.source.place(at)
+                given = [self._evaluator.value(argument) for argument in arguments]
                 if name in COMMANDS:
                     words = [word if isinstance(word, str) else kind_of(word) for word in given]
                     self._command(place, (name, *words))
@@ -103,7 +79,7 @@ class Interpreter:
             case Name(name=name) if name in self.variables:
                 return None  # showing a variable does not set ans
             case _:
-                return copied(self._value(value))
+                return copied(self._evaluator.value(value))
 
     def _command(self, place: Place, words: tuple[str, ...]) -> None:
         if words[0] not in ("clear", "clearvars"):
@@ -118,12 +94,12 @@ class Interpreter:
             self.variables.pop(name, None)
 
     def _assign(self, statement: Assignment) -> None:
-        place = self.source.place(statement.line)
+        place = self.source.place(statement.at)
         last = statement.steps[-1] if statement.steps else None
         if isinstance(last, Field) and last.name in VECTORS and isinstance(statement.value, Matrix):
-            value = self._matrix(statement.value, joined=self._joined(statement.value))
+            value = self._evaluator.value(self._joined(statement.value))
         else:
-            value = self._value(statement.value)
+            value = self._evaluator.value(statement.value)
         kept = copied(value)
         old = self.variables.get(statement.name)
         if not statement.steps:
@@ -137,31 +113,31 @@ class Interpreter:
             )
         self.variables[statement.name] = self._stored(place, old, statement.steps, kept)
 
-    def _joined(self, matrix: Matrix) -> bool:
-        """Whether a vector was broken over two lines on a printed page.
+    def _joined(self, matrix: Matrix) -> Matrix:
+        """The matrix, as one row if it is a vector that was broken over two lines on a printed page.
 
         ``[ .13`` and ``.524 .539]`` on the next line are two rows to MATLAB, which refuses them as their
         lengths differ; where a field takes a vector, nothing else than one row can be meant. Three lines
         are left alone: they may be a triangle of a symmetric matrix.
         """
-        broken = matrix.broken and len(matrix.rows) == 2 and len(matrix.rows[0]) != len(matrix.rows[1])
-        if broken:
-            self.joined_lines.append(matrix.line)
-        return broken
+        if not matrix.broken or len(matrix.rows) != 2 or len(matrix.rows[0]) == len(matrix.rows[1]):
+            return matrix
+        self.joined_lines.append(matrix.at.line)
+        return replace(matrix, rows=((*matrix.rows[0], *matrix.rows[1]),))
 
     def _stored(self, place: Place, old: Value | None, steps: tuple[Target, ...], new: Value) -> Value:
         """``old`` with ``new`` put where ``steps`` lead: ``L{2}.r(1) = …``."""
         if not steps:
             return new
         step, rest = steps[0], steps[1:]
-        place = self.source.place(step.line)
+        place = self.source.place(step.at)
         match step:
             case Field(name=name):
                 return self._stored_field(place, old, name, rest, new)
             case Braces(arguments=arguments):
-                return self._stored_cell(place, old, [self._value(a) for a in arguments], rest, new)
+                return self._stored_cell(place, old, self._indices(old, arguments), rest, new)
             case Parentheses(arguments=arguments):
-                return self._stored_element(place, old, [self._value(a) for a in arguments], rest, new)
+                return self._stored_element(place, old, self._indices(old, arguments), rest, new)
 
     def _stored_field(
         self, place: Place, old: Value | None, name: str, rest: tuple[Target, ...], new: Value
@@ -194,7 +170,7 @@ class Interpreter:
             old = Cell()
         if not isinstance(old, Cell):
             raise place.error(f"{{}} is used on {kind_of(old)}", allowed="cell arrays")
-        index = self._single_index(place, indices, MOST_LINKS)
+        index = single_index(place, indices, MOST_LINKS)
         inner = old.elements[index] if index < len(old.elements) else None
         stored = self._stored(place, inner, rest, new)
         if isinstance(stored, Cell):
@@ -213,7 +189,7 @@ class Interpreter:
         if old is None or (isinstance(old, np.ndarray) and old.size == 0 and isinstance(new, LinkRecord)):
             old = LinkArray() if isinstance(new, LinkRecord) or rest else empty()
         if isinstance(old, LinkArray):
-            index = self._single_index(place, indices, MOST_LINKS)
+            index = single_index(place, indices, MOST_LINKS)
             inner = old.links[index] if index < len(old.links) else None
             stored = self._stored(place, inner, rest, new)
             if not isinstance(stored, LinkRecord):
@@ -226,162 +202,14 @@ class Interpreter:
             return with_element(place, old, indices, number_of(place, new, "what is assigned to an element"))
         raise place.error(f"() is used on {kind_of(old)}", allowed="matrices and arrays of links")
 
-    def _single_index(self, place: Place, indices: list[Value], most: int) -> int:
-        if len(indices) == 2 and number_of(place, indices[0], "an index") == 1:
-            indices = indices[1:]  # L{1, 3} of a row
-        if len(indices) != 1:
-            raise place.error(f"{len(indices)} indices are given", allowed="one index")
-        return index_of(place, indices[0], most)
-
-    # -- expressions ---------------------------------------------------------------------------------------
-
-    def _value(self, expression: Expression) -> Value:
-        match expression:
-            case Number(value=value):
-                return scalar(value)
-            case Text(value=value):
-                return value
-            case Name():
-                return self._name(expression)
-            case Matrix():
-                return self._matrix(expression)
-            case CellLiteral(elements=elements, line=line):
-                return self._cell(self.source.place(line), elements)
-            case Negative(operand=operand, line=line):
-                place = self.source.place(line)
-                array = array_of(place, self._value(operand), "what stands behind '-'")
-                self.budget.spend(place, array.size)
-                return 0.0 - array if array.size == 1 and array[0, 0] == 0 else -array
-            case Chain(first=first, rest=rest, line=line):
-                value = self._value(first)
-                for operator, operand in rest:
-                    value = operate(
-                        self.source.place(line), self.budget, operator, value, self._value(operand)
-                    )
-                return value
-            case Range(parts=parts, line=line):
-                return self._range(self.source.place(line), [self._value(part) for part in parts])
-            case Postfix():
-                return self._postfix(expression)
-
-    def _name(self, name: Name) -> Value:
-        if name.name in self.variables:
-            return self.variables[name.name]
-        return self._call(self.source.place(name.line), name.name, (), [])
-
-    def _matrix(self, matrix: Matrix, *, joined: bool = False) -> Value:
-        rows = matrix.rows
-        if joined:
-            rows = (tuple(element for row in rows for element in row),)
-        values = [[self._value(element) for element in row] for row in rows]
-        return concatenate(self.source.place(matrix.line), self.budget, values)
-
-    def _cell(self, place: Place, elements: tuple[Expression, ...]) -> Cell:
-        if len(elements) > MOST_LINKS:
-            raise place.error(f"{len(elements)} elements in one cell array", allowed=f"at most {MOST_LINKS}")
-        values: list[Value | None] = []
-        for element in elements:
-            value = copied(self._value(element))
-            if isinstance(value, Cell):
-                raise place.error(
-                    "a cell array inside a cell array is not supported", allowed="links, numbers, text"
+    def _indices(self, value: Value | None, arguments: tuple[Expression, ...]) -> list[Value]:
+        """The indices on the left of ``=``; ``end`` is the last element of a value that exists."""
+        found: list[Value] = []
+        indices = self._evaluator.indices(empty() if value is None else value, arguments)
+        for index, argument in zip(indices, arguments):
+            if index is None:
+                raise self.source.place(argument.at).error(
+                    "assignment to several elements at once is not supported", allowed="A(i, j) = number"
                 )
-            values.append(value)
-        return Cell(values)
-
-    def _range(self, place: Place, parts: list[Value]) -> Array:
-        ends = [number_of(place, part, "an end of a range") for part in parts]
-        first, step, last = (ends[0], 1.0, ends[1]) if len(ends) == 2 else ends
-        if step == 0 or not all(math.isfinite(end) for end in (first, step, last)):
-            raise place.error("a range without end or step", allowed="first:last or first:step:last")
-        # A hair more than the quotient, as MATLAB does, so that 0:0.1:1 reaches 1.
-        count = (
-            math.floor((last - first) / step * (1 + 4e-16) + 1e-10) + 1 if (last - first) / step >= 0 else 0
-        )
-        if count > MOST_ELEMENTS:
-            raise place.error(f"a range of {count} elements", allowed=f"at most {MOST_ELEMENTS}")
-        self.budget.spend(place, count)
-        return np.array([[first + step * i for i in range(count)]]).reshape(1, -1)
-
-    def _postfix(self, expression: Postfix) -> Value:
-        base, steps = expression.base, expression.steps
-        if isinstance(base, Name) and base.name not in self.variables:
-            place = self.source.place(base.line)
-            if isinstance(steps[0], Parentheses):
-                arguments = steps[0].arguments
-                value = self._call(place, base.name, arguments, [self._value(a) for a in arguments])
-                steps = steps[1:]
-            else:
-                value = self._call(place, base.name, (), [])
-        else:
-            value = self._value(base)
-        for step in steps:
-            value = self._step(value, step)
-        return value
-
-    def _step(self, value: Value, step: Step) -> Value:
-        place = self.source.place(step.line)
-        match step:
-            case Transpose():
-                if isinstance(value, LinkArray):
-                    return value
-                array = array_of(place, value, "what is transposed")
-                self.budget.spend(place, array.size)
-                return array.T.copy()
-            case Field(name=name):
-                if isinstance(value, LinkRecord):
-                    return link_field(place, value, name)
-                if isinstance(value, RobotRecord):
-                    return robot_field(place, value, name)
-                raise place.error(
-                    f"{kind_of(value)} has no field '{name}'", allowed="fields of links and robots"
-                )
-            case Braces(arguments=arguments):
-                return self._cell_element(place, value, [self._value(a) for a in arguments])
-            case Parentheses(arguments=arguments):
-                return self._element(place, value, [self._value(a) for a in arguments])
-
-    def _cell_element(self, place: Place, value: Value, indices: list[Value]) -> Value:
-        if not isinstance(value, Cell):
-            raise place.error(f"{{}} is used on {kind_of(value)}", allowed="cell arrays")
-        index = self._single_index(place, indices, MOST_LINKS)
-        element = value.elements[index] if index < len(value.elements) else None
-        if element is None:
-            raise place.error(
-                f"element {index + 1} of the cell array is not set", allowed="elements that are set"
-            )
-        return element
-
-    def _element(self, place: Place, value: Value, indices: list[Value]) -> Value:
-        if isinstance(value, LinkRecord):
-            value = LinkArray([value])
-        if isinstance(value, LinkArray):
-            index = self._single_index(place, indices, MOST_LINKS)
-            link = value.links[index] if index < len(value.links) else None
-            if link is None:
-                raise place.error(f"link {index + 1} of the array is not set", allowed="links that are set")
-            return link
-        if isinstance(value, np.ndarray):
-            self.budget.spend(place, value.size)
-            return part_of(place, value, indices)
-        raise place.error(f"() is used on {kind_of(value)}", allowed="matrices and arrays of links")
-
-    def _call(
-        self, place: Place, name: str, written: tuple[Expression, ...], arguments: list[Value]
-    ) -> Value:
-        if name == "robot":
-            variable = written[0].name if written and isinstance(written[0], Name) else ""
-            return make_robot(place, arguments, variable)
-        if name == "SerialLink":
-            return make_serial_link(place, arguments)
-        if name in CONSTRUCTORS:
-            return CONSTRUCTORS[name](place, arguments)
-        if name in FUNCTIONS:
-            return call_function(place, self.budget, name, arguments)
-        callable_names = ["robot", "SerialLink", *CONSTRUCTORS, *FUNCTIONS]
-        near = difflib.get_close_matches(name, [*self.variables, *callable_names], n=1, cutoff=0.6)
-        raise place.error(
-            f"'{name}' is neither a variable nor a supported function",
-            allowed=f"straight-line robot scripts, with {', '.join(callable_names)}",
-            fix=f"did you mean '{near[0]}'?" if near else "define it, or remove the line",
-        )
+            found.append(index)
+        return found

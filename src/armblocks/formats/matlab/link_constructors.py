@@ -17,8 +17,9 @@ import numpy as np
 
 from armblocks.formats.matlab.link_fields import inertia_from, set_link_field
 from armblocks.formats.matlab.records import LinkRecord, Release
-from armblocks.formats.matlab.source import Place
-from armblocks.formats.matlab.values import Array, Value, kind_of, text_of
+from armblocks.formats.matlab.values import Value
+from armblocks.matlab.arrays import Array, kind_of, text_of
+from armblocks.matlab.source import Place
 
 _COLUMNS = {
     Release.UP_TO_8: ("alpha", "a", "theta", "d", "sigma", "offset"),

@@ -9,8 +9,9 @@ import numpy as np
 
 from armblocks.errors import ArmblocksError
 from armblocks.formats.matlab.records import LinkRecord
-from armblocks.formats.matlab.source import Place
-from armblocks.formats.matlab.values import Array, Value, array_of, empty, kind_of, number_of, scalar
+from armblocks.formats.matlab.values import Value
+from armblocks.matlab.arrays import Array, array_of, empty, kind_of, number_of, scalar
+from armblocks.matlab.source import Place
 from armblocks.robot import inertia_matrix
 from armblocks.spatial import Vector3
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
-from armblocks.formats.matlab.source import Source
+from armblocks.matlab.source import Source
 
 _TARGET = r"[A-Za-z]\w*(?:\{\s*\d+\s*\}|\(\s*\d+\s*\))(?:\.[A-Za-z]\w*)+"
 _FIRST_STATEMENT = re.compile(rf"{_TARGET}\s*(?:=(?!=)|$)")

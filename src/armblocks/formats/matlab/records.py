@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass, field, replace
 
-from armblocks.formats.matlab.source import Place
+from armblocks.matlab.source import Place
 from armblocks.spatial import Matrix3, Transform, Vector3
 
 
@@ -43,6 +43,11 @@ class LinkRecord:
     coulomb_friction: tuple[float, float] | None = None
     qlim: tuple[float, float] | None = None
 
+    @property
+    def kind(self) -> str:
+        """What it is, in words for messages."""
+        return "a link"
+
     def assigned(self) -> LinkRecord:
         """What another variable gets."""
         return replace(self) if self.release is Release.UP_TO_8 else self
@@ -61,6 +66,11 @@ class RobotRecord:
     gravity: Vector3 = (0.0, 0.0, 9.81)
     base: Transform = field(default_factory=Transform)
     tool: Transform = field(default_factory=Transform)
+
+    @property
+    def kind(self) -> str:
+        """What it is, in words for messages."""
+        return "a robot"
 
     def assigned(self) -> RobotRecord:
         """What another variable gets."""

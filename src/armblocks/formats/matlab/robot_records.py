@@ -10,18 +10,9 @@ from armblocks.errors import ArmblocksError
 from armblocks.formats.matlab.link_constructors import is_modified, link_from_row, rows_of
 from armblocks.formats.matlab.link_fields import finite_number, numbers, set_link_field
 from armblocks.formats.matlab.records import LinkRecord, Release, RobotRecord
-from armblocks.formats.matlab.source import Place
-from armblocks.formats.matlab.values import (
-    MOST_LINKS,
-    Array,
-    Cell,
-    LinkArray,
-    Value,
-    array_of,
-    kind_of,
-    scalar,
-    text_of,
-)
+from armblocks.formats.matlab.values import MOST_LINKS, Cell, LinkArray, Value
+from armblocks.matlab.arrays import Array, array_of, kind_of, scalar, text_of
+from armblocks.matlab.source import Place
 from armblocks.robot import (
     DhConvention,
     DhRow,

@@ -10,7 +10,7 @@ from typing import Any
 
 from armblocks.diagram import Block, Diagram, DiagramBlock, Parameter, ParameterKind
 from armblocks.diagram.diagram import block_in_scope
-from armblocks.diagram.mask import formula_names
+from armblocks.diagram.mask import parameters_read
 from armblocks.diagram.parameter import REQUIRED, Value
 from armblocks.errors import DiagramError, InputError, UnknownNameError
 from armblocks.studio.protocol.messages.sheet_edits import MaskParameter, SetMask
@@ -142,7 +142,7 @@ def _respelled(name: str, block: Block, names: Mapping[str, str], gone: list[str
     """Return the block with the new parameter names in its formulas."""
     formulas: list[tuple[str, str]] = []
     for parameter, text in block.formulas:
-        lost = formula_names(text) & set(gone)
+        lost = parameters_read(text, gone)
         if lost:
             raise DiagramError(
                 f"the mask parameter '{min(lost)}' is removed, and the formula '{text[:60]}' reads it",

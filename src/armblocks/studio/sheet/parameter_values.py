@@ -1,7 +1,7 @@
 """Conversion between the text of a parameter's field and the value of the block.
 
-Numbers and arrays may be typed as formulas, ``2*pi``, ``[1 2; 3 4]``, ``45*deg``, in the formula language
-:mod:`armblocks.diagram.expression_language`; Python evaluates nothing.
+Numbers and arrays may be typed as formulas, ``2*pi``, ``[1 2; 3 4]``, ``45*deg``, in the language of formulas
+and scripts, :mod:`armblocks.matlab`; Python evaluates nothing.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any, cast
 import numpy as np
 
 from armblocks.diagram import Parameter, ParameterFormula, ParameterKind, TimeTable, UserFunction
-from armblocks.diagram.mask import Scope, formula_names, formula_number, formula_value
+from armblocks.diagram.mask import Scope, formula_number, formula_value, parameters_read
 from armblocks.errors import InputError, UnknownNameError
 from armblocks.robot import Robot
 
@@ -40,7 +40,7 @@ def parameter_value(
         return _robot(rule, typed, place, resolve_robot)
     if isinstance(typed, str) and scope:
         numeric = rule.kind in _NUMERIC
-        if typed.strip() in scope or (numeric and formula_names(typed, place) & set(scope)):
+        if typed.strip() in scope or (numeric and parameters_read(typed, scope, place)):
             formula_value(rule, typed, scope, where)
             return ParameterFormula(typed.strip())
     if rule.kind in _NUMERIC:

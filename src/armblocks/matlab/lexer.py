@@ -1,4 +1,4 @@
-"""From the characters of a script to tokens.
+"""From the characters of a script or formula to tokens.
 
 This module handles the special cases of MATLAB's syntax: the quote that is a transpose after an operand and a
 string elsewhere, line continuation, block comments, newlines that end a statement outside brackets and a row
@@ -15,7 +15,9 @@ import math
 import re
 from dataclasses import dataclass
 
-from armblocks.formats.matlab.source import Place, Source
+from armblocks.errors import ArmblocksError
+from armblocks.matlab.operators import ALTERNATIVES, INFIX
+from armblocks.matlab.source import Place, Position, Source
 
 
 class Kind(enum.Enum):
@@ -38,7 +40,7 @@ class Token:
 
     kind: Kind
     text: str
-    line: int
+    at: Position
     spaced: bool = False
     number: float = 0.0
 
@@ -46,54 +48,57 @@ class Token:
 COMMANDS = ("clear", "clearvars", "clc", "close", "format", "more")
 """Words that MATLAB scripts use in command syntax; all but the first two do nothing here."""
 
-_NUMBER = re.compile(r"(?:[0-9]+(?:\.(?![*/\\^'])[0-9]*)?|\.[0-9]+)(?:[eEdD][+-]?[0-9]+)?")
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
-_LOGIC = ("==", "~=", "!=", "<=", ">=", "&&", "||", "<", ">", "&", "|", "~", "!")
-_OPERATORS = (*_LOGIC, ".*", "./", ".\\", ".^", ".'", *"=+-*/\\^'()[]{},;:.@")
-_UNFINISHED = frozenset(("=", "+", "-", "*", "/", "\\", "^", ".*", "./", ".\\", ".^", ",", "(", ":"))
+_DIGITS = "[0-9](?:_?[0-9])*"
+_NUMBER = re.compile(
+    rf"0[xX][0-9a-fA-F](?:_?[0-9a-fA-F])*|0[bB][01](?:_?[01])*|0[oO][0-7](?:_?[0-7])*"
+    rf"|(?:{_DIGITS}(?:\.(?!\*(?!\*)|[/\\^']|\.\.)(?:{_DIGITS})?)?|\.{_DIGITS})(?:[eEdD][+-]?{_DIGITS})?"
+)
+_NAME = re.compile(r"[^\W\d]\w*")
+_OPERATORS = sorted({*INFIX, *ALTERNATIVES, ".'", *"=~'()[]{},;.@"}, key=len, reverse=True)
+_UNFINISHED = frozenset((*INFIX, "=", ",", "(", "~"))
 """Operators after which no statement can end."""
 _CLOSING = {"(": ")", "[": "]", "{": "}"}
 
 
 def tokenize(source: Source) -> list[Token]:
-    """All tokens of a script, with an END after every statement and an EOF at the end.
+    """All tokens of a source, with an END after every statement and an EOF at the end.
 
-    Raises ``FormatError`` at characters, numbers and strings that MATLAB does not know or that are not
-    supported, and at brackets that do not match.
+    Raises an error at characters, numbers and strings that MATLAB does not know or that are not supported,
+    and at brackets that do not match.
     """
     return _Lexer(source).run()
 
 
 class _Lexer:
-    """Walks over the lines once; ``brackets`` holds the open brackets and their lines."""
+    """Walks over the lines once; ``brackets`` holds the open brackets and their positions."""
 
     def __init__(self, source: Source) -> None:
         self.source = source
         self.tokens: list[Token] = []
-        self.brackets: list[tuple[str, int]] = []
+        self.brackets: list[tuple[str, Position]] = []
         self.comment_starts: list[int] = []
 
     def run(self) -> list[Token]:
         for number, text in enumerate(self.source.lines, start=1):
-            if self._block_comment(number, text):
+            if self.source.is_file and self._block_comment(number, text):
                 continue
             if not self._line(number, text):
                 self._newline(number)
         if self.comment_starts:
-            raise self._at(self.comment_starts[-1]).error(
+            raise self._at(self.comment_starts[-1], 1).error(
                 "the block comment is never closed", allowed="%{ … %}, each on a line of its own"
             )
         if self.brackets:
-            bracket, line = self.brackets[-1]
-            raise self._at(line).error(
+            bracket, at = self.brackets[-1]
+            raise self.source.place(at).error(
                 f"'{bracket}' is never closed", allowed="brackets in pairs", fix=f"add '{_CLOSING[bracket]}'"
             )
-        last = len(self.source.lines)
+        last = Position(len(self.source.lines), len(self.source.lines[-1].rstrip()) + 1)
         self.tokens += [Token(Kind.END, "\n", last), Token(Kind.EOF, "", last)]
         return self.tokens
 
-    def _at(self, line: int) -> Place:
-        return self.source.place(line)
+    def _at(self, line: int, column: int) -> Place:
+        return self.source.place(Position(line, column))
 
     def _block_comment(self, number: int, text: str) -> bool:
         """Whether the line belongs to a block comment ``%{ … %}``; they nest."""
@@ -112,11 +117,11 @@ class _Lexer:
         position = 0
         spaced = True
         while position < len(text):
-            rest = text[position]
-            if rest in " \t\f\v\u00a0":
+            character = text[position]
+            if character.isspace():
                 position, spaced = position + 1, True
                 continue
-            if rest == "%":
+            if self._comment(number, text, position):
                 return False
             if text.startswith("...", position):
                 return True
@@ -124,93 +129,119 @@ class _Lexer:
             spaced = False
         return False
 
+    def _comment(self, number: int, text: str, position: int) -> bool:
+        """Whether a comment starts here: ``%`` in scripts; ``#``, as in Python, in formulas."""
+        if self.source.is_file:
+            return text[position] == "%"
+        if text[position] == "%":
+            raise self._at(number, position + 1).error(
+                "'%' starts a comment in MATLAB and is the remainder in Python",
+                allowed="# for comments, mod(a, b) for the remainder with the sign of b, rem(a, b) of a",
+                fix="write mod(a, b), or remove the comment",
+            )
+        return text[position] == "#"
+
     def _token(self, number: int, text: str, position: int, spaced: bool) -> int:
         """Read one token and return where the next one starts."""
         character = text[position]
+        at = Position(number, position + 1)
         if (found := _NUMBER.match(text, position)) is not None:
-            return self._number(number, text, found, spaced)
-        if (found := _NAME.match(text, position)) is not None:
-            if found.group() in COMMANDS and self._starts_statement():
+            return self._number(at, text, found, spaced)
+        if (found := _NAME.match(text, position)) is not None and found.group().isidentifier():
+            if self.source.is_file and found.group() in COMMANDS and self._starts_statement():
                 after = text[found.end() :].lstrip()
                 if not after.startswith("(") and not re.match(r"=(?!=)", after):
-                    return self._command(number, text, position)
-            self.tokens.append(Token(Kind.NAME, found.group(), number, spaced))
+                    return self._command(at, text, position)
+            self.tokens.append(Token(Kind.NAME, found.group(), at, spaced))
             return found.end()
         if character == '"' or (character == "'" and not self._is_transpose(spaced)):
-            return self._string(number, text, position, spaced)
+            return self._string(at, text, position, spaced)
         for operator in _OPERATORS:
             if text.startswith(operator, position):
-                self._operator(number, operator, spaced)
+                self._operator(at, ALTERNATIVES.get(operator, operator), spaced)
                 return position + len(operator)
-        raise self._at(number).error(f"the character {character!r} means nothing in MATLAB outside strings")
+        raise self.source.place(at).error(
+            f"the character {character!r} means nothing in MATLAB outside strings"
+        )
 
-    def _number(self, line: int, text: str, found: re.Match[str], spaced: bool) -> int:
+    def _number(self, at: Position, text: str, found: re.Match[str], spaced: bool) -> int:
+        written = found.group()
         after = text[found.end() : found.end() + 1]
         if after.isalnum() or after == "_":
-            word = re.match(r"[\w.]+", text[found.start() :])
-            raise self._at(line).error(
-                f"'{word.group() if word else after}' is not a number",
-                allowed="numbers such as 12, .5, 1.8e-3",
-            )
-        value = float(found.group().translate(str.maketrans("dD", "ee")))
+            raise self._no_number(at, re.match(r"[\w.]+", text[found.start() :]))
+        digits = written.replace("_", "")
+        try:
+            base = {"x": 16, "b": 2, "o": 8}.get(digits[1:2].lower())
+            value = float(int(digits, base)) if base else float(digits.translate(_EXPONENTS))
+        except OverflowError:
+            value = math.inf
         if math.isinf(value):
-            raise self._at(line).error(
-                f"the number {found.group()} is too large", allowed="magnitudes below 1.8e308"
+            raise self.source.place(at).error(
+                f"'{_short(written)}' is too large a number", allowed="magnitudes below 1.8e308"
             )
-        self.tokens.append(Token(Kind.NUMBER, found.group(), line, spaced, value))
+        self.tokens.append(Token(Kind.NUMBER, written, at, spaced, value))
         return found.end()
 
-    def _string(self, line: int, text: str, position: int, spaced: bool) -> int:
+    def _no_number(self, at: Position, word: re.Match[str] | None) -> ArmblocksError:
+        shown = _short(word.group()) if word else ""
+        if re.fullmatch(r"[0-9.]+(?:[eE][0-9]+)?[ij]", shown):
+            return self.source.place(at).error(
+                f"'{shown}' is an imaginary number", allowed="real numbers", fix="use real numbers"
+            )
+        return self.source.place(at).error(
+            f"'{shown}' is not a number", allowed="numbers such as 12, .5, 1.8e-3"
+        )
+
+    def _string(self, at: Position, text: str, position: int, spaced: bool) -> int:
         quote = text[position]
         found = re.compile(f"{quote}((?:[^{quote}]|{quote}{quote})*){quote}").match(text, position)
         if found is None:
-            raise self._at(line).error(
+            raise self.source.place(at).error(
                 f"the string that {quote} starts is not closed on its line", allowed="'text' or \"text\""
             )
-        self.tokens.append(Token(Kind.STRING, found.group(1).replace(quote * 2, quote), line, spaced))
+        self.tokens.append(Token(Kind.STRING, found.group(1).replace(quote * 2, quote), at, spaced))
         return found.end()
 
-    def _command(self, line: int, text: str, position: int) -> int:
+    def _command(self, at: Position, text: str, position: int) -> int:
         found = re.compile(r"[^;,%]*").match(text, position)
         end = found.end() if found is not None else len(text)
-        self.tokens.append(Token(Kind.COMMAND, text[position:end].strip(), line))
+        self.tokens.append(Token(Kind.COMMAND, text[position:end].strip(), at))
         return end
 
-    def _operator(self, line: int, operator: str, spaced: bool) -> None:
-        if operator in _LOGIC:
-            raise self._at(line).error(f"comparison and logic ('{operator}') are not supported")
+    def _operator(self, at: Position, operator: str, spaced: bool) -> None:
         if operator == "@":
-            raise self._at(line).error("function handles ('@') are not supported")
+            raise self.source.place(at).error("function handles ('@') are not supported")
         if operator in _CLOSING:
-            self.brackets.append((operator, line))
+            self.brackets.append((operator, at))
         elif operator in (")", "]", "}"):
             if not self.brackets or _CLOSING[self.brackets[-1][0]] != operator:
-                raise self._at(line).error(
+                raise self.source.place(at).error(
                     f"'{operator}' closes no bracket", allowed="brackets in pairs", fix="remove or match it"
                 )
             self.brackets.pop()
         elif operator in (";", ",") and not self.brackets:
-            self.tokens.append(Token(Kind.END, operator, line))
+            self.tokens.append(Token(Kind.END, operator, at))
             return
         elif operator == "=" and self._starts_statement():
             self._undo_newline()
-        self.tokens.append(Token(Kind.OPERATOR, operator, line, spaced))
+        self.tokens.append(Token(Kind.OPERATOR, operator, at, spaced))
 
     def _newline(self, line: int) -> None:
         last = self.tokens[-1] if self.tokens else None
+        end = Position(line, len(self.source.lines[line - 1].rstrip()) + 1)
         if self.brackets and self.brackets[-1][0] in ("[", "{"):
-            self.tokens.append(Token(Kind.ROW, "\n", line))
+            self.tokens.append(Token(Kind.ROW, "\n", end))
         elif last is not None and last.kind is Kind.OPERATOR and last.text in _UNFINISHED:
             return  # the line cannot end here: it was broken on a printed page
-        elif self.brackets:
+        elif self.brackets and self.source.is_file:
             bracket, start = self.brackets[-1]
-            raise self._at(start).error(
+            raise self.source.place(start).error(
                 f"'{bracket}' is not closed on its line",
                 allowed="a statement over several lines continues with '...'",
                 fix=f"add '{_CLOSING[bracket]}' or '...'",
             )
-        else:
-            self.tokens.append(Token(Kind.END, "\n", line))
+        elif not self.brackets:
+            self.tokens.append(Token(Kind.END, "\n", end))
 
     def _undo_newline(self) -> None:
         """A line starts with ``=``: take back the newlines before it, as the statement was broken there."""
@@ -229,3 +260,10 @@ class _Lexer:
             operand = False
         in_matrix = bool(self.brackets) and self.brackets[-1][0] in ("[", "{")
         return operand and not (in_matrix and spaced)
+
+
+_EXPONENTS = str.maketrans("dD", "ee")
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 40 else text[:37] + "..."

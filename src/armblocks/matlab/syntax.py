@@ -1,4 +1,4 @@
-"""The syntax tree of a script.
+"""The syntax tree of expressions and statements; every node has the position of its first character.
 
 Chains of operators and of postfixes are flat tuples, not nested pairs: however long a line is, walking over
 it takes no deeper recursion than its brackets.
@@ -6,7 +6,10 @@ it takes no deeper recursion than its brackets.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+
+from armblocks.matlab.source import Position
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,7 +17,7 @@ class Number:
     """``1.8e-3``"""
 
     value: float
-    line: int
+    at: Position
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +25,7 @@ class Text:
     """``'standard'``"""
 
     value: str
-    line: int
+    at: Position
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +33,21 @@ class Name:
     """A variable, or a function without arguments."""
 
     name: str
-    line: int
+    at: Position
+
+
+@dataclass(frozen=True, slots=True)
+class End:
+    """``end`` inside an index: the last element."""
+
+    at: Position
+
+
+@dataclass(frozen=True, slots=True)
+class All:
+    """``:`` as an index: all elements."""
+
+    at: Position
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +56,7 @@ class Matrix:
 
     rows: tuple[tuple[Expression, ...], ...]
     broken: bool
-    line: int
+    at: Position
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,15 +64,26 @@ class CellLiteral:
     """``{a, b, c}``"""
 
     elements: tuple[Expression, ...]
-    line: int
+    at: Position
 
 
 @dataclass(frozen=True, slots=True)
-class Negative:
-    """``-operand``; a row of signs is folded to one."""
+class Prefix:
+    """``-operand`` or ``~operand``; a row of signs is folded to one."""
 
+    operator: str
     operand: Expression
-    line: int
+    at: Position
+
+
+@dataclass(frozen=True, slots=True)
+class Operation:
+    """An operator and the operand right of it."""
+
+    operator: str
+    operand: Expression
+    at: Position
+    """The position of the operator."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +91,8 @@ class Chain:
     """``first (operator operand)…``, all of one precedence, evaluated from the left."""
 
     first: Expression
-    rest: tuple[tuple[str, Expression], ...]
-    line: int
+    rest: tuple[Operation, ...]
+    at: Position
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +100,7 @@ class Range:
     """``start:stop`` or ``start:step:stop``"""
 
     parts: tuple[Expression, ...]
-    line: int
+    at: Position
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +108,7 @@ class Parentheses:
     """``(arguments)``: an index or a call."""
 
     arguments: tuple[Expression, ...]
-    line: int
+    at: Position
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +116,7 @@ class Braces:
     """``{index}``: an element of a cell array."""
 
     arguments: tuple[Expression, ...]
-    line: int
+    at: Position
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,14 +124,14 @@ class Field:
     """``.name``"""
 
     name: str
-    line: int
+    at: Position
 
 
 @dataclass(frozen=True, slots=True)
 class Transpose:
     """``'`` or ``.'``"""
 
-    line: int
+    at: Position
 
 
 Target = Parentheses | Braces | Field
@@ -117,10 +145,10 @@ class Postfix:
 
     base: Expression
     steps: tuple[Step, ...]
-    line: int
+    at: Position
 
 
-Expression = Number | Text | Name | Matrix | CellLiteral | Negative | Chain | Range | Postfix
+Expression = Number | Text | Name | End | All | Matrix | CellLiteral | Prefix | Chain | Range | Postfix
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +158,7 @@ class Assignment:
     name: str
     steps: tuple[Target, ...]
     value: Expression
-    line: int
+    at: Position
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +166,7 @@ class Evaluation:
     """An expression alone: MATLAB shows it and keeps it as ``ans``."""
 
     value: Expression
-    line: int
+    at: Position
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,7 +174,35 @@ class Command:
     """``clear L``"""
 
     words: tuple[str, ...]
-    line: int
+    at: Position
 
 
 Statement = Assignment | Evaluation | Command
+
+
+def parts_of(expression: Expression) -> tuple[Expression, ...]:
+    """The direct parts of an expression, in the order of the text."""
+    match expression:
+        case Matrix(rows=rows):
+            return tuple(element for row in rows for element in row)
+        case CellLiteral(elements=elements):
+            return elements
+        case Prefix(operand=operand):
+            return (operand,)
+        case Chain(first=first, rest=rest):
+            return (first, *(operation.operand for operation in rest))
+        case Range(parts=parts):
+            return parts
+        case Postfix(base=base, steps=steps):
+            given = (step.arguments for step in steps if isinstance(step, Parentheses | Braces))
+            return (base, *(argument for arguments in given for argument in arguments))
+        case _:
+            return ()
+
+
+def levels(expression: Expression) -> Iterator[tuple[Expression, ...]]:
+    """The expressions of a tree level by level: the whole, then its parts, then their parts …"""
+    level: tuple[Expression, ...] = (expression,)
+    while level:
+        yield level
+        level = tuple(part for whole in level for part in parts_of(whole))

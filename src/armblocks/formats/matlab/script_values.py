@@ -1,0 +1,160 @@
+"""Values of the expressions of scripts: numbers and texts, and the toolbox's links and robots."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping, Sequence
+
+from armblocks.formats.matlab.link_constructors import CONSTRUCTORS
+from armblocks.formats.matlab.link_fields import link_field
+from armblocks.formats.matlab.records import LinkRecord, RobotRecord
+from armblocks.formats.matlab.robot_records import make_robot, make_serial_link, robot_field
+from armblocks.formats.matlab.values import MOST_LINKS, Cell, LinkArray, Value, copied, join_links
+from armblocks.matlab.arrays import Budget, index_of, kind_of, number_of, scalar
+from armblocks.matlab.functions import TABLE
+from armblocks.matlab.numbers import Numbers
+from armblocks.matlab.source import Place
+from armblocks.matlab.syntax import Expression, Name
+
+
+class ScriptValues:
+    """The operations of expressions on values of scripts (:class:`armblocks.matlab.evaluation.Values`)."""
+
+    def __init__(self, budget: Budget, variables: Mapping[str, Value]) -> None:
+        self._numbers = Numbers(budget)
+        self._variables = variables
+
+    def number(self, value: float) -> Value:
+        """A number."""
+        return scalar(value)
+
+    def text(self, place: Place, value: str) -> Value:
+        """A text in quotes."""
+        return value
+
+    def negative(self, place: Place, value: Value) -> Value:
+        """``-value``"""
+        return self._numbers.negative(place, value)
+
+    def logical_not(self, place: Place, value: Value) -> Value:
+        """``~value``"""
+        return self._numbers.logical_not(place, value)
+
+    def operate(self, place: Place, operator: str, left: Value, right: Value) -> Value:
+        """``left operator right`` of arithmetic or a comparison."""
+        return self._numbers.operate(place, operator, left, right)
+
+    def logic(self, place: Place, operator: str, values: Sequence[Value]) -> Value:
+        """All values joined by one of ``&& || & |``."""
+        return self._numbers.logic(place, operator, values)
+
+    def matrix(self, place: Place, rows: Sequence[Sequence[Value]]) -> Value:
+        """``[a b; c d]`` of matrices, of texts in one row, or of links."""
+        flat = [value for row in rows for value in row]
+        if any(isinstance(value, LinkRecord | LinkArray) for value in flat):
+            return join_links(place, flat)
+        return self._numbers.matrix(place, rows)
+
+    def cell(self, place: Place, elements: Sequence[Value]) -> Value:
+        """``{a, b}``"""
+        if len(elements) > MOST_LINKS:
+            raise place.error(f"{len(elements)} elements in one cell array", allowed=f"at most {MOST_LINKS}")
+        if any(isinstance(element, Cell) for element in elements):
+            raise place.error(
+                "a cell array inside a cell array is not supported", allowed="links, numbers, text"
+            )
+        return Cell([copied(element) for element in elements])
+
+    def range(self, place: Place, parts: Sequence[Value]) -> Value:
+        """``first:last`` or ``first:step:last``"""
+        return self._numbers.range(place, parts)
+
+    def transposed(self, place: Place, value: Value) -> Value:
+        """``value'``"""
+        return value if isinstance(value, LinkArray) else self._numbers.transposed(place, value)
+
+    def element(self, place: Place, value: Value, indices: Sequence[Value | None], shown: str) -> Value:
+        """``value(indices)`` of a matrix or of an array of links."""
+        if isinstance(value, LinkRecord):
+            value = LinkArray([value])
+        if isinstance(value, LinkArray):
+            index = single_index(place, indices, MOST_LINKS)
+            link = value.links[index] if index < len(value.links) else None
+            if link is None:
+                raise place.error(f"link {index + 1} of the array is not set", allowed="links that are set")
+            return link
+        return self._numbers.element(place, value, indices, shown)
+
+    def last_index(self, place: Place, value: Value, position: int, count: int) -> Value:
+        """``end`` as index ``position`` of ``count`` indices."""
+        if isinstance(value, Cell | LinkArray):
+            return scalar(float(_length(value)))
+        return self._numbers.last_index(place, value, position, count)
+
+    def cell_element(self, place: Place, value: Value, indices: Sequence[Value | None]) -> Value:
+        """``value{indices}``"""
+        if not isinstance(value, Cell):
+            raise place.error(f"{{}} is used on {kind_of(value)}", allowed="cell arrays")
+        index = single_index(place, indices, MOST_LINKS)
+        element = value.elements[index] if index < len(value.elements) else None
+        if element is None:
+            raise place.error(
+                f"element {index + 1} of the cell array is not set", allowed="elements that are set"
+            )
+        return element
+
+    def field(self, place: Place, value: Value, name: str) -> Value:
+        """``value.name``"""
+        if isinstance(value, LinkRecord):
+            return link_field(place, value, name)
+        if isinstance(value, RobotRecord):
+            return robot_field(place, value, name)
+        return self._numbers.field(place, value, name)
+
+    def check_function(self, place: Place, name: str, called: bool) -> None:
+        """Raise ``FormatError`` unless there is a constructor or a function of this name."""
+        callable_names = ["robot", "SerialLink", *CONSTRUCTORS, *TABLE]
+        if name in callable_names:
+            return
+        near = difflib.get_close_matches(name, [*self._variables, *callable_names], n=1, cutoff=0.6)
+        raise place.error(
+            f"'{name}' is neither a variable nor a supported function",
+            allowed=f"straight-line robot scripts, with {', '.join(callable_names)}",
+            fix=f"did you mean '{near[0]}'?" if near else "define it, or remove the line",
+        )
+
+    def call(
+        self, place: Place, name: str, arguments: Sequence[Value], written: Sequence[Expression]
+    ) -> Value:
+        """``name(arguments)`` of a constructor of the toolbox, or of a function in the table."""
+        if name == "robot":
+            variable = written[0].name if written and isinstance(written[0], Name) else ""
+            return make_robot(place, list(arguments), variable)
+        if name == "SerialLink":
+            return make_serial_link(place, list(arguments))
+        if name in CONSTRUCTORS:
+            return CONSTRUCTORS[name](place, list(arguments))
+        if name in ("length", "numel") and len(arguments) == 1:
+            value = arguments[0]
+            if isinstance(value, Cell | LinkArray | str):
+                return scalar(float(_length(value)))
+        return self._numbers.call(place, name, arguments, written)
+
+
+def single_index(place: Place, indices: Sequence[Value | None], most: int) -> int:
+    """The one index into a row of links or values, from 0; ``L{1, 3}`` of a row has two."""
+    if len(indices) == 2 and indices[0] is not None and number_of(place, indices[0], "an index") == 1:
+        indices = indices[1:]
+    if len(indices) != 1 or indices[0] is None:
+        raise place.error(f"{len(indices)} indices are given", allowed="one index")
+    return index_of(place, indices[0], most)
+
+
+def _length(value: Cell | LinkArray | str) -> int:
+    match value:
+        case Cell(elements=elements):
+            return len(elements)
+        case LinkArray(links=links):
+            return len(links)
+        case _:
+            return len(value)

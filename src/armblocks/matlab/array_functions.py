@@ -1,0 +1,231 @@
+"""Functions of whole arrays, arrays of a given size, and rigid motions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.matlab.function_kinds import (
+    ARRAYS,
+    GEOMETRY,
+    Arithmetic,
+    Function,
+    MismatchError,
+    created,
+    whole,
+)
+
+MOST_ELEMENTS = 100_000
+"""Maximum number of elements of an array."""
+
+
+# Whole arrays.
+
+
+def _mean(by: Arithmetic, x: Any) -> Any:
+    rows, columns = by.shape(x)
+    return by.quotient(by.total(x), by.constant(np.array([[float(rows if rows > 1 else columns)]])))
+
+
+def _vectors(by: Arithmetic, name: str, count: int | None, *vectors: Any) -> list[list[Any]]:
+    found = [by.entries(vector) for vector in vectors]
+    sizes = {len(entries) for entries in found}
+    if any(1 not in by.shape(vector) for vector in vectors) or len(sizes) > 1 or (count and sizes != {count}):
+        wanted = f"vectors of {count} numbers" if count else "vectors of equal length"
+        raise MismatchError(f"the arguments of {name} are not {wanted}")
+    return found
+
+
+def _dot(by: Arithmetic, a: Any, b: Any) -> Any:
+    left, right = _vectors(by, "dot", None, a, b)
+    products = [x * y for x, y in zip(left, right)]
+    return by.total(by.vector_like(products, a)) if products else by.constant(np.zeros((1, 1)))
+
+
+def _cross(by: Arithmetic, a: Any, b: Any) -> Any:
+    (a1, a2, a3), (b1, b2, b3) = _vectors(by, "cross", 3, a, b)
+    return by.vector_like([a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1], a)
+
+
+def _trace(by: Arithmetic, x: Any) -> Any:
+    rows, columns = by.shape(x)
+    if rows != columns:
+        raise MismatchError(f"a {rows} x {columns} matrix has no trace")
+    return by.total(by.diagonal(x)) if rows > 1 else x
+
+
+def _count(measure: Callable[[int, int], int]) -> Callable[..., Any]:
+    def compute(by: Arithmetic, x: Any) -> Any:
+        return by.constant(np.array([[float(measure(*by.shape(x)))]]))
+
+    return compute
+
+
+def _size(by: Arithmetic, x: Any) -> Any:
+    return by.constant(np.array([[float(extent) for extent in by.shape(x)]]))
+
+
+# Arrays of a given size, from plain numbers.
+
+
+def number_of_elements(number: float) -> int:
+    """The number as a count of elements. Raises :class:`MismatchError` where it is none."""
+    if not (number >= 0 and number == number // 1):
+        raise MismatchError(f"{number:g} is not a number of elements")
+    if number > MOST_ELEMENTS:
+        raise MismatchError(f"an array would have {number:g} elements; the most are {MOST_ELEMENTS}")
+    return int(number)
+
+
+def _extents(sizes: Sequence[Any]) -> tuple[int, int]:
+    """``zeros``, ``zeros(n)``, ``zeros(m, n)``, ``zeros([m n])``"""
+    numbers = [float(number) for size in sizes for number in np.ravel(size)] or [1.0]
+    if len(numbers) > 2:
+        raise MismatchError(f"{len(numbers)} numbers are given as a size")
+    rows, columns = number_of_elements(numbers[0]), number_of_elements(numbers[-1])
+    number_of_elements(float(rows * columns))
+    return rows, columns
+
+
+def range_of(first: float, step: float, last: float) -> NDArray[np.float64]:
+    """``first:step:last``: the elements are first + k step. Raises :class:`MismatchError`."""
+    steps = (last - first) / step if step else math.nan
+    if not (math.isfinite(step) and math.isfinite(steps)):
+        raise MismatchError("the steps do not lead from the first to the last number")
+    # The number of steps that fit, with a tolerance for rounding, so that 0:0.1:1 reaches 1.
+    count = number_of_elements(max(0.0, math.floor(steps * (1 + 4e-16) + 1e-10) + 1.0))
+    return (first + step * np.arange(count, dtype=np.float64)).reshape(1, -1)
+
+
+def _linspace(first: Any, last: Any, count: Any = 100.0) -> NDArray[np.float64]:
+    first, last, count = (float(np.ravel(number)[0]) for number in (first, last, count))
+    share = np.arange(number_of_elements(count), dtype=np.float64) / max(1.0, count - 1.0)
+    return (first * (1.0 - share) + last * share).reshape(1, -1)
+
+
+# Rigid motions.
+
+
+def _translation(by: Arithmetic, *given: Any) -> Any:
+    if len(given) == 1 and by.shape(given[0]) == (4, 4):
+        return by.from_rows([[entry] for entry in by.entries(given[0])[12:15]])
+    entries = [entry for value in given for entry in by.entries(value)]
+    if len(given) not in (1, 3) or len(entries) != 3:
+        raise MismatchError(
+            f"{len(given)} arguments with {len(entries)} elements are no translation; "
+            "allowed are x, y, z, or [x y z], or a 4x4 pose"
+        )
+    x, y, z = entries
+    return by.from_rows([[1.0, 0.0, 0.0, x], [0.0, 1.0, 0.0, y], [0.0, 0.0, 1.0, z], [0.0, 0.0, 0.0, 1.0]])
+
+
+def _pose(by: Arithmetic, *given: Any) -> Any:
+    """``SE3()``, ``SE3(T)``, ``SE3(x, y, z)``, ``SE3([x y z])`` of release 10: a 4x4 matrix here."""
+    if not given:
+        return by.constant(np.eye(4))
+    if len(given) == 1 and by.shape(given[0]) == (4, 4):
+        return given[0]
+    return _translation(by, *given)
+
+
+def _rotation(name: str, axis: int, extent: int) -> Callable[..., Any]:
+    """``rotx(angle)`` (extent 3) or ``trotx(angle)`` (extent 4) for the axes 0, 1, 2."""
+
+    def compute(by: Arithmetic, angle: Any, unit: Any = None) -> Any:
+        if by.shape(angle) != (1, 1):
+            raise MismatchError(f"the angle of {name} is not one number")
+        if unit is not None:
+            if not (isinstance(unit, str) and unit == "deg"):
+                raise MismatchError(f"the option of {name} is not known; allowed is 'deg'")
+            angle = by.constant(np.array([[math.pi / 180]])) * angle
+        c, s = by.cosine_sine(angle)
+        rows: list[list[Any]] = [[1.0 if i == j else 0.0 for j in range(extent)] for i in range(extent)]
+        j, k = (axis + 1) % 3, (axis + 2) % 3
+        rows[j][j], rows[j][k], rows[k][j], rows[k][k] = c, 0.0 - s, s, c
+        return by.from_rows(rows)
+
+    return compute
+
+
+def _rotations() -> Mapping[str, Function]:
+    found: dict[str, Function] = {}
+    for prefix, extent, kind in (("rot", 3, "rotation matrix"), ("trot", 4, "pose")):
+        for axis, letter in enumerate("xyz"):
+            name = f"{prefix}{letter}"
+            found[name] = whole(
+                "angle, 'deg'",
+                f"The {extent}x{extent} {kind} of a rotation about {letter}; "
+                "the angle in rad, with `'deg'` in degrees.",
+                GEOMETRY,
+                _rotation(name, axis, extent),
+                optional=1,
+                takes_text=True,
+            )
+    return found
+
+
+FUNCTIONS_OF_ARRAYS: Mapping[str, Function] = {
+    "zeros": created(
+        "m, n", "m x n zeros; `zeros(n)` is square.", lambda *n: np.zeros(_extents(n)), optional=2
+    ),
+    "ones": created("m, n", "m x n ones; `ones(n)` is square.", lambda *n: np.ones(_extents(n)), optional=2),
+    "eye": created(
+        "m, n", "The identity matrix; `eye(n)` is square.", lambda *n: np.eye(*_extents(n)), optional=2
+    ),
+    "linspace": created(
+        "first, last, n", "n numbers with equal distances; 100 without n.", _linspace, optional=1
+    ),
+    "sum": whole("x", "The sum of the elements.", ARRAYS, lambda by, x: by.total(x), reserved=True),
+    "prod": whole(
+        "x", "The product of the elements.", ARRAYS, lambda by, x: by.folded(lambda a, b: a * b, x)
+    ),
+    "mean": whole("x", "The mean of the elements.", ARRAYS, _mean),
+    "norm": whole(
+        "x",
+        "The length of a vector; of a matrix, the root of the sum of all squares, "
+        "which is MATLAB's `norm(A, 'fro')`.",
+        ARRAYS,
+        lambda by, x: by.length_of(x),
+        reserved=True,
+    ),
+    "dot": whole("a, b", "The scalar product of two vectors.", ARRAYS, _dot),
+    "cross": whole("a, b", "The vector product of two vectors with 3 elements.", ARRAYS, _cross),
+    "transpose": whole(
+        "A", "The transpose, as `A'`.", ARRAYS, lambda by, x: by.transposed_matrix(x), reserved=True
+    ),
+    "diag": whole(
+        "x",
+        "The diagonal of a matrix, or the matrix with this diagonal.",
+        ARRAYS,
+        lambda by, x: by.diagonal(x),
+        reserved=True,
+    ),
+    "inv": whole("A", "The inverse of a matrix.", ARRAYS, lambda by, x: by.inverse(x), reserved=True),
+    "trace": whole("A", "The sum of the diagonal.", ARRAYS, _trace),
+    "numel": whole("x", "The number of elements.", ARRAYS, _count(lambda m, n: m * n)),
+    "length": whole(
+        "x", "The larger of rows and columns.", ARRAYS, _count(lambda m, n: max(m, n) if m * n else 0)
+    ),
+    "size": whole("x", "Rows and columns; in formulas, vectors are columns.", ARRAYS, _size),
+}
+RIGID_MOTIONS: Mapping[str, Function] = {
+    "transl": whole(
+        "x, y, z",
+        "The 4x4 pose of a translation, also `transl([x y z])`; of a pose, its translation.",
+        GEOMETRY,
+        _translation,
+        optional=2,
+    ),
+    **_rotations(),
+    "SE3": whole(
+        "x, y, z",
+        "The 4x4 pose of a translation, also `SE3([x y z])`; `SE3()` is the identity.",
+        GEOMETRY,
+        _pose,
+        optional=3,
+    ),
+}

@@ -1,0 +1,52 @@
+"""Calls of the functions of the table, for numbers and for symbols."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.matlab.function_kinds import Arithmetic, Function, MismatchError
+from armblocks.matlab.functions import TABLE
+from armblocks.matlab.source import Place
+
+
+def call_function(
+    by: Arithmetic,
+    place: Place,
+    name: str,
+    arguments: Sequence[Any],
+    constant: Callable[[Any], NDArray[np.float64] | None],
+) -> Any:
+    """The value of ``name(arguments)`` of a function in the table, with the given arithmetic.
+
+    ``constant`` returns the numbers of an argument, or ``None`` where it depends on symbols. Raises the error
+    of the place for arguments that do not fit.
+    """
+    function = TABLE[name]
+    _check_count(place, name, function, len(arguments))
+    try:
+        if not function.creates:
+            return function.compute(by, *arguments)
+        numbers = [constant(argument) for argument in arguments]
+        if any(number is None for number in numbers):
+            raise place.error(
+                f"the size of an array made by {name} is not constant", allowed="constant numbers"
+            )
+        return by.constant(function.compute(*numbers))
+    except MismatchError as mismatch:
+        raise place.error(f"{name}: {mismatch}", allowed=f"{name}({function.arguments})") from None
+
+
+def _check_count(place: Place, name: str, function: Function, count: int) -> None:
+    if function.fewest <= count <= function.most:
+        return
+    if count == 0:
+        raise place.error(f"the function '{name}' has no arguments", allowed=f"{name}({function.arguments})")
+    few, most = function.fewest, function.most
+    raise place.error(
+        f"{name} is called with {count} argument{'s' * (count != 1)}",
+        allowed=f"{few}" if few == most else f"{few} to {most}",
+    )

@@ -1,0 +1,107 @@
+"""Formulas: expressions as values of parameters and as functions of signals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from casadi import SX
+
+from armblocks.errors import InputError
+from armblocks.matlab.evaluation import Evaluator
+from armblocks.matlab.functions import TABLE
+from armblocks.matlab.operators import COMPARISONS
+from armblocks.matlab.parser import parse_formula
+from armblocks.matlab.source import formula_source
+from armblocks.matlab.symbols import Symbol, Symbols
+from armblocks.matlab.syntax import Chain, Expression, Name, Parentheses, Postfix, levels, parts_of
+
+LONGEST = 4000
+"""Maximum number of characters of a formula; longer ones should be diagrams."""
+
+_SIDES: Mapping[str, float] = {">": -1e-300, "<=": -1e-300, ">=": 1e-300, "<": 1e-300}
+"""An offset below any signal resolution: it assigns the border itself to one side."""
+
+
+class Formula:
+    """A parsed formula with unresolved names.
+
+    Raises ``InputError`` with the position and the allowed syntax where the text is not a formula.
+    """
+
+    def __init__(self, text: str, where: str, *, longest: int = LONGEST) -> None:
+        if len(text) > longest:
+            raise InputError(
+                f"the formula has {len(text)} characters",
+                where=where,
+                allowed=f"at most {longest}",
+                fix="split it, or draw it as blocks",
+            )
+        self._source = formula_source(text, where)
+        self._tree = parse_formula(self._source)
+
+    @property
+    def names(self) -> frozenset[str]:
+        """The names that need a value: all names except those of the function table.
+
+        A name such as ``length`` is a parameter where it stands alone and a function where it is called.
+        """
+        return frozenset(name for name, called in _names(self._tree) if _needs_value(name, called))
+
+    @property
+    def readable_names(self) -> frozenset[str]:
+        """:attr:`names`, and the functions that a parameter of the same name would hide."""
+        found = (name for name, called in _names(self._tree) if _needs_value(name, called) or name in TABLE)
+        return frozenset(name for name in found if name not in TABLE or not TABLE[name].reserved)
+
+    @property
+    def unknown_functions(self) -> frozenset[str]:
+        """The names that are called or indexed and are not in the function table."""
+        return frozenset(name for name, called in _names(self._tree) if called and name not in TABLE)
+
+    def trace(self, names: Mapping[str, SX]) -> SX:
+        """The value of the formula for these names; vectors are columns, scalars are broadcast.
+
+        Raises ``UnknownNameError`` for an unknown name or function, ``InputError`` for other errors.
+        """
+        return self._value(self._tree, names)
+
+    def borders(self, names: Mapping[str, SX]) -> list[SX]:
+        """Quantities whose zeros are the changes of comparisons in the formula: left minus right of each.
+
+        At equality the offset gives the value of the comparison. For a formula without comparisons the result
+        is its value.
+        """
+        found: list[SX] = []
+        for level in levels(self._tree):
+            for part in level:
+                if isinstance(part, Chain) and part.rest[0].operator in COMPARISONS:
+                    left, right = (self._value(side, names) for side in parts_of(part))
+                    found.append(left - right + _SIDES.get(part.rest[0].operator, 0.0))
+        return found or [self.trace(names)]
+
+    def _value(self, expression: Expression, names: Mapping[str, SX]) -> SX:
+        variables: Mapping[str, Symbol] = dict(names)
+        found = Evaluator(self._source, Symbols(names), variables).value(expression)
+        if isinstance(found, str):
+            raise self._source.place(expression.at).error(
+                f"the text '{found[:40]}' is no number", allowed="numbers and names without quotes"
+            )
+        return found
+
+
+def _names(tree: Expression) -> Iterator[tuple[str, bool]]:
+    """All names in a tree, each with whether it is called or indexed."""
+    called: set[int] = set()
+    for level in levels(tree):
+        for part in level:
+            if isinstance(part, Postfix) and isinstance(part.steps[0], Parentheses):
+                called.add(id(part.base))
+            elif isinstance(part, Name):
+                yield part.name, id(part) in called
+
+
+def _needs_value(name: str, called: bool) -> bool:
+    function = TABLE.get(name)
+    if function is None:
+        return True
+    return not called and function.fewest > 0 and not function.reserved

@@ -1,0 +1,222 @@
+"""Kinds of functions of the language, and the arithmetic in which they are written."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+CONSTANTS, TRIGONOMETRY, POWERS = "Constants", "Angles and hyperbolic functions", "Powers and logarithms"
+ROUNDING, CHOICE, ARRAYS, GEOMETRY = "Rounding and signs", "Comparison and logic", "Arrays", "Rigid motions"
+
+
+class MismatchError(Exception):
+    """Arguments that a function does not accept. The caller adds the place."""
+
+
+class Arithmetic(Protocol):
+    """The operations that the functions of the table are written in, besides ``+ - * < == …`` of arrays.
+
+    ``Any`` is an array of numbers or of symbols. All operations act element by element, except those of whole
+    arrays, which are listed last.
+    """
+
+    def elementary(self, name: str, *values: Any) -> Any:
+        """A function of :mod:`armblocks.rounded_functions`."""
+        ...
+
+    def sqrt(self, value: Any) -> Any:
+        """Square root."""
+        ...
+
+    def floor(self, value: Any) -> Any:
+        """Round down."""
+        ...
+
+    def ceil(self, value: Any) -> Any:
+        """Round up."""
+        ...
+
+    def sign(self, value: Any) -> Any:
+        """-1, 0 or 1."""
+        ...
+
+    def absolute(self, value: Any) -> Any:
+        """Absolute value."""
+        ...
+
+    def least(self, left: Any, right: Any) -> Any:
+        """The smaller one; the other where one is NaN."""
+        ...
+
+    def greatest(self, left: Any, right: Any) -> Any:
+        """The larger one; the other where one is NaN."""
+        ...
+
+    def quotient(self, left: Any, right: Any) -> Any:
+        """``left ./ right``"""
+        ...
+
+    def remainder(self, left: Any, right: Any) -> Any:
+        """The exact remainder with the sign of the dividend."""
+        ...
+
+    def where(self, condition: Any, yes: Any, no: Any) -> Any:
+        """``yes`` where the condition is not 0, else ``no``."""
+        ...
+
+    def both(self, left: Any, right: Any) -> Any:
+        """1 where both are not 0, else 0."""
+        ...
+
+    def either(self, left: Any, right: Any) -> Any:
+        """1 where one is not 0, else 0."""
+        ...
+
+    def constant(self, array: NDArray[np.float64]) -> Any:
+        """An array of numbers."""
+        ...
+
+    def shape(self, value: Any) -> tuple[int, int]:
+        """Rows and columns."""
+        ...
+
+    def folded(self, combine: Callable[[Any, Any], Any], value: Any) -> Any:
+        """All elements of a vector, or those of each column of a matrix, combined from first to last."""
+        ...
+
+    def total(self, value: Any) -> Any:
+        """The sum of a vector, or the sums of the columns of a matrix."""
+        ...
+
+    def length_of(self, value: Any) -> Any:
+        """The square root of the sum of the squares of all elements."""
+        ...
+
+    def entries(self, value: Any) -> list[Any]:
+        """The elements, column by column."""
+        ...
+
+    def vector_like(self, entries: Sequence[Any], model: Any) -> Any:
+        """A vector of these elements, with the orientation of ``model``."""
+        ...
+
+    def from_rows(self, rows: Sequence[Sequence[Any]]) -> Any:
+        """A matrix of numbers and elements."""
+        ...
+
+    def transposed_matrix(self, value: Any) -> Any:
+        """The transpose."""
+        ...
+
+    def diagonal(self, value: Any) -> Any:
+        """The diagonal of a matrix, or the matrix with this diagonal."""
+        ...
+
+    def inverse(self, value: Any) -> Any:
+        """The inverse of a square matrix."""
+        ...
+
+    def cosine_sine(self, angle: Any) -> tuple[Any, Any]:
+        """Cosine and sine of a number, exact at quarter turns if it is constant."""
+        ...
+
+
+Compute = (
+    Callable[[Arithmetic, Any], Any]
+    | Callable[[Arithmetic, Any, Any], Any]
+    | Callable[[Arithmetic, Any, Any, Any], Any]
+)
+"""The implementation of a function of one to three arguments."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Function:
+    """A function of ``fewest`` to ``most`` arguments, or a constant (none)."""
+
+    arguments: str
+    """The arguments in the documentation, ``x, y``."""
+    meaning: str
+    group: str
+    fewest: int
+    most: int
+    compute: Callable[..., Any]
+    """From :class:`Arithmetic` and the arguments; with ``creates``, from plain numbers to an array."""
+    elementwise: bool = False
+    """Whether the arguments are combined element by element."""
+    creates: bool = False
+    """Whether the arguments determine a size: they must be constant."""
+    real_from: float = -math.inf
+    real_to: float = math.inf
+    """The interval of arguments with real values. Scripts raise an error outside; formulas give NaN."""
+    reserved: bool = False
+    """Whether no parameter may have this name. Parameters hide the other functions, as in MATLAB."""
+    elementary: bool = False
+    """Whether an element costs much more than a sum, as numbers are computed by integer arithmetic."""
+    takes_text: bool = False
+    """Whether an argument may be text in quotes."""
+
+
+def constant(value: float, meaning: str, *, reserved: bool = False) -> Function:
+    """A number with a name."""
+
+    def compute(by: Arithmetic) -> Any:
+        return by.constant(np.array([[value]]))
+
+    return Function(
+        arguments="",
+        meaning=meaning,
+        group=CONSTANTS,
+        fewest=0,
+        most=0,
+        compute=compute,
+        reserved=reserved,
+    )
+
+
+def rounded(
+    name: str, meaning: str, group: str, real_from: float = -math.inf, real_to: float = math.inf
+) -> Function:
+    """A function of one argument of :mod:`armblocks.rounded_functions`."""
+    return elementwise(
+        "x",
+        meaning,
+        group,
+        lambda by, x: by.elementary(name, x),
+        real_from=real_from,
+        real_to=real_to,
+        reserved=True,
+        elementary=True,
+    )
+
+
+def elementwise(arguments: str, meaning: str, group: str, compute: Compute, **more: Any) -> Function:
+    """A function of these arguments, element by element."""
+    return whole(arguments, meaning, group, compute, elementwise=True, **more)
+
+
+def whole(
+    arguments: str, meaning: str, group: str, compute: Compute, *, optional: int = 0, **more: Any
+) -> Function:
+    """A function of whole arrays; the last ``optional`` arguments may be missing."""
+    count = arguments.count(",") + 1
+    return Function(
+        arguments=arguments,
+        meaning=meaning,
+        group=group,
+        fewest=count - optional,
+        most=count,
+        compute=compute,
+        **more,
+    )
+
+
+def created(
+    arguments: str, meaning: str, compute: Callable[..., NDArray[np.float64]], *, optional: int = 0
+) -> Function:
+    """An array of a given size, from plain numbers."""
+    return whole(arguments, meaning, ARRAYS, compute, optional=optional, creates=True, reserved=True)

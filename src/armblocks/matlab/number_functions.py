@@ -1,0 +1,168 @@
+"""Functions of numbers, which act on arrays element by element, and constants."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from armblocks.matlab.function_kinds import (
+    CHOICE,
+    POWERS,
+    ROUNDING,
+    TRIGONOMETRY,
+    Arithmetic,
+    Function,
+    constant,
+    elementwise,
+    rounded,
+    whole,
+)
+
+# Rounding and remainders, with the formulas of the blocks Rounding Function and Modulo.
+
+
+def _nearest(by: Arithmetic, x: Any) -> Any:
+    whole = by.floor(by.absolute(x))
+    return by.sign(x) * (whole + (by.absolute(x) - whole >= 0.5))
+
+
+def _toward_zero(by: Arithmetic, x: Any) -> Any:
+    return by.sign(x) * by.floor(by.absolute(x))
+
+
+def _modulo(by: Arithmetic, x: Any, y: Any) -> Any:
+    rest = by.remainder(x, y)
+    other_sign = by.both(rest != 0.0, (rest < 0.0) != (y < 0.0))
+    return by.where(y == 0.0, x, by.where(other_sign, rest + y, rest))
+
+
+def _extreme(name: str) -> Callable[..., Any]:
+    def compute(by: Arithmetic, x: Any, *other: Any) -> Any:
+        combine = getattr(by, name)
+        return combine(x, *other) if other else by.folded(combine, x)
+
+    return compute
+
+
+CONSTANTS_BY_NAME: Mapping[str, Function] = {
+    "pi": constant(math.pi, "π", reserved=True),
+    "e": constant(math.e, "Euler's number, 2.718…", reserved=True),
+    "inf": constant(math.inf, "Infinity.", reserved=True),
+    "Inf": constant(math.inf, "Infinity.", reserved=True),
+    "nan": constant(math.nan, "Not a number.", reserved=False),
+    "NaN": constant(math.nan, "Not a number.", reserved=False),
+    "eps": constant(2.0**-52, "The distance from 1 to the next larger number."),
+    "deg": constant(math.pi / 180.0, "One degree in rad: `45*deg`.", reserved=True),
+    "rad": constant(1.0, "One radian: `0.5*rad`.", reserved=True),
+    "true": constant(1.0, "1"),
+    "false": constant(0.0, "0"),
+}
+FUNCTIONS_OF_NUMBERS: Mapping[str, Function] = {
+    "sin": rounded("sin", "Sine of an angle in rad.", TRIGONOMETRY),
+    "cos": rounded("cos", "Cosine of an angle in rad.", TRIGONOMETRY),
+    "tan": rounded("tan", "Tangent of an angle in rad.", TRIGONOMETRY),
+    "asin": rounded("asin", "Inverse sine, -π/2 to π/2.", TRIGONOMETRY, -1.0, 1.0),
+    "acos": rounded("acos", "Inverse cosine, 0 to π.", TRIGONOMETRY, -1.0, 1.0),
+    "atan": rounded("atan", "Inverse tangent, -π/2 to π/2.", TRIGONOMETRY),
+    "atan2": elementwise(
+        "y, x",
+        "The angle of the point (x, y), -π to π.",
+        TRIGONOMETRY,
+        lambda by, y, x: by.elementary("atan2", y, x),
+        reserved=True,
+        elementary=True,
+    ),
+    "sinh": rounded("sinh", "Hyperbolic sine.", TRIGONOMETRY),
+    "cosh": rounded("cosh", "Hyperbolic cosine.", TRIGONOMETRY),
+    "tanh": rounded("tanh", "Hyperbolic tangent.", TRIGONOMETRY),
+    "asinh": rounded("asinh", "Inverse hyperbolic sine.", TRIGONOMETRY),
+    "acosh": rounded("acosh", "Inverse hyperbolic cosine, of 1 or more.", TRIGONOMETRY, 1.0),
+    "atanh": rounded("atanh", "Inverse hyperbolic tangent, of -1 to 1.", TRIGONOMETRY, -1.0, 1.0),
+    "deg2rad": elementwise(
+        "x", "Degrees in rad.", TRIGONOMETRY, lambda by, x: x * (math.pi / 180.0), reserved=True
+    ),
+    "rad2deg": elementwise(
+        "x", "Radians in degrees.", TRIGONOMETRY, lambda by, x: x * (180.0 / math.pi), reserved=True
+    ),
+    "exp": rounded("exp", "e to the power of x.", POWERS),
+    "expm1": rounded("expm1", "exp(x) - 1, exact for small x.", POWERS),
+    "log": rounded("log", "Natural logarithm.", POWERS, 0.0),
+    "ln": rounded("log", "Natural logarithm.", POWERS, 0.0),
+    "log10": rounded("log10", "Decimal logarithm.", POWERS, 0.0),
+    "log1p": rounded("log1p", "log(1 + x), exact for small x.", POWERS, -1.0),
+    "sqrt": elementwise("x", "Square root.", POWERS, lambda by, x: by.sqrt(x), reserved=True, real_from=0.0),
+    "power": elementwise(
+        "x, y",
+        "x to the power of y, as `x.^y`.",
+        POWERS,
+        lambda by, x, y: by.elementary("power", x, y),
+        reserved=True,
+        elementary=True,
+    ),
+    "pow": elementwise(
+        "x, y",
+        "x to the power of y, as `x.^y`.",
+        POWERS,
+        lambda by, x, y: by.elementary("power", x, y),
+        reserved=True,
+        elementary=True,
+    ),
+    "hypot": elementwise(
+        "x, y",
+        "The square root of x² + y².",
+        POWERS,
+        lambda by, x, y: by.elementary("hypot", x, y),
+        reserved=True,
+        elementary=True,
+    ),
+    "erf": rounded("erf", "Error function.", POWERS),
+    "abs": elementwise("x", "Absolute value.", ROUNDING, lambda by, x: by.absolute(x), reserved=True),
+    "sign": elementwise("x", "-1, 0 or 1.", ROUNDING, lambda by, x: by.sign(x), reserved=True),
+    "floor": elementwise("x", "Down to an integer.", ROUNDING, lambda by, x: by.floor(x), reserved=True),
+    "ceil": elementwise("x", "Up to an integer.", ROUNDING, lambda by, x: by.ceil(x), reserved=True),
+    "round": elementwise("x", "The nearest integer; halves away from zero.", ROUNDING, _nearest),
+    "fix": elementwise("x", "The integer part, rounded toward zero.", ROUNDING, _toward_zero),
+    "rem": elementwise(
+        "x, y",
+        "The remainder with the sign of x; `rem(x, 0)` is NaN.",
+        ROUNDING,
+        lambda by, x, y: by.remainder(x, y),
+        reserved=True,
+    ),
+    "mod": elementwise("x, y", "The remainder with the sign of y; `mod(x, 0)` is x.", ROUNDING, _modulo),
+    "if": elementwise(
+        "condition, yes, no",
+        "`yes` where the condition is not 0, else `no`.",
+        CHOICE,
+        lambda by, condition, yes, no: by.where(condition != 0.0, yes, no),
+        reserved=True,
+    ),
+    "and": elementwise("x, y", "1 where both are not 0, as `x & y`.", CHOICE, lambda by, x, y: by.both(x, y)),
+    "or": elementwise("x, y", "1 where one is not 0, as `x | y`.", CHOICE, lambda by, x, y: by.either(x, y)),
+    "xor": elementwise(
+        "x, y",
+        "1 where exactly one is not 0.",
+        CHOICE,
+        lambda by, x, y: (x != 0.0) != (y != 0.0),
+    ),
+    "not": elementwise("x", "1 where x is 0, as `~x`.", CHOICE, lambda by, x: x == 0.0),
+    "any": whole("x", "1 where one element is not 0.", CHOICE, lambda by, x: by.folded(by.either, x != 0.0)),
+    "all": whole("x", "1 where all elements are not 0.", CHOICE, lambda by, x: by.folded(by.both, x != 0.0)),
+    "min": elementwise(
+        "x, y",
+        "The smaller of two numbers, element by element; `min(x)` is the smallest element.",
+        CHOICE,
+        _extreme("least"),
+        optional=1,
+        reserved=True,
+    ),
+    "max": elementwise(
+        "x, y",
+        "The larger of two numbers, element by element; `max(x)` is the largest element.",
+        CHOICE,
+        _extreme("greatest"),
+        optional=1,
+        reserved=True,
+    ),
+}

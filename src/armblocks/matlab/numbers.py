@@ -1,0 +1,297 @@
+"""Values of expressions as numbers: arrays with two axes and texts, as in MATLAB."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import reduce
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks import rounded_functions
+from armblocks.errors import UnknownNameError
+from armblocks.matlab.array_functions import range_of
+from armblocks.matlab.arrays import (
+    ROUNDED_WORK,
+    Array,
+    Budget,
+    array_of,
+    is_array,
+    kind_of,
+    number_of,
+    operate,
+    positions,
+    scalar,
+    stacked,
+)
+from armblocks.matlab.calls import call_function
+from armblocks.matlab.function_kinds import MismatchError
+from armblocks.matlab.functions import TABLE
+from armblocks.matlab.source import Place
+from armblocks.matlab.syntax import Expression
+from armblocks.spatial.rotation import cos_exact, sin_exact
+
+Plain = Array | str
+
+
+class NumberArithmetic:
+    """The operations of the function table on arrays of numbers (:class:`~.function_kinds.Arithmetic`)."""
+
+    def elementary(self, name: str, *values: Array) -> Array:
+        """A correctly rounded function, element by element."""
+        return np.vectorize(rounded_functions.FUNCTIONS[name], otypes=[np.float64])(*values)
+
+    def sqrt(self, value: Array) -> Array:
+        """Square root."""
+        return np.sqrt(value)
+
+    def floor(self, value: Array) -> Array:
+        """Round down."""
+        return np.floor(value)
+
+    def ceil(self, value: Array) -> Array:
+        """Round up."""
+        return np.ceil(value)
+
+    def sign(self, value: Array) -> Array:
+        """-1, 0 or 1."""
+        return np.sign(value)
+
+    def absolute(self, value: Array) -> Array:
+        """Absolute value."""
+        return np.abs(value)
+
+    def least(self, left: Array, right: Array) -> Array:
+        """The smaller one; the other where one is NaN."""
+        return np.fmin(left, right)
+
+    def greatest(self, left: Array, right: Array) -> Array:
+        """The larger one; the other where one is NaN."""
+        return np.fmax(left, right)
+
+    def quotient(self, left: Array, right: Array) -> Array:
+        """``left ./ right``"""
+        return left / right
+
+    def remainder(self, left: Array, right: Array) -> Array:
+        """The exact remainder with the sign of the dividend."""
+        return np.fmod(left, right)
+
+    def where(self, condition: Array, yes: Array, no: Array) -> Array:
+        """``yes`` where the condition is not 0, else ``no``."""
+        return np.where(condition != 0.0, yes, no)
+
+    def both(self, left: Array, right: Array) -> Array:
+        """1 where both are not 0, else 0."""
+        return np.logical_and(left != 0.0, right != 0.0)
+
+    def either(self, left: Array, right: Array) -> Array:
+        """1 where one is not 0, else 0."""
+        return np.logical_or(left != 0.0, right != 0.0)
+
+    def constant(self, array: NDArray[np.float64]) -> Array:
+        """An array of numbers."""
+        return array
+
+    def shape(self, value: Array) -> tuple[int, int]:
+        """Rows and columns."""
+        rows, columns = value.shape
+        return rows, columns
+
+    def folded(self, combine: Callable[[Any, Any], Any], value: Array) -> Array:
+        """All elements of a vector, or those of each column of a matrix, combined from first to last."""
+        rows = value.reshape(-1, 1) if 1 in value.shape else value
+        if not rows.size:
+            raise MismatchError("the array is empty")
+        return reduce(combine, [rows[k : k + 1] for k in range(rows.shape[0])])
+
+    def total(self, value: Array) -> Array:
+        """The sum of a vector, or the sums of the columns of a matrix."""
+        return self.folded(np.add, value) if value.size else scalar(0.0)
+
+    def length_of(self, value: Array) -> Array:
+        """The square root of the sum of the squares of all elements."""
+        return np.sqrt(self.total((value * value).reshape(-1, 1, order="F")))
+
+    def entries(self, value: Array) -> list[float]:
+        """The elements, column by column."""
+        return [float(entry) for entry in value.ravel(order="F")]
+
+    def vector_like(self, entries: Sequence[Any], model: Array) -> Array:
+        """A vector of these elements, with the orientation of ``model``."""
+        return np.array(entries, dtype=np.float64).reshape((-1, 1) if model.shape[1] == 1 else (1, -1))
+
+    def from_rows(self, rows: Sequence[Sequence[Any]]) -> Array:
+        """A matrix of numbers and elements."""
+        return np.array(rows, dtype=np.float64)
+
+    def transposed_matrix(self, value: Array) -> Array:
+        """The transpose."""
+        return value.T.copy()
+
+    def diagonal(self, value: Array) -> Array:
+        """The diagonal of a matrix, or the matrix with this diagonal."""
+        if 1 in value.shape or value.size == 0:
+            if value.size**2 > 100_000:
+                raise MismatchError(f"a matrix would have {value.size}x{value.size} elements")
+            return np.diag(value.ravel())
+        return np.diag(value).reshape(-1, 1)
+
+    def inverse(self, value: Array) -> Array:
+        """The inverse of a square matrix."""
+        rows, columns = value.shape
+        if rows != columns:
+            raise MismatchError(f"a {rows} x {columns} matrix has no inverse")
+        try:
+            return np.asarray(np.linalg.solve(value, np.eye(rows)), dtype=np.float64)
+        except np.linalg.LinAlgError:
+            raise MismatchError("a singular matrix has no inverse") from None
+
+    def cosine_sine(self, angle: Array) -> tuple[float, float]:
+        """Cosine and sine of a number, exact at quarter turns."""
+        number = float(angle[0, 0])
+        return cos_exact(number), sin_exact(number)
+
+
+class Numbers:
+    """The operations of expressions on numbers (:class:`~.evaluation.Values`), within a budget of work."""
+
+    def __init__(self, budget: Budget) -> None:
+        self.budget = budget
+        self._arithmetic = NumberArithmetic()
+
+    def number(self, value: float) -> Plain:
+        """A number."""
+        return scalar(value)
+
+    def text(self, place: Place, value: str) -> Plain:
+        """A text in quotes."""
+        return value
+
+    def negative(self, place: Place, value: object) -> Array:
+        """``-value``; 0 stays 0."""
+        array = array_of(place, value, "what stands behind '-'")
+        self.budget.spend(place, array.size)
+        return 0.0 - array if array.size == 1 and array[0, 0] == 0 else -array
+
+    def logical_not(self, place: Place, value: object) -> Array:
+        """``~value``"""
+        array = array_of(place, value, "what stands behind '~'")
+        self.budget.spend(place, array.size)
+        return (array == 0.0).astype(np.float64)
+
+    def operate(self, place: Place, operator: str, left: object, right: object) -> Array:
+        """``left operator right`` of arithmetic or a comparison."""
+        return operate(place, self.budget, operator, left, right)
+
+    def logic(self, place: Place, operator: str, values: Sequence[object]) -> Array:
+        """All values joined by one of ``&& || & |``."""
+        joined = np.logical_and if operator in ("&&", "&") else np.logical_or
+        found = array_of(place, values[0], f"what stands left of '{operator}'") != 0.0
+        for value in values[1:]:
+            other = array_of(place, value, f"what stands right of '{operator}'") != 0.0
+            if found.shape != other.shape and 1 not in (found.size, other.size):
+                raise place.error(
+                    f"'{operator}' of {kind_of(found)} and {kind_of(other)}",
+                    allowed="equal sizes, or a number on one side",
+                )
+            self.budget.spend(place, max(found.size, other.size))
+            found = joined(found, other)
+        return found.astype(np.float64)
+
+    def matrix(self, place: Place, rows: Sequence[Sequence[object]]) -> Plain:
+        """``[a b; c d]`` of arrays, or of texts in one row."""
+        flat = [value for row in rows for value in row]
+        texts = [value for value in flat if isinstance(value, str)]
+        if texts and len(texts) == len(flat) and len(rows) == 1:
+            return "".join(texts)
+        return stacked(place, self.budget, rows)
+
+    def cell(self, place: Place, elements: Sequence[object]) -> Plain:
+        """Cell arrays exist in scripts only."""
+        raise place.error("a cell array is no number", allowed="[a b; c d]")
+
+    def range(self, place: Place, parts: Sequence[object]) -> Array:
+        """``first:last`` or ``first:step:last``"""
+        ends = [number_of(place, part, "an end of a range") for part in parts]
+        first, step, last = (ends[0], 1.0, ends[1]) if len(ends) == 2 else ends
+        try:
+            found = range_of(first, step, last)
+        except MismatchError as mismatch:
+            raise place.error(f"a range: {mismatch}", allowed="first:last or first:step:last") from None
+        self.budget.spend(place, found.size)
+        return found
+
+    def transposed(self, place: Place, value: object) -> Array:
+        """``value'``"""
+        array = array_of(place, value, "what is transposed")
+        self.budget.spend(place, array.size)
+        return array.T.copy()
+
+    def element(self, place: Place, value: object, indices: Sequence[object], shown: str) -> Array:
+        """``value(indices)``, where ``None`` is ``:``."""
+        if not is_array(value):
+            raise place.error(f"() is used on {kind_of(value)}", allowed="matrices and arrays of links")
+        self.budget.spend(place, value.size)
+        rows, columns = value.shape
+        return value.ravel(order="F")[positions(place, (rows, columns), indices, shown)]
+
+    def last_index(self, place: Place, value: object, position: int, count: int) -> Array:
+        """``end`` as index ``position`` of ``count`` indices."""
+        array = array_of(place, value, "what 'end' belongs to")
+        return scalar(float(array.size if count == 1 else array.shape[min(position, 1)]))
+
+    def cell_element(self, place: Place, value: object, indices: Sequence[object]) -> Plain:
+        """Cell arrays exist in scripts only."""
+        raise place.error(f"{{}} is used on {kind_of(value)}", allowed="cell arrays")
+
+    def field(self, place: Place, value: object, name: str) -> Plain:
+        """``A.T`` is the transpose; numbers have no other fields."""
+        if is_array(value) and name == "T":
+            return self.transposed(place, value)
+        raise place.error(f"{kind_of(value)} has no field '{name}'", allowed="fields of links and robots")
+
+    def check_function(self, place: Place, name: str, called: bool) -> None:
+        """Raise ``UnknownNameError`` unless the table has a function of this name."""
+        if name not in TABLE:
+            raise UnknownNameError("function" if called else "name", name, TABLE, where=place.source.name)
+
+    def call(
+        self, place: Place, name: str, arguments: Sequence[object], written: Sequence[Expression]
+    ) -> Plain:
+        """``name(arguments)`` of a function in the table. Complex results are errors."""
+        function = TABLE[name]
+        plain: list[Any] = [
+            value if isinstance(value, str) and function.takes_text else _argument(place, value, name)
+            for value in arguments
+        ]
+        arrays = [value for value in plain if is_array(value)]
+        if function.elementwise:
+            _check_sizes(place, name, arrays)
+        for array in arrays if function.elementwise else ():
+            if np.any((array < function.real_from) | (array > function.real_to)):
+                raise place.error(
+                    f"{name} has a complex value here",
+                    allowed=f"arguments from {function.real_from:g} to {function.real_to:g}",
+                )
+        size = max((array.size for array in arrays), default=1)
+        self.budget.spend(place, size * (ROUNDED_WORK if function.elementary else 1))
+        with np.errstate(all="ignore"):
+            found = call_function(self._arithmetic, place, name, plain, np.asarray)
+        found = np.asarray(found, dtype=np.float64)
+        self.budget.spend(place, found.size)
+        return found
+
+
+def _argument(place: Place, value: object, name: str) -> Array:
+    return array_of(place, value, f"the argument of {name}")
+
+
+def _check_sizes(place: Place, name: str, arrays: Sequence[Array]) -> None:
+    shapes = {array.shape for array in arrays if array.size != 1}
+    if len(shapes) > 1:
+        raise place.error(
+            f"the arguments of {name} are {' and '.join(kind_of(array) for array in arrays)}",
+            allowed="equal sizes, or numbers",
+        )

@@ -1,0 +1,93 @@
+"""The text of a script or formula, and places in it: errors name the line, the column and the text there."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from armblocks.errors import ArmblocksError, FormatError, InputError
+
+SCRIPTS = (
+    "straight-line scripts of the Robotics Toolbox: link, robot, Link, Revolute, Prismatic, SerialLink, "
+    "their fields, cell arrays, matrices, arithmetic, common functions, comments, clear"
+)
+FORMULAS = (
+    "numbers, names, u(1) or u[1], [1 2; 3 4], + - * / ^, comparisons, && || ~ and functions such as sin, "
+    "sqrt, max"
+)
+
+LONGEST_QUOTE = 100
+"""Characters of a line that a message repeats."""
+CARET = "\u2038"
+"""Marks the column in a quoted line. Unlike ``^``, it is no operator of the language."""
+
+
+class Position(NamedTuple):
+    """A line and a column, both counted from 1."""
+
+    line: int
+    column: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Source:
+    """The lines of a text, and its name in messages: a file (``is_file``), or the place of a formula."""
+
+    name: str
+    lines: tuple[str, ...]
+    is_file: bool = False
+
+    def place(self, at: Position) -> Place:
+        """The place of a position."""
+        return Place(self, at)
+
+
+def formula_source(text: str, where: str) -> Source:
+    """The lines of a formula; ``where`` says in messages which formula it is."""
+    return Source(name=where, lines=_lines(text))
+
+
+def script_source(text: str, name: str) -> Source:
+    """The lines of a script with the file name ``name``."""
+    return Source(name=name, lines=_lines(text), is_file=True)
+
+
+def _lines(text: str) -> tuple[str, ...]:
+    # Only MATLAB's own line ends: str.splitlines would also break at form feeds and Unicode separators.
+    return tuple(re.split(r"\r\n|\r|\n", text))
+
+
+@dataclass(frozen=True)
+class Place:
+    """A position in a source."""
+
+    source: Source
+    at: Position
+
+    def error(self, what: str, *, allowed: str = "", fix: str = "") -> ArmblocksError:
+        """The error for something at this place, to be raised by the caller.
+
+        ``FormatError`` for a script, with file and line; ``InputError`` for a formula.
+        """
+        source, (line, column) = self.source, self.at
+        text = source.lines[line - 1] if 1 <= line <= len(source.lines) else ""
+        if quoted := _with_caret(text, column):
+            within = f"line {line}, column" if len(source.lines) > 1 and not source.is_file else "column"
+            what = f"{what}, in {within} {column}: {quoted}"
+        if source.is_file:
+            return FormatError(what, where=f"{source.name}:{line}", allowed=allowed or SCRIPTS, fix=fix)
+        return InputError(
+            what, where=source.name, allowed=allowed or FORMULAS, fix=fix or "correct the formula"
+        )
+
+
+def _with_caret(text: str, column: int) -> str:
+    """The line with a caret before the column; of a long line, the part around it."""
+    if not text.strip():
+        return ""
+    start, end = max(0, column - 1 - 2 * LONGEST_QUOTE // 3), column - 1
+    before, after = text[start:end], text[end : start + LONGEST_QUOTE]
+    head = "… " if start and before.strip() else ""
+    tail = " …" if start + LONGEST_QUOTE < len(text.rstrip()) else ""
+    return f"{head}{before.lstrip()}{CARET}{after.rstrip()}{tail}"

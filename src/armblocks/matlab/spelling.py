@@ -1,0 +1,100 @@
+"""Trees written as text, with the brackets that the precedences need; reading it back gives the same tree."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from armblocks.matlab.operators import INFIX, Level
+from armblocks.matlab.syntax import (
+    All,
+    Braces,
+    CellLiteral,
+    Chain,
+    End,
+    Expression,
+    Field,
+    Matrix,
+    Name,
+    Number,
+    Parentheses,
+    Postfix,
+    Prefix,
+    Range,
+    Step,
+    Text,
+)
+
+
+def spelling(expression: Expression) -> str:
+    """The text of an expression."""
+    match expression:
+        case Number(value=value):
+            return repr(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value)
+        case Text(value=value):
+            return "'" + value.replace("'", "''") + "'"
+        case Name(name=name):
+            return name
+        case End():
+            return "end"
+        case All():
+            return ":"
+        case Matrix(rows=rows):
+            return "[" + "; ".join(_row(row) for row in rows) + "]"
+        case CellLiteral(elements=elements):
+            return "{" + _row(elements) + "}"
+        case Prefix(operator=operator, operand=operand):
+            return operator + _bracketed(operand, Level.POWER)
+        case Chain(first=first, rest=rest):
+            level = INFIX[rest[0].operator]
+            pieces = [_bracketed(first, Level(level + 1))]
+            for operation in rest:
+                operand = _operand_of_power if level is Level.POWER else _bracketed
+                blank = "" if level >= Level.PRODUCT else " "
+                pieces += [blank, operation.operator, blank, operand(operation.operand, Level(level + 1))]
+            return "".join(pieces)
+        case Range(parts=parts):
+            return ":".join(_bracketed(part, Level.SUM) for part in parts)
+        case Postfix(base=base, steps=steps):
+            whole = _bracketed(base, Level.OPERAND)
+            bare = not (isinstance(base, Number) and isinstance(steps[0], Field))  # not 5.T
+            return (whole if bare else f"({whole})") + "".join(map(_step, steps))
+
+
+def _row(elements: Sequence[Expression]) -> str:
+    return ", ".join(map(spelling, elements))
+
+
+def _step(step: Step) -> str:
+    match step:
+        case Parentheses(arguments=arguments):
+            return f"({_row(arguments)})"
+        case Braces(arguments=arguments):
+            return "{" + _row(arguments) + "}"
+        case Field(name=name):
+            return f".{name}"
+        case _:
+            return "'"
+
+
+def _level(expression: Expression) -> Level:
+    match expression:
+        case Chain(rest=rest):
+            return INFIX[rest[0].operator]
+        case Prefix():
+            return Level.SIGN
+        case Range():
+            return Level.RANGE
+        case _:
+            return Level.OPERAND
+
+
+def _bracketed(expression: Expression, loosest: Level) -> str:
+    text = spelling(expression)
+    return text if _level(expression) >= loosest else f"({text})"
+
+
+def _operand_of_power(expression: Expression, loosest: Level) -> str:
+    """An exponent: its signs need no brackets, ``2^-1``, unless a power follows them, ``2^(-1^2)``."""
+    if isinstance(expression, Prefix):
+        return expression.operator + _bracketed(expression.operand, Level.OPERAND)
+    return _bracketed(expression, loosest)

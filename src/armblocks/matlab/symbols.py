@@ -1,0 +1,363 @@
+"""Values of expressions as CasADi symbols, for equations that are traced.
+
+A vector is neither row nor column: ``[1 2]`` and ``[1; 2]`` are the same, and ``[v; w]`` has the rows v and
+w. Two vectors are multiplied element by element, as in Simulink's Fcn block (MATLAB would refuse two rows);
+with a matrix ``*`` is the matrix product, as in MATLAB, and ``.*`` goes element by element.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import reduce
+from typing import Any
+
+import casadi
+import numpy as np
+from casadi import SX, evalf, horzcat, if_else, logic_and, logic_not, logic_or, mtimes, reshape, vertcat
+from numpy.typing import NDArray
+
+from armblocks.equations import elementary
+from armblocks.errors import UnknownNameError
+from armblocks.matlab.array_functions import range_of
+from armblocks.matlab.arrays import positions
+from armblocks.matlab.calls import call_function
+from armblocks.matlab.function_kinds import MismatchError
+from armblocks.matlab.functions import TABLE
+from armblocks.matlab.source import Place
+from armblocks.matlab.syntax import Expression
+from armblocks.spatial.rotation import cos_exact, sin_exact
+
+Symbol = SX | str
+"""Texts are arguments of functions only."""
+
+
+def _quotient(left: SX, right: SX) -> SX:
+    """CasADi evaluates every constant divided by zero as plus infinity, also -1/0 and 0/0."""
+    if not (left.is_constant() and right.is_constant()):
+        return left / right
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return SX(np.divide(evalf(left).full(), evalf(right).full()))
+
+
+_OPERATIONS: Mapping[str, Callable[[SX, SX], SX]] = {
+    "+": lambda left, right: left + right,
+    "-": lambda left, right: left - right,
+    "*": lambda left, right: left * right,
+    "/": _quotient,
+    "\\": lambda left, right: _quotient(right, left),
+    "^": lambda left, right: elementary("power", left, right),
+    "<": lambda left, right: left < right,
+    "<=": lambda left, right: left <= right,
+    ">": lambda left, right: right < left,
+    ">=": lambda left, right: right <= left,
+    "==": lambda left, right: left == right,
+    "~=": lambda left, right: left != right,
+}
+
+
+class SymbolArithmetic:
+    """The operations of the function table on symbols (:class:`~.function_kinds.Arithmetic`)."""
+
+    def elementary(self, name: str, *values: SX) -> SX:
+        """An elementary function, correctly rounded for constants."""
+        return elementary(name, *values)
+
+    def sqrt(self, value: SX) -> SX:
+        """Square root."""
+        return casadi.sqrt(value)
+
+    def floor(self, value: SX) -> SX:
+        """Round down."""
+        return casadi.floor(value)
+
+    def ceil(self, value: SX) -> SX:
+        """Round up."""
+        return casadi.ceil(value)
+
+    def sign(self, value: SX) -> SX:
+        """-1, 0 or 1."""
+        return casadi.sign(value)
+
+    def absolute(self, value: SX) -> SX:
+        """Absolute value."""
+        return casadi.fabs(value)
+
+    def least(self, left: SX, right: SX) -> SX:
+        """The smaller one; the other where one is NaN."""
+        return casadi.fmin(left, right)
+
+    def greatest(self, left: SX, right: SX) -> SX:
+        """The larger one; the other where one is NaN."""
+        return casadi.fmax(left, right)
+
+    def quotient(self, left: SX, right: SX) -> SX:
+        """``left ./ right``"""
+        return _quotient(left, right)
+
+    def remainder(self, left: SX, right: SX) -> SX:
+        """The exact remainder with the sign of the dividend."""
+        return casadi.fmod(left, right)
+
+    def where(self, condition: SX, yes: SX, no: SX) -> SX:
+        """``yes`` where the condition is not 0, else ``no``."""
+        return if_else(condition, yes, no)
+
+    def both(self, left: SX, right: SX) -> SX:
+        """1 where both are not 0, else 0."""
+        return logic_and(left != 0.0, right != 0.0)
+
+    def either(self, left: SX, right: SX) -> SX:
+        """1 where one is not 0, else 0."""
+        return logic_or(left != 0.0, right != 0.0)
+
+    def constant(self, array: NDArray[np.float64]) -> SX:
+        """An array of numbers."""
+        return _plain(SX(array)) if array.size else SX(0, 1)
+
+    def shape(self, value: SX) -> tuple[int, int]:
+        """Rows and columns; a vector is a column."""
+        rows, columns = value.shape
+        return rows, columns
+
+    def folded(self, combine: Callable[[Any, Any], Any], value: SX) -> SX:
+        """All elements of a vector, or those of each column of a matrix, combined from first to last."""
+        if not value.numel():
+            raise MismatchError("the array is empty")
+        return reduce(combine, [value[k, :] for k in range(value.shape[0])])
+
+    def total(self, value: SX) -> SX:
+        """The sum of a vector, or the sums of the columns of a matrix."""
+        return casadi.sum1(value)
+
+    def length_of(self, value: SX) -> SX:
+        """The square root of the sum of the squares of all elements."""
+        return casadi.norm_fro(value)
+
+    def entries(self, value: SX) -> list[SX]:
+        """The elements, column by column."""
+        return [value[k] for k in range(value.numel())]
+
+    def vector_like(self, entries: Sequence[Any], model: SX) -> SX:
+        """A vector of these elements."""
+        return vertcat(*entries)
+
+    def from_rows(self, rows: Sequence[Sequence[Any]]) -> SX:
+        """A matrix of numbers and elements."""
+        return vertcat(*(horzcat(*row) for row in rows))
+
+    def transposed_matrix(self, value: SX) -> SX:
+        """The transpose."""
+        return casadi.transpose(value)
+
+    def diagonal(self, value: SX) -> SX:
+        """The diagonal of a matrix, or the matrix with this diagonal."""
+        return casadi.diag(value)
+
+    def inverse(self, value: SX) -> SX:
+        """The inverse of a square matrix."""
+        if value.shape[0] != value.shape[1]:
+            raise MismatchError(f"a {value.shape[0]} x {value.shape[1]} matrix has no inverse")
+        return casadi.inv(value)
+
+    def cosine_sine(self, angle: SX) -> tuple[Any, Any]:
+        """Cosine and sine of a number, exact at quarter turns if it is constant."""
+        if angle.is_constant():
+            return cos_exact(float(angle)), sin_exact(float(angle))
+        return elementary("cos", angle), elementary("sin", angle)
+
+
+class Symbols:
+    """The operations of expressions on symbols (:class:`~.evaluation.Values`)."""
+
+    def __init__(self, names: Mapping[str, SX]) -> None:
+        self._names = names
+        self._arithmetic = SymbolArithmetic()
+
+    def number(self, value: float) -> Symbol:
+        """A number."""
+        return SX(value)
+
+    def text(self, place: Place, value: str) -> Symbol:
+        """A text in quotes."""
+        return value
+
+    def negative(self, place: Place, value: Symbol) -> Symbol:
+        """``-value``"""
+        return -_symbol(place, value)
+
+    def logical_not(self, place: Place, value: Symbol) -> Symbol:
+        """``~value``"""
+        return logic_not(_symbol(place, value) != 0.0)
+
+    def operate(self, place: Place, operator: str, left: Symbol, right: Symbol) -> Symbol:
+        """``left operator right`` of arithmetic or a comparison."""
+        a, b = _symbol(place, left), _symbol(place, right)
+        if operator == "*" and _is_matrix(a, b):
+            return _product(place, a, b)
+        if operator == "^" and (a.shape[1] > 1 or b.shape[1] > 1):
+            raise place.error(
+                "powers of matrices are not supported",
+                allowed="powers of numbers and vectors",
+                fix="write .^ for powers element by element",
+            )
+        divisor = b if operator == "/" else a
+        if operator in ("/", "\\") and divisor.numel() != 1 and _is_matrix(a, b):
+            raise place.error("the divisor is a matrix", allowed="inv(A) * b, or ./ for elementwise division")
+        return _together(place, _OPERATIONS[operator.removeprefix(".")], a, b)
+
+    def logic(self, place: Place, operator: str, values: Sequence[Symbol]) -> Symbol:
+        """All values joined by one of ``&& || & |``."""
+        gate = logic_and if operator in ("&&", "&") else logic_or
+        first, *others = (_symbol(place, value) != 0.0 for value in values)
+        for other in others:
+            first = _together(place, gate, first, other)
+        return first
+
+    def matrix(self, place: Place, rows: Sequence[Sequence[Symbol]]) -> Symbol:
+        """``[1 2; 3 4]``: every row concatenates its numbers and vectors."""
+        values = [] if rows else [SX(0, 1)]
+        for row in rows:
+            entries = [_symbol(place, entry) for entry in row]
+            if any(entry.shape[1] > 1 for entry in entries):
+                raise place.error(
+                    "a matrix is inside brackets", allowed="numbers and vectors inside brackets"
+                )
+            values.append(vertcat(*entries))
+        if len(values) == 1 or all(value.numel() == 1 for value in values):
+            return vertcat(*values)
+        if len({value.numel() for value in values}) > 1:
+            lengths = ", ".join(str(value.numel()) for value in values)
+            raise place.error(f"the rows of an array have {lengths} numbers", allowed="rows of one length")
+        return _plain(horzcat(*values).T)
+
+    def cell(self, place: Place, elements: Sequence[Symbol]) -> Symbol:
+        """Cell arrays exist in scripts only."""
+        raise place.error("a cell array is no number", allowed="[a b; c d]")
+
+    def range(self, place: Place, parts: Sequence[Symbol]) -> Symbol:
+        """``first:last`` or ``first:step:last`` of constant numbers."""
+        ends = [_constant(_symbol(place, part)) for part in parts]
+        numbers = [float(end[0, 0]) for end in ends if end is not None and end.size == 1]
+        if len(numbers) < len(parts):
+            raise place.error("the size of a range is not constant", allowed="constant numbers")
+        first, step, last = (numbers[0], 1.0, numbers[1]) if len(numbers) == 2 else numbers
+        try:
+            return self._arithmetic.constant(range_of(first, step, last))
+        except MismatchError as mismatch:
+            raise place.error(f"a range: {mismatch}", allowed="first:last or first:step:last") from None
+
+    def transposed(self, place: Place, value: Symbol) -> Symbol:
+        """``value'``"""
+        return _plain(_symbol(place, value).T)
+
+    def element(self, place: Place, value: Symbol, indices: Sequence[Symbol | None], shown: str) -> Symbol:
+        """``value(indices)`` with constant indices, where ``None`` is ``:``."""
+        array = _symbol(place, value)
+        chosen: list[object] = []
+        for index in indices:
+            numbers = None if index is None else _constant(_symbol(place, index))
+            if index is not None and numbers is None:
+                raise place.error(f"'{shown}' has no constant index", allowed=f"{shown}(1) and so on")
+            chosen.append(numbers)
+        rows, columns = array.shape
+        found = positions(place, (rows, columns), chosen, shown)
+        if found.size == 1:
+            return array[int(found.flat[0])]
+        entries = vertcat(*(array[int(k)] for k in found.ravel(order="F")), SX(0, 1))
+        return _plain(reshape(entries, *found.shape)) if found.size else SX(0, 1)
+
+    def last_index(self, place: Place, value: Symbol, position: int, count: int) -> Symbol:
+        """``end`` as index ``position`` of ``count`` indices."""
+        array = _symbol(place, value)
+        return SX(float(array.numel() if count == 1 else array.shape[min(position, 1)]))
+
+    def cell_element(self, place: Place, value: Symbol, indices: Sequence[Symbol | None]) -> Symbol:
+        """Cell arrays exist in scripts only."""
+        raise place.error("cell arrays are not supported in formulas", allowed="v(1), A(1, 2)")
+
+    def field(self, place: Place, value: Symbol, name: str) -> Symbol:
+        """``A.T`` is the transpose, as in NumPy; numbers have no other fields."""
+        if name == "T":
+            return self.transposed(place, value)
+        raise place.error(f"a number has no field '{name}'", allowed="A' or A.T, the transpose")
+
+    def check_function(self, place: Place, name: str, called: bool) -> None:
+        """Raise ``UnknownNameError`` unless the table has a function of this name."""
+        if name not in TABLE:
+            kind, known = ("function", TABLE) if called else ("name", self._known())
+            raise UnknownNameError(kind, name, known, where=place.source.name)
+
+    def call(
+        self, place: Place, name: str, arguments: Sequence[Symbol], written: Sequence[Expression]
+    ) -> Symbol:
+        """``name(arguments)`` of a function in the table."""
+        function = TABLE[name]
+        given = [
+            value if isinstance(value, str) and function.takes_text else _symbol(place, value)
+            for value in arguments
+        ]
+        if function.elementwise and len(given) > 1:
+            _check_shapes(place, [value for value in given if isinstance(value, SX)])
+        return _plain(call_function(self._arithmetic, place, name, given, _constant))
+
+    def _known(self) -> set[str]:
+        return {*self._names, *(name for name, function in TABLE.items() if function.most == 0)}
+
+
+def _symbol(place: Place, value: Symbol) -> SX:
+    if isinstance(value, str):
+        raise place.error(f"the text '{value[:40]}' is no number", allowed="numbers and names without quotes")
+    return value
+
+
+def _constant(value: object) -> NDArray[np.float64] | None:
+    """The numbers of a constant; ``None`` for symbols."""
+    return evalf(value).full() if isinstance(value, SX) and value.is_constant() else None
+
+
+def _plain(value: SX) -> SX:
+    """Vectors as columns, whatever their origin."""
+    return value.T if value.shape[0] == 1 and value.shape[1] > 1 else value
+
+
+def _is_matrix(left: SX, right: SX) -> bool:
+    """Whether a matrix is an operand together with another array."""
+    return not (left.numel() == 1 or right.numel() == 1) and (left.shape[1] > 1 or right.shape[1] > 1)
+
+
+def _product(place: Place, left: SX, right: SX) -> SX:
+    """The matrix product; a vector on the left is a row."""
+    if left.shape[1] == 1:
+        left = left.T
+    if left.shape[1] != right.shape[0]:
+        raise place.error(
+            f"a matrix of {_size(left)} is multiplied by one of {_size(right)}",
+            allowed="as many columns on the left as rows on the right; .* multiplies elementwise",
+        )
+    return _plain(mtimes(left, right))
+
+
+def _size(value: SX) -> str:
+    return f"{value.shape[0]} x {value.shape[1]}"
+
+
+def _together(place: Place, function: Callable[..., SX], *values: SX) -> SX:
+    _check_shapes(place, values)
+    return function(*values)
+
+
+def _check_shapes(place: Place, values: Sequence[SX]) -> None:
+    """Raise an error unless all arrays have one shape; scalars are broadcast."""
+    shapes = {value.shape for value in values if value.numel() != 1}
+    if len(shapes) < 2:
+        return
+    if any(columns > 1 for _, columns in shapes):
+        raise place.error(
+            f"arrays of {' and '.join(sorted(f'{m} x {n}' for m, n in shapes))} numbers are combined",
+            allowed="arrays of equal size, and scalars with any array",
+        )
+    sizes = sorted(value.numel() for value in values if value.numel() != 1)
+    raise place.error(
+        f"vectors of {' and '.join(dict.fromkeys(map(str, sizes)))} elements are combined",
+        allowed="vectors of equal length, and scalars with any vector",
+    )

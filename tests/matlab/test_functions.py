@@ -1,0 +1,157 @@
+"""Every function of the table: the same values from numbers, from constants and from symbols."""
+
+from __future__ import annotations
+
+import random
+import re
+
+import casadi
+import numpy as np
+import pytest
+from casadi import SX
+
+from armblocks.errors import InputError, UnknownNameError
+from armblocks.formats import read_script
+from armblocks.matlab.arrays import Budget, scalar
+from armblocks.matlab.evaluation import Evaluator
+from armblocks.matlab.formula import Formula
+from armblocks.matlab.functions import RESERVED, TABLE
+from armblocks.matlab.number_functions import FUNCTIONS_OF_NUMBERS
+from armblocks.matlab.numbers import Numbers, Plain
+from armblocks.matlab.parser import parse_formula
+from armblocks.matlab.source import formula_source
+
+ARGUMENTS = {
+    **dict.fromkeys(("diag", "inv", "transpose", "trace", "size"), ("A",)),
+    **dict.fromkeys(("cross", "dot"), ("v", "w")),
+    **dict.fromkeys(("transl", "SE3"), ("v",)),
+    **dict.fromkeys(("zeros", "ones", "eye"), ("2", "3")),
+    "linspace": ("-1", "2.5", "7"),
+    "if": ("v > 0", "v", "w"),
+    **dict.fromkeys(("rotx", "roty", "rotz", "trotx", "troty", "trotz"), ("k",)),
+}
+"""Arguments of the functions that do not accept vectors."""
+
+
+def numbers(name: str, draw: random.Random) -> dict[str, np.ndarray]:
+    """Random values of the names in ``ARGUMENTS``, in the interval in which a function is real."""
+    low, high = max(TABLE[name].real_from, -3.0), min(TABLE[name].real_to, 3.0)
+    two = [np.array([[draw.uniform(low, high) for _ in range(3)]]) for _ in range(2)]
+    matrix = np.array([[draw.uniform(-2, 2) + 4 * (i == j) for j in range(3)] for i in range(3)])
+    return {"v": two[0], "w": two[1], "A": matrix, "k": scalar(draw.uniform(-3, 3))}
+
+
+def literal(array: np.ndarray) -> str:
+    """An array as text."""
+    return "[" + "; ".join(" ".join(map(repr, row)) for row in array.tolist()) + "]"
+
+
+@pytest.mark.parametrize("name", [name for name in TABLE if TABLE[name].most])
+def test_numbers_constants_and_symbols_have_the_same_values(name: str) -> None:
+    draw = random.Random(name)
+    arguments = ARGUMENTS.get(name) or ("v", "w")[: TABLE[name].arguments.count(",") + 1]
+    text = f"{name}({', '.join(arguments)})"
+    for _ in range(3):
+        values = numbers(name, draw)
+        script = "".join(f"{key} = {literal(value)}; " for key, value in values.items())
+        by_script = np.asarray(read_script(f"{script}x = {text};".encode(), "x.m").variables["x"], float)
+        constants = {key: SX(value.ravel() if 1 in value.shape else value) for key, value in values.items()}
+        by_constants = casadi.evalf(Formula(text, "here").trace(constants)).full()
+        symbols = {key: SX.sym(key, *value.shape) for key, value in constants.items()}
+        traced = casadi.Function("f", list(symbols.values()), [Formula(text, "here").trace(symbols)])
+        by_symbols = traced(*(casadi.evalf(value) for value in constants.values())).full()
+        if 1 in by_constants.shape or 1 in by_script.shape:
+            by_script, by_constants, by_symbols = by_script.ravel(), by_constants.ravel(), by_symbols.ravel()
+        if name == "inv":  # two algorithms
+            np.testing.assert_allclose(by_constants, by_script, rtol=1e-13, atol=1e-14)
+        else:
+            np.testing.assert_array_equal(by_constants, by_script)
+        np.testing.assert_allclose(by_symbols, by_script, rtol=1e-13, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("mod(-1, 3)", 2.0),
+        ("mod(5, -3)", -1.0),
+        ("mod(5, 0)", 5.0),
+        ("rem(-5, 3)", -2.0),
+        ("round(-2.5)", -3.0),
+        ("round(0.49999999999999994)", 0.0),
+        ("fix(-2.7)", -2.0),
+        ("sign(-3)", -1.0),
+        ("xor(1, 0) + xor(2, 3)", 1.0),
+        ("and(2, 0) + or(2, 0) + not(0)", 2.0),
+        ("any([0 0 1]) + all([1 0])", 1.0),
+        ("max([3 1 2]) - min([3 1 2])", 2.0),
+        ("max(nan, 2)", 2.0),
+        ("prod([2 3 4])", 24.0),
+        ("mean([1 2 6])", 3.0),
+        ("sum(mean([1 2; 3 4]))", 5.0),
+        ("norm([3 4])", 5.0),
+        ("dot([1 2 3], [4 5 6])", 32.0),
+        ("sum(cross([1 0 0], [0 1 0]) == [0 0 1])", 3.0),
+        ("trace([1 2; 3 4])", 5.0),
+        ("length([1 2; 3 4; 5 6])", 3.0),
+        ("sum(size([1 2; 3 4]))", 4.0),
+        ("sum(sum(trotx(90, 'deg') == trotx(pi/2)))", 16.0),
+        ("sum(transl(transl(1, 2, 3)) == [1; 2; 3])", 3.0),
+        ("sum(sum(rotz(0.3)'*rotz(0.3))) > 2.999", 1.0),
+        ("sum(sum(SE3() == eye(4)))", 16.0),
+        ("sum(zeros(1, 2)) + zeros + eye", 1.0),
+        ("numel(linspace(0, 1))", 100.0),
+        ("eps == 2^-52", 1.0),
+        ("true + false", 1.0),
+        ("90*deg == deg2rad(90)", 1.0),
+        ("inf > 1e300", 1.0),
+    ],
+)
+def test_values_are_those_of_matlab(text: str, value: float) -> None:
+    found = read_script(f"x = {text};".encode(), "x.m").variables["x"]
+    assert np.ravel(found).tolist() == [value]
+    assert casadi.evalf(Formula(text, "here").trace({})).full().ravel().tolist() == [value]
+
+
+def test_every_entry_is_documented() -> None:
+    for name, function in TABLE.items():
+        assert name.isidentifier()
+        assert function.meaning and function.group, name
+        assert function.most == 0 or function.arguments.count(",") + 1 == function.most, name
+        assert function.fewest <= function.most
+        assert function.elementwise or name not in FUNCTIONS_OF_NUMBERS or name in ("any", "all")
+    assert {"sin", "pi", "sum"} <= RESERVED
+    assert not {"length", "round", "mean", "size", "eps"} & RESERVED
+
+
+def test_a_name_hides_a_function_that_is_not_reserved() -> None:
+    length = Formula("length + length(2)*size([1 2 3])(2)", "here")
+    assert length.names == {"length"}
+    assert length.readable_names == {"length", "size"}
+    found = length.trace({"length": SX([4.0, 5.0])})
+    assert casadi.evalf(found).full().ravel().tolist() == [9.0, 10.0]  # a vector of a formula is a column
+    assert Formula("length([1 2 3])", "here").names == frozenset()
+
+
+def test_plain_numbers_are_evaluated_without_objects() -> None:
+    def value(text: str) -> object:
+        source = formula_source(text, "here")
+        variables: dict[str, Plain] = {"a": scalar(3.0)}
+        return Evaluator(source, Numbers(Budget()), variables).value(parse_formula(source))
+
+    assert np.ravel(value("a + [1 2](2)")).tolist() == [5.0]  # pyright: ignore
+    assert value("['a' 'b']") == "ab"
+    with pytest.raises(UnknownNameError, match=r"there is no function named 'sni'.*did you mean 'sin'"):
+        value("sni(a)")
+    with pytest.raises(InputError, match=r"a cell array is no number.*Allowed: \[a b; c d\]"):
+        value("{a}")
+    with pytest.raises(InputError, match=r"\{\} is used on a number"):
+        value("a{1}")
+    with pytest.raises(InputError, match=r"'end' and ':' stand outside of an index"):
+        value("sin(:)")
+
+
+def test_long_lines_are_quoted_around_the_caret() -> None:
+    text = "1 + " * 60 + "* 2 " + "+ 1" * 60
+    with pytest.raises(InputError, match=r"in column 241: … \+ 1 \+ .*\+ ‸\* 2 \+.* …\. Allowed") as caught:
+        Formula(text, "here")
+    assert len(re.sub(".*column 241: ", "", caught.value.what)) <= 106
