@@ -1,4 +1,4 @@
-"""Run a diagram the way users do: traced, compiled, simulated."""
+"""Trace, compile and simulate a diagram, as users do."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from compiled_diagrams import compiled
 def run(
     diagram: Diagram, stop_time: float, *, rtol: float = 1e-10, atol: float = 1e-12, solver: str = "auto"
 ) -> SimulationResult:
-    """All signals at 101 instants."""
+    """Simulate a diagram and return all signals at 101 times."""
     options = SimulationOptions(
         stop_time=stop_time, sample_time=stop_time / 100, rtol=rtol, atol=atol, solver=solver
     )

@@ -1,7 +1,7 @@
-"""An arm with dry friction integrated event by event with SciPy: the second opinion on sticking.
+"""An arm with dry friction integrated from event to event with SciPy: an independent reference for sticking.
 
-Which joints at rest stick is found by trying every combination, so nothing is shared with the block but the
-inertia matrix and inverse dynamics without friction.
+The joints that stick are found by trying every combination. The reference shares with the block only the
+inertia matrix and the inverse dynamics without friction.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class StickingArm:
     def accelerations(
         self, t: float, q: np.ndarray, qd: np.ndarray, modes: tuple[int, ...]
     ) -> tuple[np.ndarray, np.ndarray]:
-        """qdd, and what holds each joint."""
+        """Return qdd and the holding torque of each joint."""
         m = np.array(modes)
         friction = np.where(m > 0, self.forward, np.where(m < 0, self.backward, 0.0)) + self.viscous * qd
         M = np.asarray(self.arm.inertia(q))
@@ -40,7 +40,7 @@ class StickingArm:
         return qdd, left - M @ qdd
 
     def modes(self, t: float, q: np.ndarray, qd: np.ndarray) -> tuple[int, ...]:
-        """The one combination that contradicts nothing."""
+        """Return the consistent combination of sticking and sliding joints."""
         choices = [(int(np.sign(v)),) if v else (0, 1, -1) for v in qd]
         for combination in itertools.product(*choices):
             qdd, holding = self.accelerations(t, q, qd, combination)
@@ -55,11 +55,11 @@ class StickingArm:
         raise AssertionError(f"no combination of sticking and sliding joints fits at {t}")
 
     def run(self, q: np.ndarray, qd: np.ndarray, times: np.ndarray) -> np.ndarray:
-        """q and qd (N, 2n) at the times, from one event to the next."""
+        """Integrate from event to event; return q and qd (N, 2n) at the times."""
         n, t, x = len(q), float(times[0]), np.concatenate([q, qd])
         found = [x]
         while len(found) < len(times):
-            # a torque that has just reached the friction is beyond it an instant later
+            # evaluated slightly later, when a torque that has just reached the friction limit exceeds it
             modes = self.modes(t + 1e-10, x[:n], x[n:])
 
             def flow(t: float, x: np.ndarray, modes: tuple[int, ...] = modes) -> np.ndarray:

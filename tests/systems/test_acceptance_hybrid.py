@@ -1,4 +1,4 @@
-"""Hybrid and delayed systems as a stranger writes them, against closed forms; as objects and as files."""
+"""Acceptance tests of hybrid and delayed systems: comparison with closed forms, as objects and as files."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SOLVERS: Mapping[str, Mapping[str, object]] = {
 
 @pytest.fixture(params=SOLVERS)
 def run(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[..., ab.SimulationResult]:
-    """A run by one solver; the diagram that was saved and loaded gives the same bits."""
+    """Return a function that runs a diagram with one solver, also after saving and loading it."""
 
     def by_solver(diagram: ab.Diagram, stop_time: float, **settings: object) -> ab.SimulationResult:
         options = {**SOLVERS[request.param], "sample_time": stop_time / 97.0, **settings}
@@ -42,12 +42,12 @@ Run = Callable[..., ab.SimulationResult]
 
 
 def integrating(builder: ab.DiagramBuilder, name: str, rate: object, **parameters: object) -> ab.BlockHandle:
-    """An integrator behind its rate."""
+    """Add an integrator after its rate."""
     return builder.add(name, bl.Integrator(**parameters), rate)
 
 
-def test_a_ball_rolls_down_a_slope_and_bounces_at_its_end(run: Run) -> None:
-    """Along a slope of 30 degrees a = -g/2; e = 0.6; the bounces are at t1, t1 + 2 e v1/a, ..."""
+def test_a_ball_rolls_down_a_slope_and_bounces_at_the_end(run: Run) -> None:
+    """On a slope of 30 degrees a = -g/2; with e = 0.6 the bounces are at t1, t1 + 2 e v1/a, ..."""
     a, e, s0 = 9.81 / 2, 0.6, 2.0
     builder = ab.DiagramBuilder("slope")
     pull = builder.add("pull", bl.Constant(value=-a))
@@ -75,7 +75,7 @@ def test_a_ball_rolls_down_a_slope_and_bounces_at_its_end(run: Run) -> None:
 
 
 def test_a_mass_on_a_belt_sticks_and_slips_periodically(run: Run) -> None:
-    """m v' = -k x - friction(v - V): it sticks until k x = Fs, then slips about Fc."""
+    """m v' = -k x - friction(v - V): the mass sticks until k x = Fs, then slips with friction Fc."""
     k, m, V, Fs, Fc = 4.0, 1.0, 0.5, 1.0, 0.6
     builder = ab.DiagramBuilder("belt")
     # In belt coordinates: y = x - V t, so the friction block sees the relative speed.
@@ -83,16 +83,16 @@ def test_a_mass_on_a_belt_sticks_and_slips_periodically(run: Run) -> None:
     belt = builder.add("belt", bl.Ramp(slope=V))
     place = builder.add("place", bl.Sum(signs="++"), mass["x"], belt)
     builder.connect(builder.add("spring", bl.Gain(gain=-k), place), mass["F"])
-    t1 = Fs / (k * V)  # sticks from x = 0 until then
+    t1 = Fs / (k * V)  # end of sticking from x = 0
     w = math.sqrt(k / m)
-    # slip: x'' = -w^2 x + Fc/m, from x = Fs/k, x' = V
+    # slipping: x'' = -w^2 x + Fc/m, from x = Fs/k, x' = V
     A, B = Fs / k - Fc / k, V / w
 
     def x(time: Array) -> Array:
         s = time - t1
         return Fc / k + A * np.cos(w * s) + B * np.sin(w * s)
 
-    # it sticks again where x' = V for the first time after
+    # it sticks again when x' = V for the first time after that
     s2 = (2 * math.pi - 2 * math.atan2(A, B)) / w
     found = run(builder.build(), t1 + s2 + 0.3)
     t = found.time
@@ -106,7 +106,7 @@ def test_a_mass_on_a_belt_sticks_and_slips_periodically(run: Run) -> None:
 
 
 def test_a_thermostat_with_exponential_branches(run: Run) -> None:
-    """T' = -(T - 10 - 20 on): from 15 it heats to 22, cools to 18, ...: the period is closed."""
+    """T' = -(T - 10 - 20 on): heating from 15 to 22, then cooling to 18, ...: exponentials in closed form."""
     builder = ab.DiagramBuilder("thermostat")
     room = builder.add("room", bl.Integrator(initial=15.0))
     relay = builder.add("relay", bl.Relay(on_point=22.0, off_point=18.0, on_value=10.0, off_value=30.0), room)
@@ -124,7 +124,7 @@ def test_a_thermostat_with_exponential_branches(run: Run) -> None:
 
 
 def test_two_rates_with_offsets_around_a_plant(run: Run) -> None:
-    """x' = u held at 0.02 + 0.1 j, u = -K w, w = x held at 0.07 + 0.25 j: exact piecewise lines."""
+    """x' = u held at 0.02 + 0.1 j, u = -K w, w = x held at 0.07 + 0.25 j: x is exactly piecewise linear."""
     builder = ab.DiagramBuilder("rates")
     x = builder.add("x", bl.Integrator(initial=1.0))
     sensor = builder.add("sensor", bl.ZeroOrderHold(sample_time=(0.25, 0.07)), x)
@@ -140,7 +140,7 @@ def test_two_rates_with_offsets_around_a_plant(run: Run) -> None:
         begin = time
         if which == 0:
             seen = value
-        # both tick together at 0.32 + 0.5 j: the sensor first, as it feeds the control
+        # both clocks tick at 0.32 + 0.5 j: the sensor is evaluated first, because the control depends on it
         else:
             held = seen
         pieces.append((time, value, held))
@@ -150,8 +150,8 @@ def test_two_rates_with_offsets_around_a_plant(run: Run) -> None:
     np.testing.assert_allclose(found["x"], expected, atol=1e-12)
 
 
-def test_a_relay_in_a_double_integrator_loop_with_dead_zone_of_time(run: Run) -> None:
-    """x'' = -sign-relay(x) with hysteresis h: parabolas, amplitudes that grow as v^2 + 4 h per half turn."""
+def test_a_relay_with_hysteresis_in_a_double_integrator_loop(run: Run) -> None:
+    """x'' = -relay(x) with hysteresis h: parabolas, on which v^2 grows by 4 h in each half period."""
     h = 0.1
     builder = ab.DiagramBuilder("relay")
     v = builder.add("v", bl.Integrator(initial=1.0))
@@ -172,7 +172,7 @@ def test_a_relay_in_a_double_integrator_loop_with_dead_zone_of_time(run: Run) ->
 
 
 def test_dead_time_in_a_loop(run: Run) -> None:
-    """x'(t) = -x(t - 1), x = 1 before: the method of steps gives a polynomial for every second."""
+    """x'(t) = -x(t - 1) with x = 1 for t <= 0: the method of steps gives a polynomial for every second."""
     builder = ab.DiagramBuilder("dead time")
     x = builder.add("x", bl.Integrator(initial=1.0))
     late = builder.add("late", bl.TransportDelay(delay=1.0, initial=1.0), x)
@@ -187,7 +187,7 @@ def test_dead_time_in_a_loop(run: Run) -> None:
 
 
 def test_a_sampled_pi_with_a_delay_of_one_tick(run: Run) -> None:
-    """The recurrence of plant, integrator and delay, exactly: e^-T for the plant between two ticks."""
+    """The exact recurrence of plant, integrator and delay, with e^-T for the plant between two ticks."""
     T, kp, ki = 0.2, 0.8, 0.5
     builder = ab.DiagramBuilder("pi")
     plant = builder.add("plant", bl.TransferFunction(numerator=[2.0], denominator=[1.0, 1.0]))
@@ -205,8 +205,8 @@ def test_a_sampled_pi_with_a_delay_of_one_tick(run: Run) -> None:
     np.testing.assert_allclose(found["plant/y"], expected, atol=2e-9)
 
 
-def test_an_event_at_the_very_instant_of_a_tick(run: Run) -> None:
-    """A ramp crosses 0.5 exactly at the tick 0.5: the hold sees the value after it, once, and stays."""
+def test_an_event_exactly_at_a_tick(run: Run) -> None:
+    """A ramp crosses 0.5 exactly at the tick at 0.5 s: the hold samples the value after the event."""
     builder = ab.DiagramBuilder("instant")
     ramp = builder.add("ramp", bl.Ramp(slope=1.0))
     above = builder.add("above", bl.CompareToConstant(relation=">=", constant=0.5), ramp)
@@ -219,21 +219,21 @@ def test_an_event_at_the_very_instant_of_a_tick(run: Run) -> None:
 
 
 def test_backlash_in_an_integrating_loop(run: Run) -> None:
-    """x' = -b(x): the play is taken up, then x follows an exponential to the edge of the play and rests."""
+    """x' = -b(x): first the backlash is crossed, then x decays exponentially to the edge of the backlash."""
     builder = ab.DiagramBuilder("play")
     x = builder.add("x", bl.Integrator(initial=2.0))
     play = builder.add("play", bl.Backlash(width=1.0, initial=1.5), x)
     builder.connect(builder.add("minus", bl.Gain(gain=-1.0), play), x["u"])
     found = run(builder.build(), 6.0)
     t = found.time
-    # b rests at 1.5 while x falls from 2 to 1 (2/3 s); then b = x + 0.5: x' = -(x + 0.5)
+    # b stays 1.5 while x falls from 2 to 1 (2/3 s); then b = x + 0.5, x' = -(x + 0.5)
     t1 = 1.0 / 1.5
     expected = np.where(t < t1, 2.0 - 1.5 * t, -0.5 + 1.5 * np.exp(-(t - t1)))
     np.testing.assert_allclose(found["x"], expected, atol=2e-8)
 
 
-def test_an_enabled_counter_against_a_state_machine(run: Run) -> None:
-    """Ticks of 0.1 s are counted while a square wave of period 0.7 s is high."""
+def test_an_enabled_counter_agrees_with_a_state_machine(run: Run) -> None:
+    """The ticks of a clock of 0.1 s are counted while a square wave of period 0.7 s is high."""
     inner = ab.DiagramBuilder("count")
     one = inner.add("one", bl.Constant(value=1.0))
     total = inner.add("total", bl.Sum(signs="++"), one)
@@ -247,7 +247,7 @@ def test_an_enabled_counter_against_a_state_machine(run: Run) -> None:
     count, expected, k = 0, [], 0
     for row in range(found.time.size):
         if row % 5 == 0:
-            # the state before this tick is the output at it
+            # the output at a tick is the state before it
             if (0.1 * k + 1e-9) % 0.7 < 0.35:
                 shown, count = count, count + 1
             k += 1
@@ -255,8 +255,8 @@ def test_an_enabled_counter_against_a_state_machine(run: Run) -> None:
     assert found["counter/n"].tolist() == expected
 
 
-def test_a_switch_that_fights_itself_is_reported(tmp_path: Path) -> None:
-    """x' = -1 for x >= 0, else 1: after 1 s the switch is thrown without end; the good second is kept."""
+def test_a_switch_that_chatters_is_reported_with_its_block(tmp_path: Path) -> None:
+    """x' = -1 for x >= 0, else 1: the switch chatters after 1 s; the samples before that are kept."""
     builder = ab.DiagramBuilder("chattering")
     x = builder.add("x", bl.Integrator(initial=1.0))
     down, up = builder.add("down", bl.Constant(value=-1.0)), builder.add("up", bl.Constant(value=1.0))

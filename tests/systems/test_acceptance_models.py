@@ -1,4 +1,5 @@
-"""Stiff systems, loops, arms, analysis and structure as strangers write them, against independent numbers."""
+"""Acceptance tests of stiff systems, loops, arms, analysis and structure: comparison with independent
+results."""
 
 from __future__ import annotations
 
@@ -21,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 def system_of(name: str, rates: Sequence[str], start: Sequence[float]) -> ab.Diagram:
-    """One integrator and one formula of ``u1, u2, …`` and ``t`` for every state ``y1, y2, …``."""
+    """Build one integrator and one formula in ``u1, u2, …`` and ``t`` for every state ``y1, y2, …``."""
     builder = ab.DiagramBuilder(name)
     states = [builder.add(f"y{i + 1}", bl.Integrator(initial=value)) for i, value in enumerate(start)]
     for i, formula in enumerate(rates):
@@ -67,7 +68,7 @@ OREGONATOR_END = (
     0.1000814870318523e1,
     0.1228178521549917e4,
     0.1320554942846706e3,
-)  # at 360 s, the same source
+)  # at 360 s, from the same source
 
 
 @pytest.mark.parametrize("solver", ["auto", "rodas5p"])
@@ -88,7 +89,7 @@ def test_the_oregonator(solver: str) -> None:
     np.testing.assert_allclose(ends(found, 3), OREGONATOR_END, rtol=2e-6)
 
 
-def test_a_diode_rectifier_follows_scipy() -> None:
+def test_a_diode_rectifier_agrees_with_scipy() -> None:
     """C v' = Is (exp((sin(w t) 5 - v)/Ut) - 1) - v/R: rates from 1e3 to more than 1e7 1/s."""
     formula = "(1e-9*(exp((5*sin(314.159265358979*t) - u)/0.0259) - 1) - u/1000)/1e-5"
     diagram = system_of("rectifier", (formula,), (0.0,))
@@ -103,7 +104,7 @@ def test_a_diode_rectifier_follows_scipy() -> None:
 
 
 def test_a_brusselator_on_a_line_as_two_vectors() -> None:
-    """u' = 1 + u^2 v - 4 u + D u, v' = 3 u - u^2 v + D v on 20 points between fixed ends."""
+    """u' = 1 + u^2 v - 4 u + D u, v' = 3 u - u^2 v + D v on 20 points with fixed boundary values."""
     n, spread = 20, 0.02 * 21**2
     D = spread * (np.diag(np.full(n, -2.0)) + np.diag(np.ones(n - 1), 1) + np.diag(np.ones(n - 1), -1))
     place = np.arange(1, n + 1) / (n + 1)
@@ -144,8 +145,10 @@ RUNS = pytest.mark.parametrize(
 
 
 @RUNS
-def test_a_loop_with_three_solutions_stays_on_its_branch(settings: Mapping[str, object]) -> None:
-    """w = 0.9 tanh(3 w) + 0.3 + 0.05 sin t: the branch nearest to 0 of three, as bracketing finds it."""
+def test_the_solution_of_a_loop_with_three_solutions_stays_on_its_branch(
+    settings: Mapping[str, object],
+) -> None:
+    """w = 0.9 tanh(3 w) + 0.3 + 0.05 sin t: the branch nearest to 0, compared with a bracketing method."""
     builder = ab.DiagramBuilder("branches")
     drive = builder.add("drive", bl.SineWave(amplitude=0.05))
     loop = builder.add("loop", bl.Expression(formula="0.9*tanh(3*u1) + u2 + 0.3", inputs=2), u2=drive)
@@ -162,7 +165,7 @@ def test_a_loop_with_three_solutions_stays_on_its_branch(settings: Mapping[str, 
 
 @RUNS
 def test_a_vector_loop_through_a_matrix_solve(settings: Mapping[str, object]) -> None:
-    """A w = b - 0.3 w with b = (cos t, sin t): linear, so exact; its integral has a closed form."""
+    """A w = b - 0.3 w with b = (cos t, sin t): a linear loop, whose integral has a closed form."""
     A = np.array([[3.0, 1.0], [-1.0, 2.0]])
     builder = ab.DiagramBuilder("solve")
     b = builder.add(
@@ -184,8 +187,8 @@ def test_a_vector_loop_through_a_matrix_solve(settings: Mapping[str, object]) ->
     np.testing.assert_allclose(found["integral"].reshape(-1, 2), area, atol=1e-9)
 
 
-def test_a_loop_that_loses_its_solution_is_named_when_it_does() -> None:
-    """w^2 + w/2 = 1 - t: there is a root until 1 1/16 s, and none later."""
+def test_a_loop_whose_solution_ceases_to_exist_is_reported_at_that_time() -> None:
+    """w^2 + w/2 = 1 - t has a root until 1 1/16 s, and none later."""
     builder = ab.DiagramBuilder("fold")
     x = builder.add("x", bl.Integrator(), builder.add("one", bl.Constant(value=1.0)))
     fold = builder.add("fold", bl.Expression(formula="0.5*u1 - u1^2 + 1 - u2", inputs=2), u2=x)
@@ -197,8 +200,8 @@ def test_a_loop_that_loses_its_solution_is_named_when_it_does() -> None:
 
 
 @RUNS
-def test_a_loop_whose_first_guess_is_singular(settings: Mapping[str, object]) -> None:
-    """w^2 = 1 + t: the slope is 0 at the guess w = 0, and the positive root is found beside it."""
+def test_a_loop_with_a_singular_initial_guess_is_solved(settings: Mapping[str, object]) -> None:
+    """w^2 = 1 + t: the derivative is 0 at the guess w = 0; the positive root is found from there."""
     builder = ab.DiagramBuilder("root")
     time = builder.add("time", bl.Clock())
     loop = builder.add("loop", bl.Expression(formula="u1 - u1^2 + 1 + u2", inputs=2), u2=time)
@@ -230,7 +233,7 @@ def cart() -> ab.Diagram:
 
 
 def test_a_pendulum_on_a_cart_is_trimmed_and_linearised() -> None:
-    """Upright: the textbook's A and B; the unstable pole is sqrt((M + m) g / (M l))."""
+    """Upright: A and B of the textbook; the unstable pole is sqrt((M + m) g / (M l))."""
     diagram = cart()
     point = ab.trim(diagram, free=["force.value"], guess={"a": 0.2}, states={"p": 0.0})
     system = ab.linearize(diagram, "force", ["p", "a"], at=point.point)
@@ -261,7 +264,7 @@ def planar() -> ab.Robot:
 
 
 def planar_acceleration(q: Array, qd: Array, tau: Array, payload: float = 0.0) -> Array:
-    """Lagrange's equations by hand; a payload is a point at the tip."""
+    """Lagrange's equations derived by hand; a payload is a point mass at the tip."""
     l1, l2, m1, m2, g = 1.0, 0.7, 2.0, 1.5, 9.81
     c1, c2, i1, i2 = l1 / 2, l2 / 2, m1 * l1**2 / 12, m2 * l2**2 / 12
     cos = math.cos(q[1])
@@ -276,7 +279,7 @@ def planar_acceleration(q: Array, qd: Array, tau: Array, payload: float = 0.0) -
 
 
 @RUNS
-def test_a_planar_arm_falls_as_lagrange_says(settings: Mapping[str, object]) -> None:
+def test_the_motion_of_a_planar_arm_agrees_with_lagranges_equations(settings: Mapping[str, object]) -> None:
     builder = ab.DiagramBuilder("fall")
     torque = builder.add("torque", bl.Constant(value=(1.0, -0.5)))
     builder.add("arm", bl.ForwardDynamics(robot=planar(), q0=(0.4, -0.9)), torque)
@@ -290,7 +293,7 @@ def test_a_planar_arm_falls_as_lagrange_says(settings: Mapping[str, object]) -> 
     np.testing.assert_allclose(found["arm/q"], want.y[:2].T, atol=2e-7)
 
 
-def test_a_payload_in_the_hand_changes_the_torque_as_lagrange_says() -> None:
+def test_the_torque_with_a_payload_agrees_with_lagranges_equations() -> None:
     q, qd, qdd = np.array([0.3, -1.1]), np.array([0.7, -0.2]), np.array([1.0, 2.0])
     free = planar_acceleration(q, qd, np.zeros(2), 0.8)
     inverse = [planar_acceleration(q, qd, unit, 0.8) - free for unit in np.eye(2)]
@@ -299,7 +302,7 @@ def test_a_payload_in_the_hand_changes_the_torque_as_lagrange_says() -> None:
     np.testing.assert_allclose(got, tau, rtol=1e-12)
 
 
-def test_a_two_link_arm_is_linearised_as_differences_of_lagrange_say() -> None:
+def test_the_linearised_arm_agrees_with_differences_of_lagranges_equations() -> None:
     builder = ab.DiagramBuilder("linear")
     torque = builder.add("torque", bl.Constant(value=(0.0, 0.0)))
     builder.add("arm", bl.ForwardDynamics(robot=planar(), q0=(0.4, -0.9), qd0=(0.5, -0.3)), torque)
@@ -322,7 +325,7 @@ def test_a_two_link_arm_is_linearised_as_differences_of_lagrange_say() -> None:
 
 @RUNS
 def test_two_tanks_in_subsystems_on_a_bus(settings: Mapping[str, object], tmp_path: Path) -> None:
-    """Cascade of lags of 1 s and 0.5 s behind tags and a bus: the matrix exponential."""
+    """Lags of 1 s and 0.5 s in series, connected by tags and a bus, compared with the matrix exponential."""
 
     def tank(rate: float) -> ab.Diagram:
         inner = ab.DiagramBuilder("tank")

@@ -1,4 +1,4 @@
-"""Arms with friction that sticks, end stops, payloads: closed forms, laws, and an integration with SciPy."""
+"""Arms with dry friction, end stops and payloads compared with closed forms, energy laws and SciPy."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ def solver(request: pytest.FixtureRequest) -> str:
 
 
 def wheel(**motor: float | tuple[float, float]) -> Robot:
-    """One vertical axis, inertia 2 kg m2, which gravity does not turn; stops at -1 and 1 rad."""
+    """A robot with one vertical axis, inertia 2 kg m2, without gravity torque; stops at -1 and 1 rad."""
     link = standard_dh("wheel", inertia=(0, 0, 2.0), mass=1.0)
     joint = Revolute(limits=JointLimits(position=(-1.0, 1.0)))
     return Robot(name="wheel", links=serial_chain([replace(link, motor=Motor(**motor), joint=joint)]))
 
 
 def pair(gravity: float = 9.81) -> Robot:
-    """Two joints in a vertical plane, whose friction differs forwards and backwards."""
+    """A robot with two joints in a vertical plane; friction differs between forward and backward motion."""
     limits = JointLimits(position=(-2.0, 0.5))
     links = []
     for name, length, mass, motor in (
@@ -67,7 +67,7 @@ def driven(
     inputs: Mapping[str, Block] | None = None,
     held: float | None = None,
 ) -> SimulationResult:
-    """The arm under torques of its joints, with its energy and the work of all that acts on it."""
+    """Simulate the arm with joint torques, and record its energy and the work of all torques."""
     builder = DiagramBuilder("d")
     arm = builder.add("arm", plant)
     sources = [builder.add(f"torque {k}", block) for k, block in enumerate(torques)]
@@ -86,16 +86,16 @@ def driven(
 
 
 def energy_balance(found: SimulationResult) -> np.ndarray:
-    """Energy so far, less the work done by torques and stops and against friction: constant by law."""
+    """Return the energy minus the work of all torques, which energy conservation keeps constant."""
     energy = found["energy/kinetic"] + found["energy/potential"]
     return energy - found["input work/y"] + found["friction work/y"] - found["stop work/y"]
 
 
-# -- one joint, in closed form
+# -- one joint, closed forms
 
 
-def test_a_joint_breaks_away_exactly_where_the_torque_exceeds_friction(solver: str) -> None:
-    """tau = t against 0.6 at the joint, 0.9 to break away: qd' = (t - 0.6) / 2 from 0.9 s on."""
+def test_a_joint_breaks_away_exactly_when_the_torque_exceeds_friction(solver: str) -> None:
+    """tau = t, friction 0.6 N m, breakaway 0.9 N m: qd' = (t - 0.6) / 2 after 0.9 s."""
     plant = ArmPlant(robot=wheel(gear_ratio=3.0, coulomb_friction=(0.2, -0.1)), breakaway=1.5)
     found = driven(plant, Clock(), stop=2.0, solver=solver)
     t, qd = found.time, found["arm/qd"][:, 0]
@@ -108,8 +108,8 @@ def test_a_joint_breaks_away_exactly_where_the_torque_exceeds_friction(solver: s
     np.testing.assert_allclose(found["arm/friction"][other, 0], expected[other], rtol=0, atol=1e-12)
 
 
-def test_a_joint_slides_to_a_stop_and_stays_there(solver: str) -> None:
-    """-3 rad/s against 0.3 N m of 2 kg m2 … in 20 s, and exactly 0 from then on."""
+def test_a_sliding_joint_comes_to_rest_and_sticks(solver: str) -> None:
+    """-1.5 rad/s, decelerated by (0.3 + 0.25) N m with 2 kg m2; afterwards the speed is exactly 0."""
     robot = wheel(gear_ratio=3.0, coulomb_friction=(0.2, -0.1))
     found = driven(ArmPlant(robot=robot, qd0=-1.5), Constant(value=0.25), stop=20.0, solver=solver)
     end = 1.5 / ((0.3 + 0.25) / 2.0)
@@ -120,8 +120,8 @@ def test_a_joint_slides_to_a_stop_and_stays_there(solver: str) -> None:
     assert len(set(found["arm/q"][found.time > end, 0])) == 1
 
 
-def test_a_joint_turns_round_at_once_where_the_torque_is_strong(solver: str) -> None:
-    """From -1 rad/s under 2 N m: slowed by 2.3 / 2, then driven by 1.4 / 2."""
+def test_a_joint_reverses_without_sticking_when_the_torque_exceeds_friction(solver: str) -> None:
+    """From -1 rad/s with 2 N m: decelerated by 2.3 / 2 rad/s2, then accelerated by 1.4 / 2 rad/s2."""
     robot = wheel(gear_ratio=3.0, coulomb_friction=(0.2, -0.1))
     found = driven(ArmPlant(robot=robot, qd0=-1.0), Constant(value=2.0), stop=3.0, solver=solver)
     turn = 1.0 / 1.15
@@ -130,8 +130,8 @@ def test_a_joint_turns_round_at_once_where_the_torque_is_strong(solver: str) -> 
     np.testing.assert_allclose(found["arm/qd"][:, 0], expected, rtol=0, atol=1e-10)
 
 
-def test_a_hard_stop_ends_the_motion_without_rebound_and_lets_go(solver: str) -> None:
-    """1 N m turns 2 kg m2 from 0: at 1 rad after 2 s; a torque of -1 from 3 s on leads back."""
+def test_a_hard_stop_ends_the_motion_without_rebound_and_releases_the_joint(solver: str) -> None:
+    """1 N m accelerates 2 kg m2 to 1 rad in 2 s; a torque of -1 N m after 3 s moves the joint back."""
     found = driven(
         ArmPlant(robot=wheel(), stops="hard"),
         Step(time=3.0, initial=1.0, final=-1.0),
@@ -146,18 +146,18 @@ def test_a_hard_stop_ends_the_motion_without_rebound_and_lets_go(solver: str) ->
     assert set(q[resting]) == {1.0}
     assert not found["arm/qd"][resting].any()
     np.testing.assert_array_equal(found["arm/stop"][resting, 0], -1.0)
-    # the impact took the kinetic energy: 1 N m over 1 rad
+    # the impact dissipates the kinetic energy: 1 N m over 1 rad
     balance = energy_balance(found)
     np.testing.assert_allclose(balance[t > 2.0 + 1e-9], balance[0] - 1.0, rtol=0, atol=1e-9)
 
 
-def test_an_elastic_stop_is_a_spring_with_a_damper_that_never_pulls(solver: str) -> None:
-    """Into the stop at 1 rad/s: a damped half swing, until spring and damper would pull."""
+def test_an_elastic_stop_is_a_spring_and_damper_that_never_pull(solver: str) -> None:
+    """Contact with the stop at 1 rad/s: a damped half period, until spring and damper would pull."""
     k, d, J = 800.0, 16.0, 2.0
     plant = ArmPlant(robot=wheel(), stops="elastic", stiffness=k, damping=d, qd0=1.0)
     found = driven(plant, Constant(value=0.0), stop=1.5, solver=solver)
     decay, w = d / 2 / J, np.sqrt(k / J - (d / 2 / J) ** 2)
-    # k x + d x' = 0 where tan(w t) = -d w / (k - d decay)
+    # k x + d x' = 0 at tan(w t) = -d w / (k - d decay)
     contact = (np.pi - np.arctan2(d * w, k - d * decay)) / w
     since = np.clip(found.time - 1.0, 0.0, contact)
     over = np.exp(-decay * since) * np.sin(w * since) / w
@@ -170,7 +170,7 @@ def test_an_elastic_stop_is_a_spring_with_a_damper_that_never_pulls(solver: str)
         np.testing.assert_allclose(energy_balance(found), energy_balance(found)[0], rtol=0, atol=1e-8)
 
 
-# -- two joints that feel one another
+# -- two coupled joints
 
 
 def reference(robot: Robot, tau: object, q0: list[float], times: np.ndarray) -> np.ndarray:
@@ -182,7 +182,7 @@ def reference(robot: Robot, tau: object, q0: list[float], times: np.ndarray) -> 
     return arm.run(np.array(q0), np.zeros(len(q0)), times)
 
 
-def test_two_joints_stick_and_slip_as_scipy_finds_event_by_event() -> None:
+def test_sticking_and_sliding_of_two_joints_agree_with_the_scipy_reference() -> None:
     robot, q0 = pair(gravity=2.0), [-1.2, 0.3]
     torques = (SineWave(amplitude=9.0, frequency=2.0), SineWave(amplitude=4.0, frequency=3.1, phase=1.0))
 
@@ -193,8 +193,8 @@ def test_two_joints_stick_and_slip_as_scipy_finds_event_by_event() -> None:
     by_rk45, by_rk4 = (driven(plant, *torques, stop=5.0, solver=solver) for solver in ("rk45", "rk4"))
     exact = reference(robot, tau, q0, by_rk45.time)
     rests = (exact[:, 2:] == 0.0).sum(axis=0)
-    assert rests.min() > 5, "both joints have to stick for a while"
-    # Two joints that swing at 1e-10; RK4 has steps of 50 ms
+    assert rests.min() > 5, "each joint must stick in some samples"
+    # Oscillation of two joints with rtol 1e-10; RK4 has steps of 50 ms
     for found, tolerance in ((by_rk45, 1e-7), (by_rk4, 2e-3)):
         np.testing.assert_array_equal(found.time, by_rk45.time)
         np.testing.assert_allclose(found["arm/q"], exact[:, :2], rtol=0, atol=tolerance)
@@ -206,8 +206,8 @@ def test_two_joints_stick_and_slip_as_scipy_finds_event_by_event() -> None:
 @pytest.mark.parametrize(
     "tau", [(9.0, 3.5), (-7.0, 5.0), (14.0, 0.0), (2.0, -2.0), (10.0, 9.0), (-12.0, -3.0)]
 )
-def test_who_sticks_follows_a_sudden_torque(tau: tuple[float, float]) -> None:
-    """Weightless, at rest, under a torque from the start and from a tick: each combination of joints."""
+def test_joints_stick_or_slide_consistently_after_a_torque_step(tau: tuple[float, float]) -> None:
+    """No gravity, at rest, with a torque from the start and from a tick, in all combinations of joints."""
     robot, q0 = pair(gravity=0.0), [0.1, -1.4]
     plant = ArmPlant(robot=robot, q0=q0)
     times = np.linspace(0.0, 0.3, 101)
@@ -224,19 +224,19 @@ def test_who_sticks_follows_a_sudden_torque(tau: tuple[float, float]) -> None:
     assert not found["arm/qd"][:, stuck].any()
 
 
-def test_an_arm_falls_to_rest_and_rests_for_ever(solver: str) -> None:
+def test_an_arm_falls_comes_to_rest_and_stays_at_rest(solver: str) -> None:
     found = driven(
         ArmPlant(robot=pair(), q0=[-0.3, 0.2]), *[Constant(value=0.0)] * 2, stop=20.0, solver=solver
     )
     assert not found["arm/qd"][-30:].any()
     assert len({tuple(q) for q in found["arm/q"][-30:]}) == 1
     np.testing.assert_array_equal(found["arm/qdd"][-30:], 0.0)
-    # friction holds what gravity asks for
+    # friction compensates the gravity load
     hold = ab.Arm(pair()).gravload(found["arm/q"][-1])
     np.testing.assert_allclose(-found["arm/friction"][-1], hold, rtol=1e-12)
 
 
-def test_without_dry_friction_it_is_the_plain_robot(solver: str) -> None:
+def test_an_arm_without_dry_friction_agrees_with_forward_dynamics(solver: str) -> None:
     robot = pair().nofriction(viscous=False)
     torques = SineWave(amplitude=9.0, frequency=2.0), Constant(value=1.0)
     found = driven(ArmPlant(robot=robot, q0=0.1), *torques, stop=1.0, solver=solver)
@@ -244,8 +244,8 @@ def test_without_dry_friction_it_is_the_plain_robot(solver: str) -> None:
     np.testing.assert_allclose(found["arm/q"], plain["arm/q"], rtol=0, atol=1e-9)
 
 
-def test_an_impact_at_a_hard_stop_is_felt_by_the_other_joint(solver: str) -> None:
-    """Only the stop's impulse acts, so M (qd+ - qd-) is 0 at the other joint; then both are free again."""
+def test_an_impact_at_a_hard_stop_changes_the_speed_of_the_other_joint(solver: str) -> None:
+    """Only the stop has an impulse: M (qd+ - qd-) is 0 at the other joint; then both joints are free."""
     robot = pair(gravity=0.0).nofriction()
     arm, q0, qd0 = ab.Arm(robot), (0.0, -1.0), (1.0, 0.3)
 
@@ -261,11 +261,11 @@ def test_an_impact_at_a_hard_stop_is_felt_by_the_other_joint(solver: str) -> Non
     M = np.asarray(arm.inertia(q))
     after = np.array([0.0, qd[1] + M[1, 0] * qd[0] / M[1, 1]])
     then = solve_ivp(flow, (first.t[-1], 0.7), [*q, *after], "DOP853", rtol=1e-12, atol=1e-13)
-    # the centrifugal torque leads the joint away from its stop at once
+    # the centrifugal torque moves the joint away from its stop immediately
     assert then.y[2, -1] < 0.0
     zero = [Constant(value=0.0)] * 2
     found = driven(ArmPlant(robot=robot, stops="hard", q0=q0, qd0=qd0), *zero, stop=0.7, solver=solver)
-    assert found.run.events == 1, "it leaves the stop in the instant of the impact"
+    assert found.run.events == 1, "the joint leaves the stop at the time of the impact"
     np.testing.assert_allclose(found["arm/q"][-1], then.y[:2, -1], rtol=0, atol=1e-8)
     np.testing.assert_allclose(found["arm/qd"][-1], then.y[2:, -1], rtol=0, atol=1e-8)
     lost = 0.5 * qd @ M @ qd - 0.5 * after @ M @ after
@@ -274,8 +274,8 @@ def test_an_impact_at_a_hard_stop_is_felt_by_the_other_joint(solver: str) -> Non
     np.testing.assert_allclose(balance, expected, rtol=0, atol=1e-8)
 
 
-def test_energy_of_a_falling_puma_goes_into_friction_and_elastic_stops(puma560: Robot) -> None:
-    """Six joints that stick, slip and meet their stops: only friction and dampers take energy."""
+def test_energy_of_a_falling_puma_is_balanced_by_friction_and_elastic_stops(puma560: Robot) -> None:
+    """Six joints that stick, slide and reach their stops: only friction and dampers dissipate energy."""
     plant = ArmPlant(robot=puma560, q0=(0.3, 0.9, 0.4, 0.5, 0.8, 0.2), stops="elastic")
     torques = [
         SineWave(amplitude=a, frequency=f) for a, f in ((30, 2), (60, 3), (20, 1), (1, 4), (1, 5), (1, 3))
@@ -284,14 +284,14 @@ def test_energy_of_a_falling_puma_goes_into_friction_and_elastic_stops(puma560: 
     assert found.run.events > 20
     assert (found["arm/qd"] == 0.0).any()
     balance = energy_balance(found)
-    # some 1000 J go through, at rtol 1e-10
+    # about 1000 J are converted, at rtol 1e-10
     np.testing.assert_allclose(balance, balance[0], rtol=0, atol=1e-5)
 
 
-# -- loads
+# -- payloads
 
 
-def test_a_payload_that_is_dropped_changes_the_acceleration_and_no_speed() -> None:
+def test_a_dropped_payload_changes_the_acceleration_but_not_the_speed() -> None:
     robot = pair().nofriction()
     payload = np.array([2.0, 0.05, 0.0, 0.1, 0.01, 0.02, 0.02, 0.0, 0.0, 0.0])
     step = Step(time=0.3, initial=payload, final=np.zeros(10))
@@ -312,31 +312,31 @@ def test_a_payload_that_is_dropped_changes_the_acceleration_and_no_speed() -> No
     assert jump[49] < 1.2 * max(jump[48], jump[50])
 
 
-# -- refusals
+# -- rejected parameters
 
 
-def test_friction_that_drives_is_refused() -> None:
+def test_friction_that_drives_a_joint_is_refused() -> None:
     robot = pair().with_friction_model(FrictionModel.SIGNED_GEAR)
     with pytest.raises(InputError, match="the Coulomb friction of joint 'lower' drives it"):
         ArmPlant(robot=robot)
 
 
-def test_a_start_behind_a_hard_stop_is_refused() -> None:
+def test_a_start_position_beyond_a_hard_stop_is_refused() -> None:
     with pytest.raises(InputError, match=r"joint 'upper' starts at 0\.7, beyond its stop"):
         ArmPlant(robot=pair(), stops="hard", q0=(0.7, 0.0))
     ArmPlant(robot=pair(), stops="elastic", q0=(0.7, 0.0))
 
 
-def test_a_count_that_is_not_the_robots_is_refused() -> None:
+def test_parameters_for_another_number_of_joints_are_refused() -> None:
     with pytest.raises(InputError, match="breakaway has 3 joints"):
         ArmPlant(robot=pair(), breakaway=(1.0, 1.0, 1.0))
 
 
-def test_pulses_of_torque_move_a_joint_in_jerks() -> None:
-    """0.5 N m beyond friction for half of each second: each pulse gives and takes the same distance."""
+def test_each_torque_pulse_moves_a_joint_by_the_same_angle() -> None:
+    """Pulses of 0.5 s, 0.5 N m above friction: the joint moves equally far during and after each pulse."""
     robot = wheel(gear_ratio=1.0, coulomb_friction=(0.5, -0.5))
     pulses = PulseGenerator(amplitude=1.0, period=2.0, width=25.0)
     found = driven(ArmPlant(robot=robot), pulses, stop=8.0)
-    # 0.25 rad/s2 for 0.5 s, then -0.25 until rest: 2 * 0.25 * 0.5^2 / 2 a pulse
+    # 0.25 rad/s2 for 0.5 s, then -0.25 rad/s2 until rest: 2 * 0.25 * 0.5^2 / 2 per pulse
     moved = found["arm/q"][found.time.searchsorted([1.5, 3.5, 5.5, 7.5]), 0]
     np.testing.assert_allclose(moved, 0.0625 * np.arange(1, 5), rtol=0, atol=1e-10)

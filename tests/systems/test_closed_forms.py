@@ -1,7 +1,7 @@
-"""Whole diagrams against the functions of time that solve them.
+"""Diagrams compared with their solutions in closed form.
 
-Where nothing else is said, the runs have rtol 1e-10 and atol 1e-12 per step, and the tolerance 1e-8 leaves
-room for the errors of some hundred steps.
+By default the runs have rtol 1e-10 and atol 1e-12 per step, and the tolerance of 1e-8 covers the accumulated
+errors of some hundred steps.
 """
 
 from __future__ import annotations
@@ -41,11 +41,11 @@ def test_a_chain_of_integrators_gives_powers_of_time() -> None:
         last = builder.add(f"x{k}", Integrator(), last)
     result = run(builder.build(), 2.0)
     for k in range(5):
-        # a polynomial of degree 4 is exact for a method of order 5
+        # a method of order 5 integrates a polynomial of degree 4 exactly
         assert result[f"x{k}/y"] == pytest.approx(result.time**k / factorial(k), rel=1e-13, abs=1e-13)
 
 
-def test_an_oscillator_swings_as_the_cosine() -> None:
+def test_an_oscillator_agrees_with_the_cosine() -> None:
     builder = DiagramBuilder("oscillator")
     angle = builder.add("angle", Integrator(initial=1.0))
     speed = builder.add("speed", Integrator(), builder.add("force", Gain(gain=-4.0), angle))
@@ -58,7 +58,7 @@ def test_an_oscillator_swings_as_the_cosine() -> None:
     assert np.array_equal(result["acceleration/y"], result["force/y"])
 
 
-def test_a_matrix_in_a_loop_is_its_exponential() -> None:
+def test_a_matrix_in_a_loop_gives_the_matrix_exponential() -> None:
     A = np.array([[-0.1, 2.0, 0.0], [-2.0, -0.1, 0.3], [0.0, 0.5, -1.0]])
     x0 = np.array([1.0, 0.0, -1.0])
     builder = DiagramBuilder("linear")
@@ -70,7 +70,7 @@ def test_a_matrix_in_a_loop_is_its_exponential() -> None:
 
 
 @pytest.mark.parametrize("start", ["filter", "state space"])
-def test_a_filter_answers_a_step_with_its_closed_form(start: str) -> None:
+def test_the_step_response_of_a_filter_agrees_with_its_closed_form(start: str) -> None:
     """4 / (s^2 + 2 s + 4), damping 1/2: y = 1 - exp(-t) (cos wt + sin(wt) / w), w = sqrt(3)."""
     filters = {
         "filter": TransferFunction(numerator=(4.0,), denominator=(1.0, 2.0, 4.0)),
@@ -93,7 +93,7 @@ def test_a_filter_with_as_many_zeros_as_poles() -> None:
 
 
 def control_loop(control: PID) -> Diagram:
-    """The control of a mass: x'' = u, set point 1."""
+    """A control loop with the plant x'' = u and the set point 1."""
     builder = DiagramBuilder("loop")
     x = builder.add("x", Integrator())
     error = builder.add("error", Sum(signs="+-"), builder.add("goal", Constant(value=1.0)), x)
@@ -102,7 +102,7 @@ def control_loop(control: PID) -> Diagram:
     return builder.build()
 
 
-def test_a_pid_loop_is_the_exponential_of_its_matrix() -> None:
+def test_a_pid_loop_agrees_with_the_matrix_exponential() -> None:
     P, I, D, N = 6.0, 2.0, 4.0, 50.0  # noqa: E741
     result = run(control_loop(PID(P=P, I=I, D=D, N=N)), 8.0)
     # states x, v, integral, filter, and 1: u = P e + integral + N (D e - filter), e = 1 - x
@@ -119,8 +119,8 @@ def test_a_pid_loop_is_the_exponential_of_its_matrix() -> None:
     assert result["x/y"] == pytest.approx(expected, abs=1e-8)
 
 
-def test_a_jump_is_met_at_its_instant() -> None:
-    """x' = step(t - 1/3): a sample instant never falls on the jump, and x is exact all the same."""
+def test_a_step_of_the_integrator_ends_at_a_jump() -> None:
+    """x' = step(t - 1/3): no sample is at the jump, and x is exact nevertheless."""
     builder = DiagramBuilder("jump")
     builder.add("x", Integrator(), builder.add("u", Step(time=1 / 3, initial=-1.0, final=2.0)))
     result = run(builder.build(), 2.0)
@@ -129,7 +129,7 @@ def test_a_jump_is_met_at_its_instant() -> None:
     assert result["x/y"] == pytest.approx(expected, abs=1e-14)
 
 
-def test_the_derivative_of_an_integral_is_what_was_integrated() -> None:
+def test_the_derivative_of_an_integral_equals_the_integrand() -> None:
     builder = DiagramBuilder("round trip")
     u = builder.add("u", SineWave(amplitude=[1.0, 2.0], frequency=3.0))
     builder.add("back", Derivative(), builder.add("x", Integrator(), u))
@@ -154,7 +154,7 @@ def van_der_pol() -> Diagram:
     return builder.build()
 
 
-def test_van_der_pol_follows_an_independent_solution() -> None:
+def test_van_der_pol_agrees_with_an_independent_solution() -> None:
     def equations(t: float, x: np.ndarray) -> list[float]:
         x1, x2, integral = x
         e = np.sin(2 * np.pi * 0.1 * t) - x1
@@ -168,7 +168,7 @@ def test_van_der_pol_follows_an_independent_solution() -> None:
     assert result["x2/y"] == pytest.approx(solution.y[1], abs=1e-8)
 
 
-def test_a_diagram_without_states_is_evaluated_at_its_instants() -> None:
+def test_a_diagram_without_states_is_evaluated_at_the_sample_times() -> None:
     builder = DiagramBuilder("static")
     builder.add("square", MathFunction(function="square"), builder.add("clock", Clock()))
     result = run(builder.build(), 1.0)

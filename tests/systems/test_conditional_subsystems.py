@@ -1,4 +1,4 @@
-"""Conditional subsystems against closed forms and against loops written in plain Python."""
+"""Conditional subsystems compared with closed forms and with loops in plain Python."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def around(
     source: Callable[[DiagramBuilder], BlockHandle] = lambda builder: builder.add("source", Clock()),
     **parameters: object,
 ) -> Diagram:
-    """A subsystem ``sub`` between a source and its control signals."""
+    """Build a subsystem ``sub`` with a source and its control signals."""
     builder, inner = DiagramBuilder("top"), DiagramBuilder("inner")
     inside(inner)
     builder.add("sub", kind(diagram=inner.build(), **parameters), source(builder), **controls(builder))
@@ -71,29 +71,29 @@ def sine_control(port: str) -> Callable[[DiagramBuilder], dict[str, BlockHandle]
 
 @SETTINGS
 def test_states_are_held_while_a_subsystem_is_off(settings: dict[str, object]) -> None:
-    """u = t, enabled in (0, 1) and (2, 3): the integral of t over the time that it was on."""
+    """u = t, enabled in (0, 1) and (2, 3): the integral of t over the enabled intervals."""
     diagram = around(EnabledSubsystem, integrator, sine_control("enable"))
     result = ab.simulate(diagram, stop_time=4.0, sample_time=0.05, **settings)
     t = result.time
     on = np.clip(t, 0, 1) ** 2 / 2 + (np.clip(t, 2, 3) ** 2 - 4) / 2 + 0.5
     np.testing.assert_allclose(result["sub/integral"], on, atol=1e-11)
     np.testing.assert_allclose(result["sub/y"][1:], on[1:], atol=1e-11)
-    assert result["sub/y"][0] == -1.0  # off at the very start, as sin 0 is not positive
+    assert result["sub/y"][0] == -1.0  # disabled at the start, because sin 0 is not positive
 
 
 @SETTINGS
-def test_states_start_anew_where_that_is_asked_for(settings: dict[str, object]) -> None:
+def test_states_are_reset_on_enabling_if_chosen(settings: dict[str, object]) -> None:
     diagram = around(EnabledSubsystem, integrator, sine_control("enable"), states_when_enabling="reset")
     result = ab.simulate(diagram, stop_time=4.0, sample_time=0.05, **settings)
     t = result.time
     first, second = 0.5 + np.clip(t, 0, 1) ** 2 / 2, 0.5 + (np.clip(t, 2, 3) ** 2 - 4) / 2
     expected = np.where(t < 2.0, first, second)
-    inside = np.abs(t - 2.0) > 1e-9  # at the instant itself either side is right
+    inside = np.abs(t - 2.0) > 1e-9  # at the event time both values are correct
     np.testing.assert_allclose(result["sub/y"][1:][inside[1:]], expected[1:][inside[1:]], atol=1e-11)
 
 
 @SETTINGS
-def test_outputs_go_back_where_that_is_asked_for(settings: dict[str, object]) -> None:
+def test_outputs_return_to_the_initial_value_when_disabled_if_chosen(settings: dict[str, object]) -> None:
     def inside(inner: DiagramBuilder) -> None:
         inner.output("y", inner.add("g", Gain(gain=2.0), inner.input("u")), when_off="reset", initial=7.0)
 
@@ -101,17 +101,17 @@ def test_outputs_go_back_where_that_is_asked_for(settings: dict[str, object]) ->
         around(EnabledSubsystem, inside, sine_control("enable")), stop_time=4.0, sample_time=0.1, **settings
     )
     on = np.sin(np.pi * result.time) > 0
-    away = np.abs(result.time - np.round(result.time)) > 1e-9  # at the instant itself either side is right
+    away = np.abs(result.time - np.round(result.time)) > 1e-9  # at the event time both values are correct
     expected = np.where(on, 2.0 * result.time, 7.0)
     np.testing.assert_allclose(result["sub/y"][away], expected[away], atol=1e-12)
 
 
 @SETTINGS
 @pytest.mark.parametrize("kind", ["breakpoints", "ticks", "delays"])
-def test_an_output_that_is_switched_off_keeps_its_value_from_just_before(
+def test_a_disabled_output_keeps_its_value_just_before_the_event(
     kind: str, settings: dict[str, object]
 ) -> None:
-    """Input and enable jump at the same instant: what is held is the value before the jump."""
+    """Input and enable signal jump at the same time: the value before the jump is held."""
 
     def jumping(builder: DiagramBuilder, name: str, first: float, last: float) -> BlockHandle:
         early = 0.3 if kind == "delays" else 0.0
@@ -132,12 +132,12 @@ def test_an_output_that_is_switched_off_keeps_its_value_from_just_before(
 
 
 def sampled_counter(inner: DiagramBuilder) -> None:
-    """y = x, then x = x + T u."""
+    """Add a counter: y = x, then x = x + T u."""
     inner.output("y", inner.add("count", DiscreteIntegrator(initial=2.0, sample_time=0.1), inner.input("u")))
 
 
 def pulses(builder: DiagramBuilder, sample_time: float) -> BlockHandle:
-    """1 and 0 in turn, each three ticks long, beginning with 0 for three ticks."""
+    """Add a signal that alternates between 0 and 1 every three ticks, starting with 0."""
     clock = builder.add("c", ZeroOrderHold(sample_time=sample_time), builder.add("clock", Clock()))
     wave = Expression(formula=f"sin(2*pi*(u/{sample_time} + 3.5)/6) > 0")
     return builder.add("pulses", wave, clock)
@@ -145,8 +145,10 @@ def pulses(builder: DiagramBuilder, sample_time: float) -> BlockHandle:
 
 @SETTINGS
 @pytest.mark.parametrize("when", ["held", "reset"])
-def test_a_sampled_control_acts_within_the_same_tick(when: str, settings: dict[str, object]) -> None:
-    """The counter inside takes part in the very tick at which its enable signal becomes positive."""
+def test_a_sampled_enable_signal_takes_effect_at_the_same_tick(
+    when: str, settings: dict[str, object]
+) -> None:
+    """The inner counter is updated at the tick at which its enable signal becomes positive."""
     diagram = around(
         EnabledSubsystem,
         sampled_counter,
@@ -168,8 +170,8 @@ def test_a_sampled_control_acts_within_the_same_tick(when: str, settings: dict[s
 
 
 @SETTINGS
-def test_a_flowing_control_restarts_sampled_blocks_between_their_ticks(settings: dict[str, object]) -> None:
-    """Enabled from 1.05 s to 2.05 s of each 2 s: the counter starts anew, and counts at the next tick."""
+def test_a_continuous_enable_signal_resets_sampled_blocks_between_ticks(settings: dict[str, object]) -> None:
+    """Enabled from 1.05 s to 2.05 s in each 2 s: the counter is reset, and counts at the next tick."""
     diagram = around(
         EnabledSubsystem,
         sampled_counter,
@@ -188,11 +190,11 @@ def test_a_flowing_control_restarts_sampled_blocks_between_their_ticks(settings:
             y, x = x, x + 1.0
         was = enable
         expected.append(y)
-    # the held output of the counter is taken over at the tick; between enabling and tick it is the old one
+    # the output of the counter changes at the tick; between enabling and the tick it has the old value
     np.testing.assert_allclose(result["sub/y"], expected, atol=1e-12)
 
 
-def test_a_division_by_zero_in_a_subsystem_that_is_off_disturbs_nobody() -> None:
+def test_a_division_by_zero_in_a_disabled_subsystem_has_no_effect() -> None:
     def inside(inner: DiagramBuilder) -> None:
         u = inner.input("u")
         root = inner.add("root", Expression(formula="sqrt(1 - u)"), u)
@@ -217,8 +219,8 @@ def test_a_division_by_zero_in_a_subsystem_that_is_off_disturbs_nobody() -> None
     assert result["sub/y"][-1] == 2.0
 
 
-def test_conditional_subsystems_inside_each_other() -> None:
-    """The inner one works where both are enabled: sin(pi t) > 0 and t > 2.5."""
+def test_nested_conditional_subsystems() -> None:
+    """The inner subsystem executes while both are enabled: sin(pi t) > 0 and t > 2.5."""
     builder = DiagramBuilder("top")
     outer, inner = DiagramBuilder("outer"), DiagramBuilder("inner")
     integrator(inner)
@@ -264,8 +266,8 @@ def test_a_triggered_subsystem_samples_and_holds(edge: str, settings: dict[str, 
 
 
 @SETTINGS
-def test_sampled_blocks_take_one_step_at_each_firing(settings: dict[str, object]) -> None:
-    """y = x(k), x(k+1) = x(k) + elapsed u: the rectangle rule over irregular instants, u = t."""
+def test_sampled_blocks_are_updated_once_at_each_trigger(settings: dict[str, object]) -> None:
+    """y = x(k), x(k+1) = x(k) + elapsed u: the rectangle rule with irregular steps, u = t."""
 
     def inside(inner: DiagramBuilder) -> None:
         delayed = inner.add("delay", UnitDelay(initial=-3.0), inner.input("u"))
@@ -292,7 +294,7 @@ def test_sampled_blocks_take_one_step_at_each_firing(settings: dict[str, object]
 
 
 @SETTINGS
-def test_a_sampled_trigger_is_followed_within_the_same_tick(settings: dict[str, object]) -> None:
+def test_a_sampled_trigger_takes_effect_at_the_same_tick(settings: dict[str, object]) -> None:
     builder = DiagramBuilder("top")
     inner = DiagramBuilder("inner")
     inner.output("y", inner.add("count", DiscreteIntegrator(gain=0.0, initial=0.0), inner.input("u")))
@@ -310,10 +312,10 @@ def test_a_sampled_trigger_is_followed_within_the_same_tick(settings: dict[str, 
         was = enable
         expected.append(last)
     np.testing.assert_array_equal(result["sub/last"], expected)
-    np.testing.assert_array_equal(result["seen"], expected)  # no tick later
+    np.testing.assert_array_equal(result["seen"], expected)  # not one tick later
 
 
-def test_a_trigger_counts_only_while_enabled() -> None:
+def test_a_trigger_takes_effect_only_while_enabled() -> None:
     diagram = around(
         EnabledTriggeredSubsystem,
         lambda inner: inner.output("y", inner.input("u")),
@@ -327,7 +329,7 @@ def test_a_trigger_counts_only_while_enabled() -> None:
     assert result["sub/y"][-1] == pytest.approx(2.5, abs=1e-9)
 
 
-def test_what_cannot_wait_for_a_trigger_is_refused() -> None:
+def test_a_triggered_subsystem_with_states_or_clocks_is_refused() -> None:
     def trigger(builder: DiagramBuilder) -> dict[str, BlockHandle]:
         return {"trigger": builder.add("w", SineWave())}
 
@@ -352,8 +354,8 @@ def test_what_cannot_wait_for_a_trigger_is_refused() -> None:
 
 
 @SETTINGS
-def test_all_states_start_anew_when_the_reset_fires(settings: dict[str, object]) -> None:
-    """The integral of 1 begins again at 0.5, 2.5, 4.5 s, and so does that in a subsystem inside."""
+def test_the_reset_restores_all_initial_states(settings: dict[str, object]) -> None:
+    """The integral of 1 restarts at 0.5, 2.5 and 4.5 s, also that in an inner subsystem."""
 
     def inside(inner: DiagramBuilder) -> None:
         u = inner.input("u")
@@ -375,7 +377,7 @@ def test_all_states_start_anew_when_the_reset_fires(settings: dict[str, object])
 
 
 @SETTINGS
-def test_a_sampled_reset_acts_before_the_tick_it_comes_with(settings: dict[str, object]) -> None:
+def test_a_sampled_reset_takes_effect_before_the_update_of_the_same_tick(settings: dict[str, object]) -> None:
     diagram = around(
         ResettableSubsystem,
         sampled_counter,
@@ -392,7 +394,7 @@ def test_a_sampled_reset_acts_before_the_tick_it_comes_with(settings: dict[str, 
     np.testing.assert_allclose(result["sub/y"], expected, atol=1e-12)
 
 
-# -- chosen by conditions --------------------------------------------------------------------------------
+# -- selected by conditions --------------------------------------------------------------------------------
 
 
 def with_if(source: Callable[[DiagramBuilder], BlockHandle]) -> Diagram:
@@ -408,7 +410,7 @@ def with_if(source: Callable[[DiagramBuilder], BlockHandle]) -> Diagram:
 
 
 @SETTINGS
-def test_if_chooses_an_action_and_merge_takes_its_output(settings: dict[str, object]) -> None:
+def test_if_selects_an_action_and_merge_outputs_its_result(settings: dict[str, object]) -> None:
     result = ab.simulate(
         with_if(lambda b: b.add("u", SineWave())), stop_time=7.0, sample_time=0.05, **settings
     )
@@ -420,7 +422,7 @@ def test_if_chooses_an_action_and_merge_takes_its_output(settings: dict[str, obj
 
 
 @SETTINGS
-def test_if_with_sampled_inputs_acts_within_the_tick(settings: dict[str, object]) -> None:
+def test_if_with_sampled_inputs_takes_effect_at_the_same_tick(settings: dict[str, object]) -> None:
     def source(builder: DiagramBuilder) -> BlockHandle:
         return builder.add("u", ZeroOrderHold(sample_time=0.1), builder.add("sine", SineWave()))
 
@@ -432,7 +434,7 @@ def test_if_with_sampled_inputs_acts_within_the_tick(settings: dict[str, object]
 
 
 @SETTINGS
-def test_cases_are_whole_numbers(settings: dict[str, object]) -> None:
+def test_switch_case_truncates_its_input_to_an_integer(settings: dict[str, object]) -> None:
     builder = DiagramBuilder("cases")
     u = builder.add("u", Ramp(slope=1.0, initial=-2.55))
     builder.add("switch", SwitchCase(cases="-1 1; 0; 2"), u)
@@ -442,7 +444,7 @@ def test_cases_are_whole_numbers(settings: dict[str, object]) -> None:
         np.testing.assert_array_equal(result[f"switch/{port}"] == 1.0, np.isin(whole, numbers))
 
 
-def test_merge_keeps_the_value_of_the_one_that_worked_last() -> None:
+def test_merge_keeps_the_last_value_of_the_subsystem_that_executed_last() -> None:
     builder = DiagramBuilder("merge")
     u = builder.add("u", Clock())
     for name, begin in (("first", 1.0), ("second", 3.0)):
@@ -460,7 +462,7 @@ def test_merge_keeps_the_value_of_the_one_that_worked_last() -> None:
     assert values[5.5] == pytest.approx(4.0, abs=1e-9)
 
 
-def test_wrong_conditions_and_merges_are_refused() -> None:
+def test_invalid_conditions_cases_and_merges_are_refused() -> None:
     builder = DiagramBuilder("merge")
     with pytest.raises(DiagramError, match="'c/y', which is not an output of a conditional subsystem"):
         builder.add("merge", Merge(inputs=1), builder.add("c", Clock()))
@@ -476,8 +478,8 @@ def test_wrong_conditions_and_merges_are_refused() -> None:
             SwitchCase(cases=wrong)
 
 
-def test_an_enabled_subsystem_is_a_switch_where_it_has_no_states() -> None:
-    """Two ways to say one thing: a switch between live signals, and merged action subsystems."""
+def test_merged_action_subsystems_without_states_agree_with_a_switch() -> None:
+    """A Switch between two signals agrees with two merged action subsystems."""
     builder = DiagramBuilder("two ways")
     u = builder.add("u", SineWave(frequency=2.0))
     plus, minus = builder.add("plus", Gain(gain=2.0), u), builder.add("minus", Gain(gain=-3.0), u)

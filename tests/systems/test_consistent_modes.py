@@ -1,6 +1,7 @@
-"""Modes are functions of the signals: after every jump, and wherever a border is touched or grazed.
+"""Modes are consistent with the signals after every jump, and when a signal touches or grazes a switching
+value.
 
-Formulas in NumPy are the second opinion. The laws hold at every recorded time, whatever the tolerance.
+The references are formulas in NumPy, which hold at every recorded time for every tolerance.
 """
 
 from __future__ import annotations
@@ -85,7 +86,7 @@ SWITCHING: Mapping[str, tuple[Callable[[], Block], Callable[[Array], Array]]] = 
 
 
 def sources() -> dict[str, Block]:
-    """Jumping and touching signals that reach a border just as they leave it; frequencies are seeded."""
+    """Return signals that jump to or touch a switching value; the random frequencies have a fixed seed."""
     random = np.random.default_rng(9)
     found: dict[str, Block] = {"as found": SignalGenerator(waveform="sawtooth", frequency=2.652)}
     for number, frequency in enumerate((1.0, 2.5, *random.uniform(0.3, 4.0, 2))):
@@ -99,7 +100,7 @@ def sources() -> dict[str, Block]:
 
 
 @pytest.mark.parametrize("rtol", [1e-3, 1e-8])
-def test_a_switching_block_gives_its_formula_of_its_input(rtol: float) -> None:
+def test_the_output_of_a_switching_block_agrees_with_its_formula(rtol: float) -> None:
     builder = DiagramBuilder("borders")
     for name, source in sources().items():
         signal = builder.add(name, source)
@@ -112,7 +113,8 @@ def test_a_switching_block_gives_its_formula_of_its_input(rtol: float) -> None:
         u = result[f"{name}/y"]
         for kind, (_, formula) in SWITCHING.items():
             found = result[f"{name}: {kind}/y"]
-            # Where the input passes a border at a recorded time, rounding decides between its two sides.
+            # If the input crosses a switching value at a recorded time, rounding decides between the two
+            # sides.
             sides = [formula(u + shift) for shift in (0.0, -1e-12, 1e-12)]
             differs = np.min([np.abs(found - side) for side in sides], axis=0) > 1e-11
             wrong += [
@@ -123,7 +125,7 @@ def test_a_switching_block_gives_its_formula_of_its_input(rtol: float) -> None:
 
 
 def limited(u: Array, dt: float, rising: float, falling: float, start: float) -> Array:
-    """The fastest course towards ``u (N, n)`` with bounded rates, by small steps."""
+    """Limit the rates of ``u (N, n)`` with small steps."""
     y = np.empty_like(u)
     y[0] = start
     for k in range(1, len(u)):
@@ -132,14 +134,14 @@ def limited(u: Array, dt: float, rising: float, falling: float, start: float) ->
 
 
 def test_rates_of_many_sines_are_limited() -> None:
-    """Crests, touches of the limit and restarts from below and above, with few events each."""
+    """Sines with crests, contacts with the limit, and starts below and above, with few events each."""
     random = np.random.default_rng(4)
     count, dt = 30, 1e-3
     amplitude, frequency = random.uniform(0.3, 3.0, count), random.uniform(0.3, 3.0, count)
     phase = random.uniform(0.0, 6.0, count)
     amplitude[0], frequency[0], phase[0] = 1.1166089529668757, 1.7826608001550557, 2.350048796723417
     amplitude[1], frequency[1], phase[1] = 1.5, 1.0, 0.0
-    frequency[2] = 1.0 / amplitude[2]  # its rate touches the limit
+    frequency[2] = 1.0 / amplitude[2]  # the rate of this sine touches the limit
     builder = DiagramBuilder("sines")
     sines = builder.add("u", SineWave(amplitude=amplitude, frequency=frequency, phase=phase))
     builder.add("fixed", RateLimiterContinuous(), sines)
@@ -149,12 +151,12 @@ def test_rates_of_many_sines_are_limited() -> None:
     u = result["u/y"]
     for name in ("fixed/y", "dynamic/y"):
         expected = limited(u, dt, 1.0, -1.0, 0.0)
-        # The reference is of first order in its step.
+        # The reference is a first-order method.
         np.testing.assert_allclose(result[name], expected, rtol=0, atol=2e-3)
     assert result.run.events < 60 * count
 
 
-def test_a_rate_limiter_makes_up_for_a_jump() -> None:
+def test_a_rate_limiter_approaches_its_input_after_a_jump() -> None:
     builder = DiagramBuilder("jump")
     jump = builder.add("u", Step(time=1.0, initial=0.5, final=2.0))
     builder.add("limited", RateLimiterContinuous(rising=0.5, falling=-0.5, initial=0.5), jump)
@@ -165,7 +167,7 @@ def test_a_rate_limiter_makes_up_for_a_jump() -> None:
 
 
 def ball(restitution: float, start: float, rest_speed: float = 1e-6) -> Diagram:
-    """A ball 1 m above the floor that is let go at a time."""
+    """A ball 1 m above the floor that is released at a given time."""
     builder = DiagramBuilder("ball")
     gravity = builder.add("gravity", Step(time=start, initial=0.0, final=-9.81))
     block = SecondOrderIntegratorLimited(initial=1.0, lower=0.0, reinitialize=True, rest_speed=rest_speed)
@@ -180,24 +182,24 @@ def ball(restitution: float, start: float, rest_speed: float = 1e-6) -> Diagram:
     [(0.7, 300.0, 310.0), (0.7, 3e5, 3e5 + 10.0), (0.999, 0.0, 1000.0), (0.99, 1e6, 1e6 + 100.0)],
 )
 def test_a_ball_comes_to_rest_at_any_time(restitution: float, start: float, stop: float) -> None:
-    """It bounces until its speed is 1e-6 m/s: so many times, and then lies on the floor."""
+    """The ball bounces until its speed is 1e-6 m/s, which gives the number of bounces, and then rests."""
     result = ab.simulate(ball(restitution, start), stop_time=stop, sample_time=(stop - start) / 10.0)
     impact = np.sqrt(2 * 9.81)
     bounces = int(np.ceil(np.log(1e-6 / impact) / np.log(restitution)))
     assert result.run.complete
     assert result["ball/x"].min() >= 0.0
     assert result["ball/x"][-1] == 0.0
-    # Rounding of the time decides the last of the slow bounces.
+    # Rounding errors of the time affect the number of the last slow bounces.
     assert result.run.events == pytest.approx(bounces, rel=0.1, abs=2)
 
 
 @pytest.mark.parametrize("restitution", [0.001, 0.5])
-def test_a_ball_that_never_rests_is_named(restitution: float) -> None:
+def test_a_ball_with_rest_speed_zero_is_reported_for_endless_events(restitution: float) -> None:
     with pytest.raises(SimulationError, match=r"block 'ball' causes events without end at 30[01]"):
         ab.simulate(ball(restitution, 300.0, rest_speed=0.0), stop_time=310.0, sample_time=1.0)
 
 
-def test_the_chattering_block_is_named_and_not_one_that_switched_before() -> None:
+def test_the_error_names_the_chattering_block_and_no_other() -> None:
     builder = DiagramBuilder("chatter")
     early = builder.add("early", SignalGenerator(waveform="square", frequency=3.0))
     builder.add("bystander", Saturation(lower=-0.3, upper=0.3), early)
@@ -210,7 +212,7 @@ def test_the_chattering_block_is_named_and_not_one_that_switched_before() -> Non
 
 
 @pytest.mark.parametrize("initial", [-2.0, 0.3, 2.0])
-def test_a_backlash_that_starts_beyond_its_play_is_pushed_before_the_input_turns_back(initial: float) -> None:
+def test_a_backlash_with_an_initial_output_outside_its_band_moves_into_it(initial: float) -> None:
     builder = DiagramBuilder("play")
     play = builder.add("play", Backlash(initial=initial), builder.add("input", Ramp(initial=0.5, slope=-1.0)))
     builder.add("hit", HitCrossing(offset=-0.1), play)
@@ -220,8 +222,8 @@ def test_a_backlash_that_starts_beyond_its_play_is_pushed_before_the_input_turns
 
 
 @pytest.mark.parametrize("states", ["held", "reset"])
-def test_a_backlash_that_is_switched_on_beyond_its_play_is_pushed_once(states: str) -> None:
-    """An event that its output causes at the same instant finds it where it was pushed to."""
+def test_a_backlash_that_is_enabled_outside_its_band_moves_once(states: str) -> None:
+    """An event caused by the output at the same time uses the new output."""
     inside = DiagramBuilder("inside")
     inside.add("out", Outport(), inside.add("play", Backlash(), inside.add("in", Inport())))
     builder = DiagramBuilder("play")
@@ -248,8 +250,8 @@ def test_a_backlash_that_is_switched_on_beyond_its_play_is_pushed_once(states: s
     ],
     ids=lambda gate: f"{gate.title} {getattr(gate, 'operator', getattr(gate, 'function', ''))}",
 )
-def test_an_analog_signal_is_true_from_the_very_instant_at_which_it_leaves_0(gate: Block) -> None:
-    """A rate limiter goes on from the output just before that instant, which the step does not leap over."""
+def test_a_logical_input_is_true_from_the_time_at_which_it_leaves_0(gate: Block) -> None:
+    """A step ends at that time, and the rate limiter continues from the output just before it."""
     builder = DiagramBuilder("gate")
     rise = builder.add("rise", Integrator(), builder.add("rate", Constant(value=0.75)))
     if isinstance(gate, DirectLookup):
@@ -261,7 +263,7 @@ def test_an_analog_signal_is_true_from_the_very_instant_at_which_it_leaves_0(gat
     np.testing.assert_allclose(result["limited/y"], np.minimum(result.time, 1.0), atol=1e-9)
 
 
-def test_a_quantizer_that_steps_up_and_down_within_its_hysteresis_is_named() -> None:
+def test_a_quantizer_that_chatters_in_a_loop_is_reported() -> None:
     builder = DiagramBuilder("chatter")
     place = builder.add("place", Integrator())
     steps = builder.add("steps", Quantizer(interval=0.1), place)
@@ -271,8 +273,8 @@ def test_a_quantizer_that_steps_up_and_down_within_its_hysteresis_is_named() -> 
         ab.simulate(builder.build(), stop_time=100.0)
 
 
-def test_jumps_that_crowd_at_a_pole_are_named() -> None:
-    """``t mod (1 - t)`` jumps n times before t = n / (n + 1): infinitely often before 1 s."""
+def test_jumps_that_accumulate_at_a_pole_are_reported() -> None:
+    """``t mod (1 - t)`` has n jumps before t = n / (n + 1), and thus infinitely many before 1 s."""
     builder = DiagramBuilder("pole")
     builder.add(
         "rest", Modulo(), builder.add("time", Ramp()), builder.add("left", Ramp(slope=-1.0, initial=1.0))
@@ -282,8 +284,8 @@ def test_jumps_that_crowd_at_a_pole_are_named() -> None:
 
 
 @pytest.mark.parametrize("switch", [Sign(), CompareToZero(relation="~=")], ids=["Sign", "CompareToZero"])
-def test_a_difference_of_recorded_values_that_is_0_counts_as_0(switch: Block) -> None:
-    """The quantizer's product is rounded before it is subtracted, in modes and in records alike."""
+def test_a_recorded_difference_of_0_gives_the_mode_of_0(switch: Block) -> None:
+    """The product in the quantizer is rounded before the subtraction, in modes as well as in records."""
     builder = DiagramBuilder("tie")
     value = builder.add("value", Constant(value=-1.0))
     error = builder.add("error", Sum(signs="+-"), value, builder.add("steps", Quantizer(interval=0.1), value))
@@ -293,8 +295,8 @@ def test_a_difference_of_recorded_values_that_is_0_counts_as_0(switch: Block) ->
     assert not result["switch/y"].any()
 
 
-def test_modes_without_a_consistent_choice_are_named() -> None:
-    """``y = sign(bias - y)`` has no solution for a bias of 0.5: 1 asks for -1, and -1 asks for 1."""
+def test_modes_without_a_consistent_solution_are_reported() -> None:
+    """``y = sign(bias - y)`` has no solution for a bias of 0.5: y = 1 requires -1, and y = -1 requires 1."""
     builder = DiagramBuilder("contradiction")
     bias = builder.add("bias", Step(time=1.0, initial=2.0, final=0.5))
     sum_ = builder.add("sum", Sum(signs="+-"))
@@ -306,8 +308,8 @@ def test_modes_without_a_consistent_choice_are_named() -> None:
     assert "at 1 s" in str(raised.value)
 
 
-def test_coupled_modes_find_their_one_consistent_choice() -> None:
-    """``y = max(0, M y + q)`` by saturations in a loop: a complementarity problem with one solution."""
+def test_the_unique_solution_of_coupled_modes_is_found() -> None:
+    """``y = max(0, M y + q)`` with saturations in a loop: a complementarity problem with one solution."""
     random = np.random.default_rng(7)
     for _ in range(3):
         n = 4
@@ -326,7 +328,7 @@ def test_coupled_modes_find_their_one_consistent_choice() -> None:
 
 
 @pytest.mark.parametrize("formula", ["if(u > 0, -1, 1)", "1 - (u > 0)"])
-def test_a_formula_that_contradicts_itself_has_no_solution(formula: str) -> None:
+def test_a_contradictory_formula_in_a_loop_is_reported(formula: str) -> None:
     builder = DiagramBuilder("loop")
     block = builder.add("formula", Expression(formula=formula))
     builder.connect(block, block["u"])
@@ -337,7 +339,9 @@ def test_a_formula_that_contradicts_itself_has_no_solution(formula: str) -> None
 @pytest.mark.parametrize(
     ("formula", "expected"), [("0.5 * u + 1", 2.0), ("floor(u / 2) + 0.25", 0.25), ("max(u, 1) / 2 + 1", 2.0)]
 )
-def test_a_formula_with_jumps_is_solved_where_it_has_a_solution(formula: str, expected: float) -> None:
+def test_a_discontinuous_formula_in_a_loop_is_solved_if_a_solution_exists(
+    formula: str, expected: float
+) -> None:
     builder = DiagramBuilder("loop")
     block = builder.add("formula", Expression(formula=formula))
     builder.connect(block, block["u"])
@@ -345,8 +349,8 @@ def test_a_formula_with_jumps_is_solved_where_it_has_a_solution(formula: str, ex
     np.testing.assert_allclose(result["formula/y"], expected, rtol=1e-12)
 
 
-def test_a_state_at_its_limit_follows_a_rate_that_jumps_there() -> None:
-    """The state reaches its limit at the instant at which its rate jumps: away from it, or towards it."""
+def test_a_limited_state_is_correct_when_its_rate_jumps_at_the_limit() -> None:
+    """The state reaches its limit at the time at which its rate jumps, away from or towards the limit."""
     builder = DiagramBuilder("limit")
     rate = builder.add("rate", RepeatingSequence(times=(0.0, 1.0, 1.5, 2.0), values=(1.0, 1.0, -1.0, -1.0)))
     builder.add("limited", IntegratorLimited(lower=0.0, upper=1.0), rate)
@@ -362,8 +366,8 @@ def test_a_state_at_its_limit_follows_a_rate_that_jumps_there() -> None:
     np.testing.assert_allclose(y, expected, atol=0.03)
 
 
-def test_a_switch_follows_its_control_through_a_touch() -> None:
-    """The control rests on the threshold exactly, and leaves it to either side."""
+def test_a_switch_is_correct_when_its_control_rests_on_the_threshold() -> None:
+    """The control signal stays exactly on the threshold, and leaves it to both sides."""
     builder = DiagramBuilder("touch")
     control = builder.add(
         "control",
@@ -377,8 +381,8 @@ def test_a_switch_follows_its_control_through_a_touch() -> None:
     np.testing.assert_array_equal(result["switch/y"][sure], np.where(u > 0.0, 1.0, 2.0)[sure])
 
 
-def test_nothing_with_a_memory_acts_on_a_signal_that_is_not_consistent_yet() -> None:
-    """A square wave behind a limiter is never positive: no relay, edge, count, reset or trigger sees more."""
+def test_blocks_with_memory_do_not_react_to_inconsistent_signals() -> None:
+    """A limited square wave is never positive: relay, counter, reset and trigger must not react."""
     builder = DiagramBuilder("memory")
     square = builder.add("square", SignalGenerator(waveform="square", amplitude=0.5, frequency=0.5))
     cut = builder.add("cut", Saturation(lower=-0.5, upper=0.0), square)
@@ -398,8 +402,8 @@ def test_nothing_with_a_memory_acts_on_a_signal_that_is_not_consistent_yet() -> 
     np.testing.assert_array_equal(result["triggered/y"], -1.0)
 
 
-def test_what_a_hysteresis_gives_on_the_way_to_its_value_is_not_remembered() -> None:
-    """Behind a jump, a relay, a rate limiter, a play and friction take several turns to find their values."""
+def test_intermediate_outputs_of_hysteresis_blocks_are_not_stored() -> None:
+    """After a jump, relay, rate limiter, backlash and friction need several mode iterations."""
     builder = DiagramBuilder("turns")
     jump = builder.add("jump", Step(time=1.0))
     relay = builder.add("relay", Relay(), jump)
@@ -429,8 +433,8 @@ def test_what_a_hysteresis_gives_on_the_way_to_its_value_is_not_remembered() -> 
         np.testing.assert_array_equal(result[f"{name} remembered/y"], 0.5)
 
 
-def test_a_relay_that_resets_what_it_watches_stays_on() -> None:
-    """At one instant the integral reaches 1, the relay switches on and resets the integral, and stays on."""
+def test_a_relay_that_resets_its_own_input_stays_on() -> None:
+    """At the same time the integral reaches 1, the relay switches on and resets the integral; it stays on."""
     builder = DiagramBuilder("reset")
     integral = builder.add("integral", ResettableIntegrator(external_reset="rising"))
     relay = builder.add("relay", Relay(on_point=1.0, off_point=-1.0), integral)
@@ -443,10 +447,10 @@ def test_a_relay_that_resets_what_it_watches_stays_on() -> None:
 
 @pytest.mark.parametrize("frequency", [4.0, 1.7, 0.9])
 @pytest.mark.parametrize("settings", [{}, {"solver": "rodas5p"}, {"solver": "rk4", "step": 0.3}], ids=str)
-def test_an_edge_after_an_unwanted_one_in_the_same_step_is_seen(
+def test_a_rising_edge_after_a_falling_one_in_the_same_step_is_detected(
     frequency: float, settings: Mapping[str, object]
 ) -> None:
-    """A sawtooth falls through 0 within a step, and rises through 0 where it jumps at the end of the step."""
+    """A sawtooth falls through 0 within a step, and rises through 0 at its jump at the end of the step."""
     builder = DiagramBuilder("saw")
     saw = builder.add("saw", SignalGenerator(waveform="sawtooth", frequency=frequency))
     total = builder.add("total", ResettableIntegrator(), builder.add("one", Constant()), saw)
@@ -457,8 +461,8 @@ def test_an_edge_after_an_unwanted_one_in_the_same_step_is_seen(
     np.testing.assert_allclose(result["total/y"][apart], since[apart], atol=1e-9)
 
 
-def test_a_touch_at_a_corner_is_sampled_as_it_is_at_the_tick() -> None:
-    """At 0.25 s and 1 s later the course touches 1 at a corner, and a tick samples the comparison there."""
+def test_a_comparison_at_a_corner_of_its_input_is_sampled_correctly() -> None:
+    """At 0.25 s and 1.25 s the input touches 1 at a corner, where a tick samples the comparison."""
     builder = DiagramBuilder("touch")
     course = builder.add(
         "course", RepeatingSequence(times=(0.0, 0.25, 0.5, 1.0), values=(-1.0, 1.0, 0.5, -1.0))
@@ -471,8 +475,8 @@ def test_a_touch_at_a_corner_is_sampled_as_it_is_at_the_tick() -> None:
     np.testing.assert_array_equal(result["held/y"], 1.0)
 
 
-def test_an_event_next_to_the_start_leaves_a_delay_its_history() -> None:
-    """The speed of the ball leaves 0 right after the start, which is an event of the absolute value."""
+def test_an_event_just_after_the_start_does_not_affect_the_history_of_a_delay() -> None:
+    """The speed of the ball leaves 0 just after the start, which is an event of the absolute value."""
     builder = DiagramBuilder("delayed ball")
     gravity = builder.add("gravity", Step(time=0.0, final=-9.81))
     block = SecondOrderIntegratorLimited(initial=0.3, lower=0.0, reinitialize=True)

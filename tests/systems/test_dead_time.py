@@ -1,4 +1,4 @@
-"""Dead time against the method of steps, closed forms and SciPy, by fixed and adaptive steps."""
+"""Dead time compared with the method of steps, closed forms and SciPy, for fixed and adaptive steps."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def close(found: np.ndarray, expected: np.ndarray, tolerance: float) -> None:
 
 
 def decay(delay: float = 1.0) -> Diagram:
-    """x' = -x(t - delay), x = 1 up to 0."""
+    """x' = -x(t - delay) with x = 1 for t <= 0."""
     builder = DiagramBuilder("d")
     x = builder.add("x", Integrator(initial=1.0))
     late = builder.add("late", TransportDelay(delay=delay, initial=1.0), x)
@@ -81,7 +81,7 @@ def decay(delay: float = 1.0) -> Diagram:
 
 
 def decayed(t: float) -> float:
-    """The method of steps: (-1)^k (t - (k - 1))^k / k! over all k whose step has begun; in fractions."""
+    """The method of steps in fractions: the sum of (-1)^k (t - (k - 1))^k / k! over all k with t >= k - 1."""
     time, total, k = Fraction(t), Fraction(1), 1
     while time >= k - 1:
         total += (-1) ** k * (time - (k - 1)) ** k / math.factorial(k)
@@ -89,15 +89,15 @@ def decayed(t: float) -> float:
     return float(total)
 
 
-def test_a_delayed_decay_follows_the_method_of_steps(run: Run) -> None:
+def test_a_delayed_decay_agrees_with_the_method_of_steps(run: Run) -> None:
     result = run(decay(), 10.0)
     expected = np.array([decayed(t) for t in result.time])
     close(result["x/y"], expected, 5e-9)
     close(result["late/y"], np.array([decayed(t - 1.0) if t > 1.0 else 1.0 for t in result.time]), 5e-9)
 
 
-def test_the_past_is_as_exact_as_the_run() -> None:
-    """Tighter tolerances give smaller errors, in proportion, however long the steps."""
+def test_the_error_of_the_history_is_proportional_to_the_tolerance() -> None:
+    """Tighter tolerances give proportionally smaller errors for any length of the steps."""
     errors = []
     for rtol in (1e-4, 1e-6, 1e-8, 1e-10):
         result = native(solver="rk45", rtol=rtol, atol=rtol * 1e-3)(decay(), 10.0)
@@ -107,7 +107,7 @@ def test_the_past_is_as_exact_as_the_run() -> None:
     assert all(later < 0.1 * sooner for sooner, later in pairwise(errors))
 
 
-def test_a_step_comes_out_exactly_one_delay_later(run: Run) -> None:
+def test_the_output_of_a_delayed_step_jumps_exactly_one_delay_later(run: Run) -> None:
     builder = DiagramBuilder("d")
     late = builder.add(
         "late", TransportDelay(delay=0.7, initial=-1.0), builder.add("step", Step(time=0.5, final=2.0))
@@ -119,7 +119,7 @@ def test_a_step_comes_out_exactly_one_delay_later(run: Run) -> None:
     assert result["late/y"].tolist() == np.select([t < 0.7, t < 1.2 - 1e-12], [-1.0, 0.0], 2.0).tolist()
 
 
-def test_a_sine_comes_out_late(run: Run) -> None:
+def test_a_sine_is_delayed(run: Run) -> None:
     builder = DiagramBuilder("d")
     sines = builder.add("sines", SineWave(frequency=2.0, amplitude=(1.0, 3.0), phase=(0.0, 1.0)))
     builder.add("late", TransportDelay(delay=0.35, initial=(5.0, 6.0)), sines)
@@ -137,11 +137,11 @@ BENT: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "sqrt(max(1.3 - u, 0))": lambda t: np.sqrt(np.maximum(1.3 - t, 0.0)),
     "sin(40*u)": lambda t: np.sin(40.0 * t),
 }
-"""Signals that no state follows, with slopes that are infinite, nearly so, or change within a step."""
+"""Signals without states whose derivatives are infinite, very large, or vary within a step."""
 
 
-def test_a_delayed_signal_is_not_extrapolated_to_before_a_bend(run: Run) -> None:
-    """What leaves its dead zone right after the start has a bend there, and never is below zero."""
+def test_a_delayed_signal_is_not_extrapolated_beyond_a_kink(run: Run) -> None:
+    """A signal that leaves its dead zone just after the start has a kink there and is never negative."""
     builder = DiagramBuilder("d")
     place = builder.add("place", SecondOrderIntegrator(), builder.add("push", Constant()))
     free = builder.add("free", DeadZone(end=0.0), place["x"])
@@ -154,7 +154,7 @@ def test_a_delayed_signal_is_not_extrapolated_to_before_a_bend(run: Run) -> None
 @pytest.mark.parametrize(
     "settings", [{}, {"rtol": 1e-9, "atol": 1e-12}, {"solver": "rk4", "step": 0.1}], ids=str
 )
-def test_the_past_of_a_signal_is_exact_however_it_bends(
+def test_the_history_of_a_signal_with_large_curvature_is_accurate(
     formula: str, settings: dict[str, object], tmp_path: Path
 ) -> None:
     builder = DiagramBuilder("d")
@@ -168,7 +168,7 @@ def test_the_past_of_a_signal_is_exact_however_it_bends(
     assert RunState.load(tmp_path / "state").past.tolist() == result.final_state.past.tolist()
 
 
-def test_the_derivative_of_what_is_late_is_the_late_derivative(run: Run) -> None:
+def test_the_derivative_of_a_delayed_signal_is_the_delayed_derivative(run: Run) -> None:
     builder = DiagramBuilder("d")
     late = builder.add("late", TransportDelay(delay=0.5), builder.add("sine", SineWave(frequency=2.0)))
     later = builder.add("later", TransportDelay(delay=0.25), late)
@@ -177,8 +177,8 @@ def test_the_derivative_of_what_is_late_is_the_late_derivative(run: Run) -> None
     close(result["integral/y"], np.where(result.time < 0.75, 0.0, np.sin(2.0 * (result.time - 0.75))), 1e-7)
 
 
-def test_pulses_and_ticks_come_out_late(run: Run) -> None:
-    """Jumps at events and at ticks arrive as jumps: the integrals are exact."""
+def test_pulses_and_sampled_signals_are_delayed(run: Run) -> None:
+    """Jumps at events and ticks are delayed as jumps: the integrals are exact."""
     builder = DiagramBuilder("d")
     pulses = builder.add("late", TransportDelay(delay=0.3), builder.add("pulses", PulseGenerator(period=1.0)))
     builder.add("integral", Integrator(), pulses)
@@ -193,9 +193,9 @@ def test_pulses_and_ticks_come_out_late(run: Run) -> None:
 
 
 def test_a_loop_with_dead_time(run: Run) -> None:
-    """A plant under an integral controller with dead time, at the border of its stability.
+    """A loop of an integral controller and dead time, at the limit of its stability.
 
-    y' = K (1 - y(t - 1)): the border is K = pi / 2, where it swings as cos(pi t / 2) for ever.
+    y' = K (1 - y(t - 1)): the limit is K = pi / 2, with the undamped oscillation cos(pi t / 2).
     """
     builder = DiagramBuilder("d")
     error = builder.add("error", Sum(signs="+-"), builder.add("one", Constant(value=1.0)))
@@ -210,8 +210,8 @@ def test_a_loop_with_dead_time(run: Run) -> None:
     assert np.hypot(*fit) > 0.5
 
 
-def test_a_thermostat_with_dead_time_overshoots_by_what_it_sees_too_late(run: Run) -> None:
-    """x' = 1 - 2 m, seen 0.2 s late, relay at +-0.5: a triangle between +-0.7, of period 4 (0.5 + 0.2)."""
+def test_a_thermostat_with_dead_time_overshoots_by_the_delayed_change(run: Run) -> None:
+    """x' = 1 - 2 m, measured 0.2 s late, relay at +-0.5: a triangle between +-0.7 of period 4 (0.5 + 0.2)."""
     builder = DiagramBuilder("d")
     x = builder.add("x", Integrator())
     late = builder.add("late", TransportDelay(delay=0.2), x)
@@ -222,8 +222,8 @@ def test_a_thermostat_with_dead_time_overshoots_by_what_it_sees_too_late(run: Ru
     close(result["x/y"], triangle, 1e-9)
 
 
-def test_a_delay_that_grows(run: Run) -> None:
-    """d = 0.1 + t / 2 gives u((t - 0.2) / 2), once there is a past."""
+def test_a_growing_delay(run: Run) -> None:
+    """d = 0.1 + t / 2 gives u((t - 0.2) / 2) after 0.2 s."""
     builder = DiagramBuilder("d")
     d = builder.add("d", Ramp(slope=0.5, initial=0.1))
     late = builder.add(
@@ -236,24 +236,24 @@ def test_a_delay_that_grows(run: Run) -> None:
     close(result["late/y"], expected, 1e-7)
 
 
-def test_a_pipe_in_which_the_flow_slows_down(run: Run) -> None:
-    """T(t) = 1 + t / 2: the integral of 1/T over the stay is 1: 1 + (t - d) / 2 = (1 + t / 2) exp(-1/2)."""
+def test_the_transport_delay_of_a_pipe_with_decreasing_flow(run: Run) -> None:
+    """T(t) = 1 + t / 2; the integral of 1/T over d is 1: 1 + (t - d) / 2 = (1 + t / 2) exp(-1/2)."""
     builder = DiagramBuilder("d")
     T = builder.add("T", Ramp(slope=0.5, initial=1.0))
     pipe = builder.add("pipe", VariableTransportDelay(), builder.add("sine", SineWave()), T)
     builder.add("integral", Integrator(), pipe["y"])
     result = run(builder.build(), 6.0)
     entered = 2.0 * ((1.0 + result.time / 2.0) * math.exp(-0.5) - 1.0)
-    # before: 1/T was 1 up to 0, so -e + 2 log(1 + t / 2) = 1
+    # entry e before 0, where 1/T is 1: -e + 2 log(1 + t / 2) = 1
     before = 2.0 * np.log1p(result.time / 2.0) - 1.0
     entered = np.where(entered > 0.0, entered, before)
-    # the kink of T at 0 comes out unannounced: RK4 steps over it
+    # the delayed kink of T at 0 is not an event: RK4 steps across it
     close(result["pipe/delay"], result.time - entered, 1e-6)
     close(result["pipe/y"], np.where(entered < 0.0, 0.0, np.sin(entered)), 1e-6)
 
 
 @pytest.mark.parametrize("start", (0.0, -1.0))
-def test_a_transit_time_that_is_not_above_0_ends_the_run(start: float) -> None:
+def test_a_transit_time_that_is_not_positive_ends_the_run(start: float) -> None:
     builder = DiagramBuilder("d")
     T = builder.add("T", Ramp(slope=0.5, initial=start))
     builder.add("pipe", VariableTransportDelay(), builder.add("sine", SineWave()), T)
@@ -261,11 +261,11 @@ def test_a_transit_time_that_is_not_above_0_ends_the_run(start: float) -> None:
         native()(builder.build(), 1.0)
 
 
-def test_a_long_run_forgets_what_is_out_of_reach() -> None:
+def test_a_long_run_discards_history_older_than_the_delay() -> None:
     result = native(solver="rk4", step=0.01)(decay(0.5), 200.0)
     assert result.final_state is not None
-    assert result.final_state.past.size < FIRST_ROOM * 4  # numbers of a row; 20 000 steps make 40 000 rows
-    # it fades with the real part of the root of s + exp(-s / 2) = 0
+    assert result.final_state.past.size < FIRST_ROOM * 4  # numbers per row; 20 000 steps add 40 000 rows
+    # it decays with the real part of the root of s + exp(-s / 2) = 0
     s = complex(-1.0, 1.0)
     for _ in range(50):
         s -= (s + np.exp(-s / 2)) / (1 - np.exp(-s / 2) / 2)
@@ -273,8 +273,8 @@ def test_a_long_run_forgets_what_is_out_of_reach() -> None:
     assert math.log(later / early) / 10.0 == pytest.approx(s.real, abs=0.05)
 
 
-def test_a_run_goes_on_with_its_past(tmp_path: Path) -> None:
-    """To the bit with the same settings, also through a file; with others from the values and the past."""
+def test_a_continued_run_uses_the_saved_history(tmp_path: Path) -> None:
+    """With equal settings the bits are equal; other settings restart from values and history."""
     for settings in ({"solver": "rk45", "rtol": 1e-8, "atol": 1e-10}, {"solver": "rk4", "step": 0.05}):
         run = native(**settings)
         whole = run(decay(), 8.0, sample_time=0.1)
@@ -293,7 +293,7 @@ def test_a_run_goes_on_with_its_past(tmp_path: Path) -> None:
         close(anew["x/y"][anew.time > 3.75], whole["x/y"][after], 1e-6)
 
 
-def test_a_tuned_delay_is_obeyed_without_compiling() -> None:
+def test_a_changed_delay_takes_effect_without_compilation() -> None:
     compiled = compile_system(trace_diagram(decay()))
     options = SimulationOptions(stop_time=3.0, sample_time=0.1, rtol=1e-9, atol=1e-12)
     tuned = simulate(compiled, options, {"late.delay": 0.5})
@@ -301,8 +301,8 @@ def test_a_tuned_delay_is_obeyed_without_compiling() -> None:
     assert tuned["x/y"] == pytest.approx(fresh["x/y"], abs=1e-12)
 
 
-def test_delays_break_algebraic_loops_and_see_events(run: Run) -> None:
-    """y = 1 - y(t - 1) / 2 has no integrator at all: 1, 1/2, 3/4, 5/8 …"""
+def test_delays_break_algebraic_loops_and_delay_jumps(run: Run) -> None:
+    """y = 1 - y(t - 1) / 2, a loop without integrators: 1, 1/2, 3/4, 5/8 …"""
     builder = DiagramBuilder("d")
     y = builder.add("y", Sum(signs="+-"), builder.add("one", Constant(value=1.0)))
     half = builder.add("half", Gain(gain=0.5), builder.add("late", TransportDelay(delay=1.0), y))
@@ -317,7 +317,7 @@ def test_delays_break_algebraic_loops_and_see_events(run: Run) -> None:
     close(result["time/y"], np.cumsum(np.r_[0.0, level[:-1]]) * 0.025, 1e-9)
 
 
-def test_what_cannot_be_delayed_is_refused() -> None:
+def test_unsupported_derivatives_and_delay_times_are_refused() -> None:
     builder = DiagramBuilder("d")
     builder.add(
         "twice",

@@ -1,4 +1,4 @@
-"""Electric drives against matrix exponentials, by fixed and adaptive steps."""
+"""Electric drives compared with matrix exponentials, for fixed and adaptive steps."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ def solver(request: pytest.FixtureRequest) -> str:
 
 
 def affine(A: np.ndarray, b: np.ndarray, x0: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """x' = A x + b from x0, at the instants t."""
+    """Solve x' = A x + b from x0 at the times t."""
     n = len(x0)
     both = np.zeros((n + 1, n + 1))
     both[:n, :n], both[:n, n] = A, b
     return np.array([(expm(both * instant) @ [*x0, 1.0])[:n] for instant in t])
 
 
-def test_a_motor_under_voltage_and_load(solver: str) -> None:
+def test_a_motor_with_voltage_and_load(solver: str) -> None:
     motor = DcMotor(
         R=2.0, L=0.1, k=0.3, J=0.02, b=0.01, initial_current=0.5, initial_speed=-2.0, initial_angle=1.0
     )
@@ -34,15 +34,15 @@ def test_a_motor_under_voltage_and_load(solver: str) -> None:
     found = run(builder.build(), 2.0, solver=solver)
     A = np.array([[-20.0, -3.0, 0.0], [15.0, -0.5, 0.0], [0.0, 1.0, 0.0]])
     exact = affine(A, np.array([120.0, -10.0, 0.0]), np.array([0.5, -2.0, 1.0]), found.time)
-    # fixed steps are the samples of 20 ms, with a time constant of 60 ms
+    # fixed steps equal the sample time, 20 ms; the time constant is 60 ms
     tolerance = 1e-7 if solver == "rk45" else 2e-3
     for column, port in enumerate(("i", "w", "angle")):
         np.testing.assert_allclose(found[f"motor/{port}"], exact[:, column], rtol=0, atol=tolerance)
     np.testing.assert_array_equal(found["motor/torque"], 0.3 * found["motor/i"])
 
 
-def test_the_power_of_windings_goes_into_heat_field_and_shaft(solver: str) -> None:
-    """v i = R i^2 + (L i^2 / 2)' + tau w: at rest of the current the first and last remain."""
+def test_the_electric_power_of_windings_equals_losses_and_mechanical_power(solver: str) -> None:
+    """v i = R i^2 + (L i^2 / 2)' + tau w: in steady state the middle term is zero."""
     R, L, k, G = np.array([1.0, 2.0]), np.array([0.1, 0.05]), np.array([0.2, 0.1]), np.array([-60.0, 100.0])
     builder = DiagramBuilder("d")
     v, w = builder.add("v", Constant(value=(24.0, 10.0))), builder.add("w", Constant(value=(-0.5, 0.7)))

@@ -1,4 +1,4 @@
-"""Runs that blocks end or complain about: exactly where, and with which words."""
+"""Runs that blocks end, and assertions: time and message."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def run(diagram: Diagram, solver: str, step: float | None) -> SimulationResult:
 
 
 def watched(block: Block, relation: str = ">", level: float = 0.5) -> Diagram:
-    """x = 1 - cos t, and a block that watches how it compares with a level."""
+    """x = 1 - cos t, with a block that monitors a comparison of x with a level."""
     builder = DiagramBuilder("d")
     x = builder.add("x", Integrator(), builder.add("sine", SineWave()))
     builder.add("watch", block, builder.add("is", CompareToConstant(relation=relation, constant=level), x))
@@ -43,7 +43,7 @@ def watched(block: Block, relation: str = ">", level: float = 0.5) -> Diagram:
 
 
 @pytest.mark.parametrize(("solver", "step"), SOLVERS)
-def test_a_run_ends_exactly_where_its_condition_is_met(solver: str, step: float | None) -> None:
+def test_a_run_ends_exactly_when_its_condition_becomes_true(solver: str, step: float | None) -> None:
     result = run(watched(StopSimulation()), solver, step)
     end = math.acos(0.5)
     assert result.time[-1] == pytest.approx(end, abs=1e-9)
@@ -54,13 +54,13 @@ def test_a_run_ends_exactly_where_its_condition_is_met(solver: str, step: float 
     assert result.run.message.startswith("stopped by block 'watch' at 1.0471975")
 
 
-def test_a_run_ends_at_once_where_the_condition_holds_from_the_start() -> None:
+def test_a_run_ends_at_the_start_if_the_condition_is_true() -> None:
     result = run(watched(StopSimulation(), "<"), "rk45", None)
     assert result.time.tolist() == [0.0]
     assert result.run.message == "stopped by block 'watch' at 0 s"
 
 
-def test_a_run_that_is_sampled_or_jumps_ends_at_the_tick_or_the_jump() -> None:
+def test_a_run_with_a_sampled_or_jumping_condition_ends_at_the_tick_or_jump() -> None:
     builder = DiagramBuilder("d")
     step = builder.add("step", Step(time=1.23))
     held = builder.add("held", ZeroOrderHold(sample_time=0.25), step)
@@ -77,7 +77,7 @@ def test_a_run_that_is_sampled_or_jumps_ends_at_the_tick_or_the_jump() -> None:
 
 
 @pytest.mark.parametrize(("solver", "step"), SOLVERS)
-def test_a_broken_assertion_fails_the_run_and_keeps_what_was_good(solver: str, step: float | None) -> None:
+def test_a_violated_assertion_fails_the_run_and_keeps_the_samples(solver: str, step: float | None) -> None:
     with pytest.raises(SimulationError, match=r"assertion 'watch' does not hold at 1\.0471975") as raised:
         run(watched(Assertion(), "<="), solver, step)
     partial = raised.value.partial
@@ -88,7 +88,7 @@ def test_a_broken_assertion_fails_the_run_and_keeps_what_was_good(solver: str, s
 
 
 @pytest.mark.parametrize(("solver", "step"), SOLVERS)
-def test_a_broken_assertion_may_only_warn(solver: str, step: float | None) -> None:
+def test_a_violated_assertion_may_only_warn(solver: str, step: float | None) -> None:
     result = run(watched(Assertion(action="warn"), "<="), solver, step)
     assert result.time[-1] == 10.0
     assert result.run.complete
@@ -100,8 +100,8 @@ def test_a_broken_assertion_may_only_warn(solver: str, step: float | None) -> No
     assert result.run.message == "assertion 'watch' did not hold, from the start on"
 
 
-def test_events_at_one_instant_happen_in_one_order() -> None:
-    """Two switches of one signal change together: no recorded instant shows one without the other."""
+def test_simultaneous_events_are_processed_together() -> None:
+    """Two comparisons of one signal change together: no sample has only one of the changes."""
     builder = DiagramBuilder("d")
     sine = builder.add("sine", SineWave())
     one = builder.add("one", CompareToConstant(relation=">", constant=0.5), sine)
@@ -110,4 +110,5 @@ def test_events_at_one_instant_happen_in_one_order() -> None:
     builder.add("keeps the steps", Integrator(), sine)
     result = run(builder.build(), "rk45", None)
     assert result["one/y"].tolist() == result["two/y"].tolist() == result["three/y"].tolist()
-    assert result.run.events == 2 * 4  # the third changes with the answer of the first
+    # the third comparison has no events, because its input changes only at events
+    assert result.run.events == 2 * 4

@@ -1,4 +1,4 @@
-"""Guards that are zero at the start of a step: masses that leave their rest, and a throw from the ground."""
+"""Guards that are zero at the start of a step: masses that start from rest, and a throw from the ground."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from armblocks.diagram import Block
 
 
 def masses(random: np.random.Generator) -> ab.Diagram:
-    """Nine of them; a block that switches watches each one's speed, which leaves zero before the position."""
+    """Nine masses; each speed, which leaves zero before the position, is the input of a switching block."""
     builder = ab.DiagramBuilder("masses")
     kinds = (CoulombFriction(), Sign(), CompareToZero(relation=">"), Relay(), HitCrossing())
     for k in range(9):
@@ -55,7 +55,7 @@ def masses(random: np.random.Generator) -> ab.Diagram:
     ],
     ids=lambda settings: str(settings["solver"]),
 )
-def test_a_mass_that_leaves_its_rest_does_not_pass_it(settings: dict[str, float]) -> None:
+def test_a_mass_that_starts_from_rest_causes_no_false_zero_crossing(settings: dict[str, float]) -> None:
     for seed in range(3):
         result = ab.simulate(
             masses(np.random.default_rng(seed)), stop_time=3.0, sample_time=0.01, rtol=1e-8, **settings
@@ -68,7 +68,7 @@ def test_a_mass_that_leaves_its_rest_does_not_pass_it(settings: dict[str, float]
 
 @pytest.mark.parametrize("solver", ["rk3", "rk4", "ros5", "heun"])
 @pytest.mark.parametrize("step", [0.3, 0.5, 0.7, 1.0, 1.5])
-def test_a_throw_comes_back_to_the_ground_within_a_step_or_at_its_end(solver: str, step: float) -> None:
+def test_a_thrown_body_returns_to_the_ground_within_a_step_or_at_its_end(solver: str, step: float) -> None:
     builder = ab.DiagramBuilder("throw")
     speed = builder.add("speed", Integrator(initial=5.0), builder.add("weight", Constant(value=-10.0)))
     height = builder.add("height", Integrator(), speed)

@@ -1,4 +1,4 @@
-"""Sampled, switching and implicit diagrams against closed forms, by fixed and adaptive steps alike."""
+"""Sampled, switching and implicit diagrams compared with closed forms, for fixed and adaptive steps."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def run(request: pytest.FixtureRequest) -> Run:
 
 
 def fed(block: Block, source: Block, *, name: str = "block") -> Diagram:
-    """A block behind a source, with the integral of its output, which tells when it switched."""
+    """A source, a block, and the integral of its output, which depends on the switching times."""
     builder = DiagramBuilder("d")
     out = builder.add(name, block, builder.add("source", source))
     builder.add("integral", Integrator(), out)
@@ -73,15 +73,15 @@ def fed(block: Block, source: Block, *, name: str = "block") -> Diagram:
 
 
 def close(found: np.ndarray, expected: np.ndarray, tolerance: float = 5e-9) -> None:
-    # rtol 1e-10 over a few hundred steps; RK4 of 0.01 on sines: h^4/120 = 1e-10
+    # rtol 1e-10 over a few hundred steps; RK4 with h = 0.01 s on sines: h^4/120 = 1e-10
     assert found == pytest.approx(expected, abs=tolerance)
 
 
-# -- sampled parts -----------------------------------------------------------------------------------------
+# -- sampled blocks -----------------------------------------------------------------------------------------
 
 
 def test_a_sampled_loop_around_an_integrator(run: Run) -> None:
-    """x' = -k x(jT): x((j+1)T) = (1 - kT) x(jT), a straight line in between."""
+    """x' = -k x(jT): x((j+1)T) = (1 - kT) x(jT), and x is linear between the ticks."""
     builder = DiagramBuilder("d")
     x = builder.add("x", Integrator(initial=1.0))
     hold = builder.add("hold", ZeroOrderHold(sample_time=0.25), x)
@@ -94,7 +94,7 @@ def test_a_sampled_loop_around_an_integrator(run: Run) -> None:
 
 
 def test_a_held_exponential(run: Run) -> None:
-    """The hold of x' = -x gives exp(-jT) at exactly jT, also where jT is no sum of steps."""
+    """The hold of x' = -x gives exp(-jT) exactly at jT, also where jT is not a multiple of the step."""
     builder = DiagramBuilder("d")
     x = builder.add("x", Integrator(initial=1.0))
     builder.connect(builder.add("k", Gain(gain=-1.0), x), x)
@@ -105,7 +105,7 @@ def test_a_held_exponential(run: Run) -> None:
 
 
 def test_two_rates_and_a_delay(run: Run) -> None:
-    """A slow clock sees the fast one's value of the same instant; the delay the one before."""
+    """A slow block samples the fast one at a common tick; the delay outputs the previous value."""
     builder = DiagramBuilder("d")
     t = builder.add("t", Clock())
     fast = builder.add("fast", ZeroOrderHold(sample_time=0.2), t)
@@ -136,7 +136,7 @@ def test_a_limiter_between_sampled_blocks_limits_at_the_tick(run: Run) -> None:
 
 
 def test_saturation_and_dead_zone_of_a_sine(run: Run) -> None:
-    """The integral shows that the kinks are met: they lie at sin t = 1/2."""
+    """The integral is exact only if steps end at the kinks, at sin t = 1/2."""
     t = np.linspace(0.0, 3.0, SAMPLES + 1)
     edge = np.pi / 6
     rise, fall = np.minimum(t, edge), np.maximum(t - (np.pi - edge), 0.0)
@@ -150,14 +150,14 @@ def test_saturation_and_dead_zone_of_a_sine(run: Run) -> None:
     close(found["integral/y"], 1 - np.cos(t) - limited)
 
 
-def test_a_limiter_may_begin_beyond_its_limit_and_be_passed_in_one_jump(run: Run) -> None:
+def test_a_limiter_starts_above_its_limit_and_jumps_to_the_other_limit(run: Run) -> None:
     found = run(fed(Saturation(), Step(time=1.0, initial=3.0, final=-2.0)), 2.0)
     assert found["block/y"].tolist() == [0.5] * 50 + [-0.5] * 51
     close(found["integral/y"][-1:], np.zeros(1), 1e-14)
 
 
 def test_a_relay_with_hysteresis(run: Run) -> None:
-    """On from sin t = 0.5 upwards at pi/6, off at sin t = -0.5 downwards at 7 pi/6."""
+    """The relay is on from pi/6 (sin t = 0.5, rising) to 7 pi/6 (sin t = -0.5, falling)."""
     found = run(fed(Relay(on_value=2.0, off_value=-1.0), SineWave()), 6.0)
     t = found["t"]
     on = (t >= np.pi / 6) & (t < 7 * np.pi / 6)
@@ -165,8 +165,8 @@ def test_a_relay_with_hysteresis(run: Run) -> None:
     close(found["integral/y"], -t + 3 * np.clip(t - np.pi / 6, 0.0, np.pi))
 
 
-def test_a_thermostat_cycles_with_its_exact_period(run: Run) -> None:
-    """T' = -1 below and 1 above the relay's points: a triangle between -1 and 1 of period 4."""
+def test_a_thermostat_oscillates_with_the_exact_period(run: Run) -> None:
+    """T' = 1 until the relay switches on at 1, then -1 until -1: a triangle of period 4."""
     builder = DiagramBuilder("d")
     x = builder.add("x", Integrator())
     relay = builder.add("relay", Relay(on_point=1.0, off_point=-1.0, on_value=-1.0, off_value=1.0), x)
@@ -182,11 +182,11 @@ def test_a_quantizer(run: Run) -> None:
     assert found["block/y"] == pytest.approx(0.4 * np.floor(np.sin(t) / 0.4 + 0.5), abs=1e-15)
     edges = np.arcsin([0.2, 0.6])
     levels = 0.4 * sum(np.clip(t - edge, 0, np.pi - 2 * edge) for edge in edges)
-    # the step down is 1e-9 of the interval late
+    # the step down is late by 1e-9 of the interval
     close(found["integral/y"], levels, 2e-9)
 
 
-def test_coulomb_friction_of_a_speed_that_turns(run: Run) -> None:
+def test_coulomb_friction_of_a_speed_that_changes_its_sign(run: Run) -> None:
     found = run(fed(CoulombFriction(offset=2.0, gain=3.0), SineWave(frequency=2.0)), 3.0)
     t, u = found["t"], np.sin(2.0 * found["t"])
     assert found["block/y"][0] == 0.0
@@ -195,8 +195,8 @@ def test_coulomb_friction_of_a_speed_that_turns(run: Run) -> None:
     close(found["integral/y"], moved)
 
 
-def test_backlash_follows_and_rests(run: Run) -> None:
-    """u = sin t, play 0.5: y leaves 0 at sin t = 0.25, rests at 0.75 from pi/2 on until sin t = 0.5."""
+def test_the_output_of_a_backlash_follows_and_rests(run: Run) -> None:
+    """u = sin t, width 0.5: y leaves 0 at sin t = 0.25, and stays 0.75 from pi/2 until sin t = 0.5."""
     found = run(fed(Backlash(width=0.5), SineWave()), 6.0)
     t, u = found["t"], np.sin(found["t"])
     expected = np.where(t < np.pi / 2, np.maximum(u - 0.25, 0.0), np.minimum(u + 0.25, 0.75))
@@ -204,7 +204,7 @@ def test_backlash_follows_and_rests(run: Run) -> None:
     close(found["block/y"], expected)
 
 
-def test_a_switch_on_the_time(run: Run) -> None:
+def test_a_switch_controlled_by_the_time(run: Run) -> None:
     builder = DiagramBuilder("d")
     t, one = builder.add("t", Clock()), builder.add("one", Constant(value=5.0))
     switch = builder.add("switch", Switch(threshold=0.7), one, t, t)
@@ -216,7 +216,7 @@ def test_a_switch_on_the_time(run: Run) -> None:
     )
 
 
-def test_pulses(run: Run) -> None:
+def test_a_pulse_generator(run: Run) -> None:
     builder = DiagramBuilder("d")
     pulses = builder.add("pulses", PulseGenerator(amplitude=3.0, period=0.5, width=50.0, delay=0.125))
     builder.add("integral", Integrator(), pulses)
@@ -229,8 +229,8 @@ def test_pulses(run: Run) -> None:
     close(found["integral/y"], area, 1e-11)
 
 
-def test_a_limited_integrator_stays_and_leaves_at_once(run: Run) -> None:
-    """x' = 2 cos t, |x| <= 1: at 1 from pi/6 until cos t < 0 at pi/2, then 2 sin t - 1."""
+def test_a_limited_integrator_stays_at_its_limit_and_leaves_it_without_delay(run: Run) -> None:
+    """x' = 2 cos t, |x| <= 1: x is 1 from pi/6 until cos t < 0 at pi/2, then 2 sin t - 1."""
     builder = DiagramBuilder("d")
     rate = builder.add("rate", SineWave(amplitude=2.0, phase=np.pi / 2))
     builder.add("x", IntegratorLimited(), rate)
@@ -242,7 +242,7 @@ def test_a_limited_integrator_stays_and_leaves_at_once(run: Run) -> None:
 
 
 def test_an_integrator_reset_by_pulses(run: Run) -> None:
-    """It rises by 1 a second; each rising edge (0.5, 1, …) or falling one (0.25, 0.75, …) sets it anew."""
+    """The integral of 1 is reset at rising edges (0.5 s, 1 s, …) or falling edges (0.25 s, 0.75 s, …)."""
     builder = DiagramBuilder("d")
     pulses = builder.add("pulses", PulseGenerator(period=0.5, width=50.0))
     one = builder.add("one", Constant())
@@ -269,7 +269,7 @@ def ball(builder: DiagramBuilder, restitution: float, height: float) -> BlockHan
     return position
 
 
-def test_a_bouncing_ball_hits_the_ground_at_the_published_times(run: Run) -> None:
+def test_a_bouncing_ball_reaches_the_ground_at_the_published_times(run: Run) -> None:
     """h0 = 1, e = 0.7: impacts at 0.451523640985731, 1.08365673836575, 1.52614990653177 (FMI reference)."""
     builder = DiagramBuilder("d")
     ball(builder, 0.7, 1.0)
@@ -283,8 +283,8 @@ def test_a_bouncing_ball_hits_the_ground_at_the_published_times(run: Run) -> Non
     close(found["height/y"], height, 1e-9)
 
 
-def test_a_sliding_mass_comes_to_true_rest(run: Run) -> None:
-    """v0 = 3 against 2 N on 1 kg: it stops after 1.5 s and 2.25 m, with exactly no speed."""
+def test_a_sliding_mass_comes_to_rest_exactly(run: Run) -> None:
+    """v0 = 3 m/s with 2 N on 1 kg: the mass stops after 1.5 s and 2.25 m with a speed of exactly 0."""
     builder = DiagramBuilder("d")
     force = builder.add("force", Constant(value=0.0))
     builder.add("mass", StickSlipFriction(coulomb=2.0, static=2.5, initial_speed=3.0), force)
@@ -295,8 +295,8 @@ def test_a_sliding_mass_comes_to_true_rest(run: Run) -> None:
     assert not found["mass/v"][51:].any()
 
 
-def test_stick_slip_breaks_away_exactly(run: Run) -> None:
-    """F = t: it sticks until t = 1.2, then v' = t - 1."""
+def test_a_stuck_mass_breaks_away_at_the_exact_time(run: Run) -> None:
+    """F = t: the mass sticks until t = 1.2, then v' = t - 1."""
     builder = DiagramBuilder("d")
     builder.add("mass", StickSlipFriction(), builder.add("force", Clock()))
     found = run(builder.build(), 3.0)
@@ -304,7 +304,7 @@ def test_stick_slip_breaks_away_exactly(run: Run) -> None:
     assert not found["mass/v"][t < 1.2 - 1e-9].any()
     since = np.maximum(t - 1.2, 0.0)
     close(found["mass/v"], 0.2 * since + since**2 / 2, 1e-10)
-    # at 1.2 itself it may still stick
+    # at 1.2 s both values are correct
     other = np.abs(t - 1.2) > 1e-9
     close(found["mass/friction"][other], np.where(t < 1.2, t, 1.0)[other], 1e-10)
 
@@ -312,8 +312,8 @@ def test_stick_slip_breaks_away_exactly(run: Run) -> None:
 # -- implicit equations ------------------------------------------------------------------------------------
 
 
-def test_a_loop_that_is_not_linear_is_solved_as_time_goes(run: Run) -> None:
-    """u = cos(u) stays 0.739…, and x' = u."""
+def test_a_constant_nonlinear_loop_is_solved(run: Run) -> None:
+    """u = cos(u) is 0.739…, and x' = u."""
     builder = DiagramBuilder("d")
     u = builder.add("u", Trigonometry(function="cos"))
     builder.connect(u, u)
@@ -323,8 +323,8 @@ def test_a_loop_that_is_not_linear_is_solved_as_time_goes(run: Run) -> None:
     close(found["x/y"], 0.7390851332151607 * found["t"], 1e-12)
 
 
-def test_a_moving_implicit_equation(run: Run) -> None:
-    """u = t + cos(u)/2 with the derivative u' = 1 / (1 + sin(u)/2)."""
+def test_an_implicit_equation_that_depends_on_time(run: Run) -> None:
+    """u = t + cos(u)/2 has the derivative u' = 1 / (1 + sin(u)/2)."""
     builder = DiagramBuilder("d")
     t = builder.add("t", Clock())
     u = builder.add("u", Sum(), t)
@@ -334,7 +334,7 @@ def test_a_moving_implicit_equation(run: Run) -> None:
     close(found["u/y"], found["t"] + np.cos(found["u/y"]) / 2, 1e-13)
 
 
-def test_a_saturated_loop_is_linear_in_each_of_its_pieces(run: Run) -> None:
+def test_a_loop_with_saturation_is_piecewise_linear(run: Run) -> None:
     """u = 2 sin t - sat(u): u is sin t while |sin t| < 1/2, and 2 sin t ∓ 1/2 beyond."""
     builder = DiagramBuilder("d")
     source = builder.add("source", SineWave(amplitude=2.0))

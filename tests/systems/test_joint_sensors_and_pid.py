@@ -1,4 +1,5 @@
-"""Sensors and PID controllers of joints, and integrated poses: closed forms, laws, and SciPy."""
+"""Sensors and PID controllers of joints, and integrated poses, compared with closed forms, statistics and
+SciPy."""
 
 from __future__ import annotations
 
@@ -42,7 +43,7 @@ def solver(request: pytest.FixtureRequest) -> str:
 
 
 def sensed(seed: float = 0.0) -> SimulationResult:
-    """A joint sensor for ten thousand ticks of a robot at rest."""
+    """Simulate a joint sensor of a robot at rest for ten thousand ticks."""
     builder = DiagramBuilder("d")
     sensor = JointSensor(
         robot=ab.load_robot("planar3r").robot, q_deviation=(0.01, 0.02, 0.0), qd_deviation=0.1, seed=seed
@@ -56,13 +57,13 @@ def sensed(seed: float = 0.0) -> SimulationResult:
 # -- sensors
 
 
-def test_a_sensors_noise_has_its_deviations_and_no_correlation() -> None:
+def test_sensor_noise_has_the_given_deviations_and_is_uncorrelated() -> None:
     found = sensed()
     noise = np.hstack([found["sensor/q_measured"] - 0.5, found["sensor/qd_measured"]])
-    assert not noise[:, 2].any(), "no deviation is no noise"
+    assert not noise[:, 2].any(), "a deviation of 0 gives no noise"
     wanted = np.array([0.01, 0.02, 0.1, 0.1, 0.1])
     noise = np.delete(noise, 2, axis=1) / wanted
-    # 10 001 draws: the mean is out by 1e-2, the deviation by 7e-3, a correlation by 1e-2, each at 4 sigma
+    # 10 001 samples; standard errors: mean 1e-2, deviation 7e-3, correlation 1e-2; bounds of 4 sigma
     assert np.abs(noise.mean(axis=0)).max() < 0.04
     assert np.abs(noise.std(axis=0) - 1.0).max() < 0.03
     correlation = np.corrcoef(noise.T) - np.eye(5)
@@ -70,13 +71,13 @@ def test_a_sensors_noise_has_its_deviations_and_no_correlation() -> None:
     assert np.abs((noise[1:] * noise[:-1]).mean(axis=0)).max() < 0.04
 
 
-def test_a_seed_repeats_the_noise_and_another_gives_another() -> None:
+def test_equal_seeds_give_equal_noise_and_other_seeds_other_noise() -> None:
     one, again, other = sensed(seed=7.0), sensed(seed=7.0), sensed(seed=8.0)
     np.testing.assert_array_equal(one["sensor/qd_measured"], again["sensor/qd_measured"])
     assert (one["sensor/qd_measured"] != other["sensor/qd_measured"]).mean() > 0.99
 
 
-def test_an_encoder_counts_its_turns_and_differences_its_counts(solver: str) -> None:
+def test_an_encoder_quantises_the_angle_and_differentiates_its_counts(solver: str) -> None:
     counts, G, T = np.array([100.0, 256.0]), np.array([1.0, -50.0]), 0.01
     builder = DiagramBuilder("d")
     u = builder.add("u", SineWave(amplitude=(2.0, 0.3), frequency=1.3, phase=0.4))
@@ -88,15 +89,15 @@ def test_an_encoder_counts_its_turns_and_differences_its_counts(solver: str) -> 
     np.testing.assert_array_equal(found["encoder/count"], expected)
     step = 2 * np.pi / (G * counts)
     np.testing.assert_allclose(found["encoder/y"], expected * step, rtol=1e-14)
-    assert not found["encoder/speed"][0].any(), "nothing is known of the speed at the first tick"
+    assert not found["encoder/speed"][0].any(), "the speed is 0 at the first tick"
     np.testing.assert_allclose(found["encoder/speed"][1:], np.diff(expected, axis=0) * step / T, atol=1e-9)
-    # the angle is never more than a count away, the speed a count in T
+    # the error of the angle is below one count
     assert (np.abs(found["encoder/y"] - angle) < np.abs(step)).all()
     true = np.outer(1.3 * np.cos(1.3 * t + 0.4), (2.0, 0.3))
     assert (np.abs(found["encoder/speed"] - true)[1:] < np.abs(step) / T + 0.02).all()
 
 
-def test_a_tachometer_lags_by_its_time_constant(solver: str) -> None:
+def test_a_tachometer_has_a_first_order_lag(solver: str) -> None:
     builder = DiagramBuilder("d")
     builder.add("tachometer", Tachometer(gain=0.5, time_constant=0.2), builder.add("w", Ramp(slope=3.0)))
     found = run(builder.build(), 2.0, solver=solver)
@@ -109,7 +110,7 @@ def test_a_tachometer_lags_by_its_time_constant(solver: str) -> None:
 
 
 def loop(controller: Block, stop: float, solver: str, goal: Block, load: float = 0.0) -> SimulationResult:
-    """Two inertias of 1 under a controller, with a load against them."""
+    """A loop of two inertias of 1 kg m2 with a controller and a load torque."""
     builder = DiagramBuilder("d")
     pid = builder.add("pid", controller)
     builder.connect(builder.add("goal", goal), pid["qr"])
@@ -121,8 +122,8 @@ def loop(controller: Block, stop: float, solver: str, goal: Block, load: float =
     return run(builder.build(), stop, solver=solver)
 
 
-def test_a_pid_without_limits_is_its_linear_loop_and_carries_a_load(solver: str) -> None:
-    """q'' = Kp (1 - q) - Kd q' + i - load, i' = Ki (1 - q): the load is carried by the integral."""
+def test_a_pid_without_limits_agrees_with_the_linear_loop(solver: str) -> None:
+    """q'' = Kp (1 - q) - Kd q' + i - load, i' = Ki (1 - q): the integral compensates the load."""
     Kp, Ki, Kd = (30.0, 20.0), (40.0, 20.0), (11.0, 9.0)
     found = loop(JointPID(Kp=Kp, Ki=Ki, Kd=Kd), 8.0, solver, Constant(value=(1.0, 1.0)), load=3.0)
     for k in range(2):
@@ -133,8 +134,8 @@ def test_a_pid_without_limits_is_its_linear_loop_and_carries_a_load(solver: str)
     np.testing.assert_allclose(found["angle/y"][-1], 1.0, atol=1e-3)
 
 
-def test_back_calculation_keeps_a_limited_pid_from_winding_up(solver: str) -> None:
-    """Against SciPy with short steps; without it (Kb = 0) the overshoot is far greater."""
+def test_back_calculation_prevents_windup_of_a_limited_pid(solver: str) -> None:
+    """Comparison with SciPy with short steps; for Kb = 0 the overshoot is much larger."""
     gains = {"Kp": 10.0, "Ki": 8.0, "Kd": 5.0, "lower": (-0.5, -0.4), "upper": 0.5}
     goal = Constant(value=(2.0, -2.0))
     found = loop(JointPID(Kb=5.0, **gains), 10.0, solver, goal)
@@ -155,8 +156,8 @@ def test_back_calculation_keeps_a_limited_pid_from_winding_up(solver: str) -> No
     assert found["pid/tau"].max() <= 0.5
 
 
-def test_a_sampled_pid_is_its_recurrence(solver: str) -> None:
-    """Between ticks an inertia moves on parabolas, so that the loop can be written out exactly."""
+def test_a_sampled_pid_agrees_with_its_recurrence(solver: str) -> None:
+    """Between ticks the position of an inertia is a parabola, which gives an exact recurrence."""
     T, lower, upper = 0.05, np.array([-3.0, -0.5]), np.array([3.0, 0.5])
     controller = SampledJointPID(
         Kp=(10.0, 6.0), Ki=(4.0, 3.0), Kd=(5.0, 4.0), lower=lower, upper=upper, sample_time=T
@@ -175,7 +176,7 @@ def test_a_sampled_pid_is_its_recurrence(solver: str) -> None:
     np.testing.assert_allclose(found["angle/y"], angles, rtol=0, atol=1e-11)
 
 
-def test_limits_of_a_pid_that_are_out_of_order_are_refused() -> None:
+def test_reversed_limits_of_a_pid_are_refused() -> None:
     for kind in (JointPID, SampledJointPID):
         with pytest.raises(InputError, match=r"lower is 1\.0 and upper is -1\.0"):
             kind(lower=1.0, upper=-1.0)
@@ -184,8 +185,8 @@ def test_limits_of_a_pid_that_are_out_of_order_are_refused() -> None:
 # -- poses
 
 
-def test_a_constant_velocity_moves_a_frame_on_a_screw(solver: str) -> None:
-    """In body axes T = T0 exp([V] t); in world axes the origin goes straight and R = exp([w] t) R0."""
+def test_a_constant_twist_moves_a_frame_on_a_screw_motion(solver: str) -> None:
+    """In body axes T = T0 exp([V] t); in world axes the origin moves straight and R = exp([w] t) R0."""
     V = np.array([1.0, -0.5, 0.2, 0.3, 0.8, -0.6])
     p0, Q0 = (0.1, 0.2, 0.3), (2.0, 0.6, -0.4, 1.0)
     builder = DiagramBuilder("d")
@@ -206,7 +207,7 @@ def test_a_constant_velocity_moves_a_frame_on_a_screw(solver: str) -> None:
         np.testing.assert_allclose(found["world/T"][k][:3, 3], p0 + V[:3] * t, atol=tolerance)
 
 
-def test_an_integrated_pose_stays_a_rotation_at_any_step() -> None:
+def test_an_integrated_pose_remains_a_rotation_for_any_step() -> None:
     builder = DiagramBuilder("d")
     source = builder.add("V", SineWave(amplitude=(1.0, 1.0, 1.0, 3.0, 2.0, 4.0), phase=(0, 1, 2, 3, 4, 5)))
     builder.add("pose", PoseIntegration(), source)
@@ -215,7 +216,7 @@ def test_an_integrated_pose_stays_a_rotation_at_any_step() -> None:
     np.testing.assert_allclose(R @ R.transpose(0, 2, 1), np.tile(np.eye(3), (201, 1, 1)), atol=1e-14)
 
 
-def test_the_velocity_of_a_tool_integrates_to_its_pose(puma560: Robot, solver: str) -> None:
+def test_the_integrated_velocity_of_a_tool_is_its_pose(puma560: Robot, solver: str) -> None:
     builder = DiagramBuilder("d")
     path = builder.add("path", JTraj(q0=(0.1, 0.5, -0.3, 0.2, 0.7, 0.0), qf=(1.5, -0.4, 0.6, -1.0, 0.3, 2.0)))
     builder.add("fkine", Fkine(robot=puma560), path["q"])
@@ -234,7 +235,7 @@ def test_the_velocity_of_a_tool_integrates_to_its_pose(puma560: Robot, solver: s
 
 
 def quaternion(R: np.ndarray) -> np.ndarray:
-    """By the eigenvector of R for its axis, and its trace."""
+    """Return the quaternion of R from the eigenvector of its axis and its trace."""
     values, vectors = np.linalg.eig(R)
     axis = np.real(vectors[:, int(np.argmin(np.abs(values - 1.0)))])
     s = np.sqrt(1.0 + np.trace(R)) / 2.0
@@ -242,7 +243,7 @@ def quaternion(R: np.ndarray) -> np.ndarray:
     return np.array([s, *(np.sqrt(1.0 - s * s) * axis * np.sign(axis @ twist))])
 
 
-def test_a_start_that_is_no_pose_is_refused() -> None:
+def test_an_invalid_start_quaternion_is_refused() -> None:
     with pytest.raises(InputError, match="the quaternion has 3 numbers"):
         PoseIntegration(quaternion=(1.0, 0.0, 0.0))
     with pytest.raises(InputError, match="the quaternion is zero"):

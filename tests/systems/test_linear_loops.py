@@ -1,4 +1,4 @@
-"""Loops that are linear in their signals, against NumPy: flowing, at ticks, by pieces, and differentiated."""
+"""Linear algebraic loops compared with NumPy: continuous, at ticks, with modes, and differentiated."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ EPS = np.finfo(np.float64).eps
 
 
 def loop(M: np.ndarray, c: np.ndarray) -> ab.Diagram:
-    """s = c + M s."""
+    """A diagram of the loop s = c + M s."""
     builder = DiagramBuilder("loop")
     s = builder.add("s", Sum(), builder.add("c", Constant(value=c)))
     builder.connect(builder.add("M", MatrixGain(gain=M), s), s["u2"])
@@ -29,7 +29,7 @@ def loop(M: np.ndarray, c: np.ndarray) -> ab.Diagram:
 
 
 def interpreted(system: HybridSystem) -> dict[str, np.ndarray]:
-    """The signals of a system without states at t = 0, by the tape's interpreter."""
+    """Evaluate the signals of a system without states at t = 0 with the interpreter of the tape."""
     empty = np.empty(0)
     (y,) = interpret(tape_from(system.signals), [np.zeros(1), empty, empty, empty, system.parameter_values])
     return system.signals_layout.unpack(y)
@@ -40,13 +40,13 @@ def hilbert(n: int) -> np.ndarray:
 
 
 def permuted_triangle(n: int, random: np.random.Generator) -> np.ndarray:
-    """Regular, with zeros on the diagonal: elimination without an exchange of rows divides by zero."""
+    """A regular matrix with zeros on the diagonal: elimination without row exchanges divides by zero."""
     triangle = np.triu(random.uniform(0.5, 2.0, (n, n)))
     return triangle[np.roll(np.arange(n), 1)]
 
 
 @pytest.mark.parametrize("n", [3, 4, 5, 6, 8, 12])
-def test_a_loop_of_vectors_is_as_accurate_as_a_numerical_library(n: int) -> None:
+def test_a_loop_of_vectors_is_solved_as_accurately_as_by_numpy(n: int) -> None:
     random = np.random.default_rng(n)
     kinds = [np.eye(n) + random.normal(size=(n, n)), permuted_triangle(n, random)]
     kinds += [hilbert(n)] if n <= 8 else []
@@ -58,7 +58,7 @@ def test_a_loop_of_vectors_is_as_accurate_as_a_numerical_library(n: int) -> None
 
 
 def exact_solution(A: list[list[Fraction]], b: list[Fraction]) -> list[Fraction]:
-    """x with A x = b, by elimination in fractions."""
+    """Solve A x = b by elimination in fractions."""
     rows = [[*row, right] for row, right in zip(A, b)]
     for k in range(len(b)):
         pivot = next(i for i in range(k, len(b)) if rows[i][k])
@@ -70,12 +70,12 @@ def exact_solution(A: list[list[Fraction]], b: list[Fraction]) -> list[Fraction]
 
 
 @pytest.mark.parametrize("seed", range(24))
-def test_every_signal_of_a_loop_is_as_accurate_as_its_own_condition_allows(seed: int) -> None:
-    """Up to eight sums, each fed by a constant and by some sums through one gain or two, of 1e-9 to 1e9."""
+def test_every_signal_of_a_loop_is_as_accurate_as_its_condition_allows(seed: int) -> None:
+    """Up to eight sums of a constant and other sums, with one or two gains of 1e-9 to 1e9 between them."""
     random = np.random.default_rng(seed)
     n = 1 + seed % 8
     fed = random.uniform(size=(n, n)) < (2.0 / n if n > 2 else 1.0)
-    fed |= np.roll(np.eye(n, dtype=bool), 1, axis=1)  # one loop through all
+    fed |= np.roll(np.eye(n, dtype=bool), 1, axis=1)  # one loop through all sums
     gains = 10.0 ** random.uniform(-9.0, 9.0, (2, n, n)) * random.choice([-1.0, 1.0], (2, n, n))
     gains[1][random.uniform(size=(n, n)) < 0.5] = 1.0
     gains[1] = np.where(np.abs(gains[0] * gains[1]) > 1e9, 1.0, gains[1])
@@ -98,14 +98,14 @@ def test_every_signal_of_a_loop_is_as_accurate_as_its_own_condition_allows(seed:
     ]
     A = [[int(i == j) - G[i][j] for j in range(n)] for i in range(n)]
     x = exact_solution(A, [Fraction(value) for value in c])
-    # Skeel's condition of each signal: every term of every sum may be rounded.
+    # Skeel's condition number of each signal: every term of every sum may have a rounding error.
     terms = [abs(Fraction(c[i])) + abs(x[i]) + sum(abs(G[i][j] * x[j]) for j in range(n)) for i in range(n)]
     inverse = [exact_solution(A, [Fraction(int(i == k)) for i in range(n)]) for k in range(n)]
     for i in range(n):
         condition = sum(abs(inverse[k][i]) * terms[k] for k in range(n)) / abs(x[i])
         bound = 4.0 * n * EPS * float(condition)
         if bound > 1e-3:
-            continue  # too near to singular for a first-order bound
+            continue  # too close to singular for a first-order bound
         found = {f"s{i}": x[i]}
         found |= {f"g{k}_{i}": x[i] * Fraction(gains[0, k, i]) for k in range(n) if fed[k, i]}
         found |= {f"h{k}_{i}": x[i] * G[k][i] for k in range(n) if fed[k, i]}
@@ -113,7 +113,7 @@ def test_every_signal_of_a_loop_is_as_accurate_as_its_own_condition_allows(seed:
             assert abs(Fraction(float(signals[f"{name}/y"])) / exact - 1) <= bound, name
 
 
-def test_a_follower_of_high_gain_has_an_accurate_error_signal() -> None:
+def test_a_loop_of_high_gain_has_an_accurate_error_signal() -> None:
     """e = r - K e, so e = r / (1 + K), and y = K e."""
     builder = DiagramBuilder("follower")
     e = builder.add("e", Sum(signs="+-"), builder.add("r", Constant(value=1.3)))
@@ -123,7 +123,7 @@ def test_a_follower_of_high_gain_has_an_accurate_error_signal() -> None:
     assert float(signals["y/y"]) == pytest.approx(1.3e9 / (1.0 + 1e9), rel=4.0 * EPS)
 
 
-def test_a_loop_that_has_lost_half_of_the_digits_is_named_at_the_end_of_the_run() -> None:
+def test_an_ill_conditioned_loop_is_reported_at_the_end_of_the_run() -> None:
     message = ab.simulate(loop(np.eye(8) - hilbert(8), np.ones(8)), stop_time=0.0).run.message
     assert re.search(
         r"the loop of 's/y\[0\]', .* and 5 more signals has the condition 2e\+10 at 0 s", message
@@ -153,8 +153,8 @@ def test_a_loop_of_fifty_unknowns_runs() -> None:
     np.testing.assert_allclose(result["s"], [np.linalg.solve(np.eye(50) - M, c)] * 3, rtol=1e-10)
 
 
-def test_a_loop_of_vectors_changes_with_its_modes() -> None:
-    """s = c - M sat(s) with c = t c0: of the 27 linear pieces the one that fits is found."""
+def test_a_loop_of_vectors_with_saturation_is_solved() -> None:
+    """s = c - M sat(s) with c = t c0: the consistent one of 27 linear pieces is found."""
     c0 = np.array([1.0, -2.0, 1.5])
     M = np.array([[1.0, 0.5, 0.2], [0.3, 2.0, -0.4], [-0.2, 0.6, 1.5]])
     builder = DiagramBuilder("pieces")
@@ -180,7 +180,7 @@ def test_a_loop_of_vectors_changes_with_its_modes() -> None:
     assert len({tuple(np.sign(row) * (np.abs(row) > 1.0)) for row in expected}) > 2
 
 
-def test_a_loop_of_vectors_is_solved_at_a_tick_with_what_is_fresh() -> None:
+def test_a_loop_of_vectors_is_solved_at_a_tick_with_the_new_samples() -> None:
     M = np.array([[0.0, 2.0, 0.0], [0.5, 0.3, 0.7], [0.2, 0.0, -4.0]])
     builder = DiagramBuilder("ticks")
     held = builder.add("held", ZeroOrderHold(sample_time=0.5), builder.add("t", Clock()))
@@ -194,8 +194,8 @@ def test_a_loop_of_vectors_is_solved_at_a_tick_with_what_is_fresh() -> None:
     np.testing.assert_allclose(system.discrete.unpack(z)["again/y"], expected, rtol=1e-13)
 
 
-def test_a_loop_of_vectors_is_linearized_and_differentiated_by_its_gain() -> None:
-    """x' = s with s = g M s - x."""
+def test_linearisation_and_sensitivity_of_a_loop_of_vectors() -> None:
+    """The system is x' = s with s = g M s - x."""
     M = np.array([[0.0, 2.0, 0.0], [0.5, 0.3, 0.7], [0.2, 0.0, -4.0]])
     builder = DiagramBuilder("inside")
     x = builder.add("x", Integrator(initial=[1.0, -2.0, 0.5]))

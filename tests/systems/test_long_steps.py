@@ -1,4 +1,4 @@
-"""Events are found where nothing but the events themselves would hold the steps short."""
+"""Events are found even if no state limits the length of the steps."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from armblocks import blocks as bl
 
 
 def time_above(frequency: float, level: float, stop: float) -> float:
-    """For how long the sine is above a level from 0 to ``stop``, by its crossings."""
+    """Return how long the sine is above a level between 0 and ``stop``."""
     start, end = math.asin(level) / frequency, (math.pi - math.asin(level)) / frequency
     period = 2 * math.pi / frequency
     whole = math.floor(stop / period)
@@ -22,26 +22,26 @@ def time_above(frequency: float, level: float, stop: float) -> float:
 
 @pytest.mark.parametrize("solver", ["rk45", "dop853", "rodas5p"])
 @pytest.mark.parametrize(("frequency", "stop"), [(1.0, 100.0), (7.3, 100.0), (333.3, 20.0)])
-def test_a_level_that_a_sine_passes(solver: str, frequency: float, stop: float) -> None:
-    """The only state is the integral of the comparison: its derivative is constant, its steps are endless."""
+def test_crossings_of_a_level_by_a_sine_are_found(solver: str, frequency: float, stop: float) -> None:
+    """The only state is the integral of the comparison, with a constant derivative: steps are not limited."""
     builder = ab.DiagramBuilder("level")
     wave = builder.add("wave", bl.SineWave(frequency=frequency))
     above = builder.add("above", bl.CompareToConstant(relation=">", constant=0.5), wave)
     builder.add("total", bl.Integrator(), above)
     found = ab.simulate(builder.build(), stop_time=stop, solver=solver)
-    # each of some 2000 crossings is located to some units in the last place of the time
+    # each of about 2000 crossings has an error of some units in the last place of the time
     assert found["total"][-1] == pytest.approx(time_above(frequency, 0.5, stop), abs=1e-9)
 
 
 def integrating(initial: float) -> ab.Diagram:
-    """A subsystem with an integrator in it."""
+    """A subsystem with an integrator."""
     inner = ab.DiagramBuilder("integrating")
     inner.output("x", inner.add("integral", bl.Integrator(initial=initial), inner.input("rate")))
     return inner.build()
 
 
-def test_two_actions_of_which_one_works_at_a_time_and_their_merge() -> None:
-    """While sin(pi t) > 1/2 one integrates 1 and keeps its state, otherwise one integrates -2 from 0.5."""
+def test_two_alternating_action_subsystems_and_their_merge() -> None:
+    """While sin(pi t) > 1/2 one integrates 1 and keeps its state; otherwise one integrates -2 from 0.5."""
     builder = ab.DiagramBuilder("actions")
     wave = builder.add("wave", bl.SineWave(frequency=math.pi))
     choice = builder.add("choice", bl.If(expressions="u > 0.5"), wave)

@@ -1,4 +1,4 @@
-"""Blocks that switch, inside subsystems that are off: their modes follow what happened meanwhile."""
+"""Switching blocks inside disabled subsystems: their modes are consistent when the subsystem is enabled."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def enabled(block: Block, source: Block, enable: Block, *, end: str = "", when: 
 def all_enabled(
     blocks: Mapping[str, Block], source: Block, enable: Block, *, end: str = "", when: str = "held"
 ) -> ab.Diagram:
-    """Each block in a subsystem of its own, ``sub k``, behind one source; its integral is ``total k``."""
+    """Put each block in its own subsystem ``sub k`` with a common source; its integral is ``total k``."""
     builder = ab.DiagramBuilder("enabled")
     fed = builder.add("source", source)
     control = builder.add("control", enable)
@@ -57,12 +57,12 @@ SWITCHING: list[tuple[Block, float]] = [
     (bl.CoulombFriction(offset=2.0, gain=3.0), 5.0),
     (bl.LookupTable1D(positions=(-2.0, 0.0, 2.0), table=(4.0, 0.0, 1.0)), 0.5),
 ]
-"""Blocks and their outputs for 1."""
+"""Blocks and their outputs for the input 1."""
 
 
 @pytest.mark.parametrize("settings", RUNS, ids=lambda run: run["solver"])
-def test_a_jump_before_a_subsystem_is_first_on_is_seen(settings: dict[str, Any]) -> None:
-    """The input jumps from -1 to 1 after 0.2 s; the subsystems are on from 0.5 s."""
+def test_modes_are_consistent_with_a_jump_before_the_first_enabling(settings: dict[str, Any]) -> None:
+    """The input jumps from -1 to 1 at 0.2 s; the subsystems are enabled at 0.5 s."""
     blocks = {block.type_name(): block for block, _ in SWITCHING}
     diagram = all_enabled(blocks, bl.Step(time=0.2, initial=-1.0), bl.Step(time=0.5))
     found = ab.simulate(diagram, stop_time=1.0, sample_time=0.1, **settings)
@@ -74,9 +74,9 @@ def test_a_jump_before_a_subsystem_is_first_on_is_seen(settings: dict[str, Any])
 
 @pytest.mark.parametrize("settings", RUNS, ids=lambda run: run["solver"])
 @pytest.mark.parametrize("sampled", [False, True])
-def test_a_limiter_that_is_on_now_and_then(sampled: bool, settings: dict[str, Any]) -> None:
-    """While it is on, it limits; the times between are the wave's own business."""
-    builder = ab.DiagramBuilder("now and then")
+def test_a_limiter_in_an_intermittently_enabled_subsystem(sampled: bool, settings: dict[str, Any]) -> None:
+    """While the subsystem is enabled, its output is the limited wave."""
+    builder = ab.DiagramBuilder("intermittent")
     wave = builder.add("wave", bl.SineWave(frequency=3.0, phase=-0.1))
     control = builder.add("control", bl.PulseGenerator(period=1.0, width=30.0, delay=0.37))
     if sampled:
@@ -90,8 +90,8 @@ def test_a_limiter_that_is_on_now_and_then(sampled: bool, settings: dict[str, An
 
 
 @pytest.mark.parametrize("settings", RUNS, ids=lambda run: run["solver"])
-def test_a_relay_within_its_band_keeps_its_side_while_it_is_off(settings: dict[str, Any]) -> None:
-    """On at 0.25 s by 1, off from 0.4 s; the input falls to 0.1, inside the band: it is still on at 0.8 s."""
+def test_a_relay_keeps_its_mode_while_disabled(settings: dict[str, Any]) -> None:
+    """On at 0.25 s, disabled from 0.4 s to 0.8 s; the input falls to 0.1, within the hysteresis: still on."""
     source = bl.FromTable(times=(0.0, 0.2, 0.3, 0.5, 0.6, 2.0), values=(0.0, 0.0, 1.0, 1.0, 0.1, 0.1))
     control = bl.FromTable(times=(0.0, 0.4, 0.8), values=(1.0, 0.0, 1.0), method="flat")
     found = ab.simulate(
@@ -104,8 +104,8 @@ def test_a_relay_within_its_band_keeps_its_side_while_it_is_off(settings: dict[s
 
 
 @pytest.mark.parametrize("settings", RUNS, ids=lambda run: run["solver"])
-def test_a_sliding_mass_stands_still_in_time_while_it_is_off(settings: dict[str, Any]) -> None:
-    """3 m/s against 2 N on 1 kg last 1.5 s; the mass is off from 0.5 to 1.5 s: it rests after 2.5 s."""
+def test_the_motion_of_a_sliding_mass_is_suspended_while_disabled(settings: dict[str, Any]) -> None:
+    """3 m/s with 2 N on 1 kg last 1.5 s; the mass is disabled from 0.5 s to 1.5 s and rests after 2.5 s."""
     block = bl.StickSlipFriction(coulomb=2.0, static=2.5, initial_speed=3.0)
     control = bl.FromTable(times=(0.0, 0.5, 1.5), values=(1.0, 0.0, 1.0), method="flat")
     diagram = enabled(block, bl.Constant(value=0.0), control, end="v")
@@ -116,8 +116,8 @@ def test_a_sliding_mass_stands_still_in_time_while_it_is_off(settings: dict[str,
 
 
 @pytest.mark.parametrize("settings", RUNS, ids=lambda run: run["solver"])
-def test_a_limited_integrator_that_starts_anew_leaves_its_limit(settings: dict[str, Any]) -> None:
-    """It climbs by 1 a second to 0.2 and waits there; each time it is on it begins at 0 again."""
+def test_a_limited_integrator_that_is_reset_leaves_its_limit(settings: dict[str, Any]) -> None:
+    """It rises with rate 1 to 0.2 and stays there; each enabling resets it to 0."""
     block = bl.IntegratorLimited(lower=-0.2, upper=0.2)
     control = bl.PulseGenerator(period=1.0, width=50.0)
     diagram = enabled(block, bl.Constant(value=1.0), control, end="y", when="reset")
@@ -126,8 +126,8 @@ def test_a_limited_integrator_that_starts_anew_leaves_its_limit(settings: dict[s
     np.testing.assert_allclose(found["sub/o"], np.minimum(since, 0.2), atol=1e-9)
 
 
-def test_no_event_sees_the_old_states_of_a_subsystem_that_is_switched_on() -> None:
-    """It is -1 while off and climbs from 0 to 0.2 while on: it passes 0.1 upwards and back once each time."""
+def test_no_event_sees_the_old_states_of_a_subsystem_when_it_is_enabled() -> None:
+    """-1 while disabled, rising from 0 to 0.2 while enabled: 0.1 is crossed twice per period."""
     inner = ab.DiagramBuilder("inside")
     climb = inner.add("climb", bl.IntegratorLimited(upper=0.2), inner.input("u"))
     inner.add("o", bl.Outport(when_off="reset", initial=-1.0), climb["y"])
@@ -144,8 +144,8 @@ def test_no_event_sees_the_old_states_of_a_subsystem_that_is_switched_on() -> No
 
 
 @pytest.mark.parametrize("settings", RUNS, ids=lambda run: run["solver"])
-def test_a_rate_limiter_that_starts_anew_climbs_again(settings: dict[str, Any]) -> None:
-    """Also where its input does not move at that time: a restart is like the start of a run."""
+def test_a_rate_limiter_that_is_reset_rises_again(settings: dict[str, Any]) -> None:
+    """Its input is constant: a reset has the same effect as the start of a run."""
     builder = ab.DiagramBuilder("climbing")
     reset = builder.add("reset", bl.PulseGenerator(period=1.0, width=50.0, delay=0.25))
     limited = bl.ResettableSubsystem(diagram=inside(bl.RateLimiterContinuous()), edge="rising")
@@ -155,8 +155,8 @@ def test_a_rate_limiter_that_starts_anew_climbs_again(settings: dict[str, Any]) 
     np.testing.assert_allclose(found["sub/o"], np.minimum(since, 0.3), atol=1e-9)
 
 
-def test_what_is_asked_while_a_subsystem_is_off_changes_nothing() -> None:
-    """Comparisons are located also while nobody looks: events, and the same numbers as without them."""
+def test_events_in_a_disabled_subsystem_do_not_change_the_result() -> None:
+    """Events of comparisons are located also while the subsystem is disabled, without effect."""
     wave, control = bl.SineWave(frequency=50.0), bl.Step(time=0.7)
     located = ab.simulate(enabled(bl.CompareToZero(), wave, control), stop_time=1.0, sample_time=0.01)
     assert located.run.events > 10
@@ -164,7 +164,7 @@ def test_what_is_asked_while_a_subsystem_is_off_changes_nothing() -> None:
     assert not located["sub/o"][off].any()
     expected = np.sin(50.0 * located.time) <= 0.0
     assert located["sub/o"][~off].tolist() == expected[~off].astype(float).tolist()
-    # Off from 0: the integral is of what follows 0.7 s alone.
+    # Disabled until 0.7 s: the integral includes only the time after it.
     edges = np.arange(0, 20) * math.pi / 50.0
     low = [(edges[k], edges[k + 1]) for k in range(1, 19, 2)]
     exact = sum(max(0.0, min(b, 1.0) - max(a, 0.7)) for a, b in low)

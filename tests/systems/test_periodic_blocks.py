@@ -1,4 +1,4 @@
-"""First Order Hold, PWM and Memory against closed forms, by fixed and adaptive steps alike."""
+"""First Order Hold, PWM and Memory compared with closed forms, for fixed and adaptive steps."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def run(request: pytest.FixtureRequest) -> Run:
 
 
 def fed(block: Block, source: Block) -> Diagram:
-    """A block behind a source, and the integral of its output, which tells when it switched."""
+    """A source, a block, and the integral of its output, which depends on the switching times."""
     builder = DiagramBuilder("d")
     out = builder.add("block", block, builder.add("source", source))
     builder.add("integral", Integrator(), out)
@@ -62,7 +62,7 @@ def sample_index(t: np.ndarray, period: float, offset: float = 0.0) -> np.ndarra
 
 
 @pytest.mark.parametrize("method", ["extrapolation", "interpolation"])
-def test_a_first_order_hold_draws_the_lines_through_the_samples_of_a_sine(run: Run, method: str) -> None:
+def test_a_first_order_hold_of_a_sine_is_piecewise_linear(run: Run, method: str) -> None:
     period, offset, first = 0.3, 0.2, 0.7
     block = FirstOrderHold(method=method, period=period, offset=offset, initial=first)
     found = run(fed(block, SineWave(frequency=1.3)), 4.0)
@@ -72,9 +72,9 @@ def test_a_first_order_hold_draws_the_lines_through_the_samples_of_a_sine(run: R
     before = np.where(k < 1, first, np.sin(1.3 * (offset + (k - 1) * period)))
     start = last if method == "extrapolation" else before
     expected = start + (last - before) * np.where(k < 0, 0.0, (t - offset - k * period) / period)
-    # The source is looked at at located instants, exact to rounding.
+    # The source is sampled at located times, exact to rounding.
     assert found["block/y"] == pytest.approx(expected, abs=1e-12)
-    # Its integral piece by piece: trapezia, exact for straight lines.
+    # The integral by the trapezoidal rule, exact for linear pieces.
     knots = np.unique(np.concatenate([t, offset + period * np.arange(14)]))
     knots = knots[knots <= t[-1]]
     j = sample_index(knots[:-1], period, offset)
@@ -87,12 +87,12 @@ def test_a_first_order_hold_draws_the_lines_through_the_samples_of_a_sine(run: R
     assert found["integral/y"][-1] == pytest.approx(float(np.sum(height * np.diff(knots))), abs=1e-10)
 
 
-def test_an_extrapolating_hold_is_exact_for_a_straight_line(run: Run) -> None:
+def test_an_extrapolating_hold_is_exact_for_a_ramp(run: Run) -> None:
     found = run(fed(FirstOrderHold(period=0.25, initial=-0.25), Clock()), 3.0)
     assert found["block/y"] == pytest.approx(found["t"], abs=1e-12)
 
 
-def test_a_first_order_hold_takes_what_a_sampled_block_gives_at_the_same_instant(run: Run) -> None:
+def test_a_first_order_hold_samples_a_sampled_block_at_the_same_tick(run: Run) -> None:
     builder = DiagramBuilder("d")
     held = builder.add("held", ZeroOrderHold(sample_time=0.1), builder.add("t", Clock()))
     builder.add("block", FirstOrderHold(period=0.1, method="interpolation"), held)
@@ -100,7 +100,7 @@ def test_a_first_order_hold_takes_what_a_sampled_block_gives_at_the_same_instant
     assert found["block/y"] == pytest.approx(np.maximum(found["t"] - 0.1, 0.0), abs=1e-12)
 
 
-def test_a_first_order_hold_draws_vectors(run: Run) -> None:
+def test_a_first_order_hold_of_a_vector(run: Run) -> None:
     found = run(fed(FirstOrderHold(period=0.5, initial=(1.0, 2.0)), Constant(value=(3.0, -4.0))), 2.0)
     assert found["block/y"][-1] == pytest.approx([3.0, -4.0])
     # 3 + (3 - 1) t / T within the first period
@@ -108,8 +108,8 @@ def test_a_first_order_hold_draws_vectors(run: Run) -> None:
     assert found["block/y"][early, 0] == pytest.approx(3.0 + 2.0 * found["t"][early] / 0.5, abs=1e-12)
 
 
-def test_the_input_is_looked_at_after_the_events_of_the_instant(run: Run) -> None:
-    """Pulses whose edges are at the instants of the hold and of the modulation, the start included."""
+def test_the_input_is_sampled_after_the_events_at_the_same_time(run: Run) -> None:
+    """The edges of the pulses are at the sample times of the hold and of the PWM, including the start."""
     builder = DiagramBuilder("d")
     pulses = builder.add("pulses", PulseGenerator(period=0.5))
     builder.add("hold", FirstOrderHold(period=0.25, method="interpolation"), pulses)
@@ -123,7 +123,7 @@ def test_the_input_is_looked_at_after_the_events_of_the_instant(run: Run) -> Non
 
 
 @pytest.mark.parametrize("duty", [-0.5, 0.0, 0.3, 1.0, 1.5])
-def test_pulses_are_as_wide_as_the_duty_cycle_says(run: Run, duty: float) -> None:
+def test_the_pulse_width_is_given_by_the_duty_cycle(run: Run, duty: float) -> None:
     found = run(fed(PWM(period=0.4, offset=0.1, amplitude=2.0), Constant(value=duty)), 3.99)
     t, width = found["t"], 0.4 * min(max(duty, 0.0), 1.0)
     k = sample_index(t, 0.4, 0.1)
@@ -134,7 +134,7 @@ def test_pulses_are_as_wide_as_the_duty_cycle_says(run: Run, duty: float) -> Non
     assert found["block/y"] == pytest.approx(np.where((k >= 0) & (into < width - 1e-9), 2.0, 0.0))
 
 
-def test_the_duty_cycle_is_looked_at_where_a_pulse_may_begin(run: Run) -> None:
+def test_the_duty_cycle_is_sampled_at_the_start_of_each_period(run: Run) -> None:
     found = run(fed(PWM(period=0.5), Ramp(slope=0.25)), 4.0)
     t = found["t"]
     widths = 0.5 * np.minimum(0.25 * 0.5 * np.arange(9), 1.0)
@@ -157,7 +157,7 @@ def test_a_memory_is_a_unit_delay_at_its_ticks(run: Run) -> None:
         assert found[f"{name}/y"] == pytest.approx(expected, abs=1e-12)
 
 
-def test_a_memory_of_a_continuous_signal_is_refused_with_the_way_out() -> None:
+def test_a_memory_of_a_continuous_signal_is_refused_with_a_fix() -> None:
     builder = DiagramBuilder("d")
     builder.add("memory", Memory(sample_time=-1.0), builder.add("wave", SineWave()))
     with pytest.raises(

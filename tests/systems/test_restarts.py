@@ -1,7 +1,7 @@
-"""Law: where the states of a subsystem are reset, it goes on as a run starts.
+"""A subsystem whose states are reset continues as at the start of a run.
 
-A subsystem with one block of every kind that keeps something is reset once in a period of its inputs. Every
-signal inside then has the same course in each period as in the first, which is that from the start.
+A subsystem with blocks of every kind that store values is reset once in each period of its inputs. Every
+inner signal must then be equal in all periods, the first of which begins with the start of the run.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def _around(block: Block) -> Diagram:
 
 
 def _contents() -> Diagram:
-    """Events, hysteresis, holds, triggers, enables and resets, fed by an integrator that jumps when reset."""
+    """Blocks with events, hysteresis, holds, triggers, enables and resets after an integrator."""
     b = DiagramBuilder("contents")
     u, v = b.add("u", Inport(port=1)), b.add("v", Inport(port=2))
     x = b.add("x", Integrator(initial=-0.2), u)
@@ -78,7 +78,7 @@ def _contents() -> Diagram:
 
 @pytest.mark.parametrize("sampled", (False, True))
 @pytest.mark.parametrize("kind", ("reset", "enabled"))
-def test_a_subsystem_that_is_reset_goes_on_as_a_run_starts(kind: str, sampled: bool) -> None:
+def test_a_subsystem_continues_after_a_reset_as_at_the_start_of_a_run(kind: str, sampled: bool) -> None:
     b = DiagramBuilder("restarts")
     pulse = b.add("pulse", PulseGenerator(period=1.0))
     pulse = b.add("ticks", ZeroOrderHold(sample_time=0.25), pulse) if sampled else pulse

@@ -27,7 +27,7 @@ from armblocks.robot import Robot, serial_chain, standard_dh
 
 
 def figure_9(robot: Robot) -> Diagram:
-    """The paper's model: jtraj, fkine, plot, three projections, a display, and rne behind two du/dt."""
+    """The model of the paper: jtraj, fkine, plot, three projections, a display, and rne after two du/dt."""
     builder = DiagramBuilder("kr180model")
     q = builder.add("jtraj", JTraj(q0=[0, 0, 0, 0], qf=[3.14, 0, 1.57, 0], tmax=10))["q"]
     builder.add("plot", RobotPlot(robot=robot), q)
@@ -43,7 +43,7 @@ def figure_9(robot: Robot) -> Diagram:
     return builder.build()
 
 
-def test_the_papers_model_gives_the_papers_numbers(kr180: Robot) -> None:
+def test_the_model_of_the_paper_gives_its_published_numbers(kr180: Robot) -> None:
     result = run(figure_9(kr180.nofriction()), 10.0)
     reference = {
         0.0: (1.95, -1.25, -1.85),
@@ -54,14 +54,14 @@ def test_the_papers_model_gives_the_papers_numbers(kr180: Robot) -> None:
     for t, position in reference.items():
         row = int(np.argmin(np.abs(result.time - t)))
         found = [result[f"T2xyz/{axis}"][row] for axis in "xyz"]
-        assert found == pytest.approx(position, abs=1e-9)  # twelve decimals are printed
+        assert found == pytest.approx(position, abs=1e-9)  # the paper prints twelve decimals
         assert result["plot/poses"][row][-1][:3, 3] == pytest.approx(position, abs=1e-9)
     peaks = np.degrees(np.abs(result["speeds/u"]).max(axis=0))
-    assert peaks == pytest.approx([33.73, 0, 16.87, 0], abs=5e-3)  # two decimals are printed
+    assert peaks == pytest.approx([33.73, 0, 16.87, 0], abs=5e-3)  # the paper prints two decimals
     assert result["rne/tau"][0] == pytest.approx([0, 2305.35, 2452.5, 0], abs=1e-9)
 
 
-def test_friction_sees_no_speed_where_the_robot_stands(kr180: Robot) -> None:
+def test_friction_is_zero_while_the_robot_is_at_rest(kr180: Robot) -> None:
     result = run(figure_9(kr180), 10.0)
     still = run(figure_9(kr180.nofriction()), 10.0)
     for row in (0, -1):
@@ -70,7 +70,7 @@ def test_friction_sees_no_speed_where_the_robot_stands(kr180: Robot) -> None:
 
 
 def pendulum() -> Robot:
-    """A point of 2 kg, 0.8 m from a horizontal axis; at q = 0 it points along x, y is up."""
+    """A point mass of 2 kg, 0.8 m from a horizontal axis, on the x axis at q = 0; y points up."""
     return Robot(
         name="pendulum",
         gravity=(0, -9.81, 0),
@@ -78,20 +78,20 @@ def pendulum() -> Robot:
     )
 
 
-def test_a_falling_pendulum_follows_the_elliptic_function() -> None:
-    """Let go at 90 degrees: sin(angle / 2) = k sn(K - w t), k = sin(45 deg), w = sqrt(g / l)."""
+def test_a_falling_pendulum_agrees_with_the_elliptic_function() -> None:
+    """Released at 90 degrees: sin(angle / 2) = k sn(K - w t), k = sin(45 deg), w = sqrt(g / l)."""
     builder = DiagramBuilder("pendulum")
     builder.add("arm", ForwardDynamics(robot=pendulum()), builder.add("tau", Constant(value=0.0)))
     result = run(builder.build(), 5.0)
     w, m = np.sqrt(9.81 / 0.8), 0.5
     sn, cn, dn, _ = ellipj(ellipk(m) - w * result.time, m)
     from_below = result["arm/q"][:, 0] + np.pi / 2
-    # some hundred steps of 1e-10
+    # error of some hundred steps of 1e-10
     assert from_below == pytest.approx(2 * np.arcsin(np.sqrt(m) * sn), abs=1e-7)
     assert cn.shape == dn.shape
 
 
-def test_computed_torque_control_makes_the_error_a_damped_oscillator(puma560: Robot) -> None:
+def test_the_error_of_computed_torque_control_is_critically_damped(puma560: Robot) -> None:
     """tau = rne(q, qd, qdd_r + KP e + KD e') gives e'' + 20 e' + 100 e = 0: e = e0 (1 + 10 t) exp(-10 t)."""
     robot = puma560.nofriction()
     qf = np.array([0.5, 0.9, -0.8, 0.6, -0.4, 1.0])

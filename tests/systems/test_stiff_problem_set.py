@@ -1,4 +1,4 @@
-"""Stiff problems of the Bari test set as diagrams, against its published end values."""
+"""Stiff problems of the Bari test set as diagrams, compared with the published end values."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ OREGONATOR_END = (0.1000814870318523e1, 0.1228178521549917e4, 0.1320554942846706
 
 
 def pollution() -> tuple[str, ...]:
-    """25 reactions of 20 substances: which reactions make (+) and use up (-) each."""
+    """25 reactions of 20 substances, with the reactions that produce (+) and consume (-) each substance."""
     rates = (
         0.35,
         26.6,
@@ -166,10 +166,10 @@ def equations(rates: tuple[str, ...], start: tuple[float, ...]) -> ab.Diagram:
     ],
     ids=["HIRES", "OREGO", "pollution"],
 )
-def test_the_end_values_are_those_published(
+def test_end_values_agree_with_the_published_ones(
     diagram: ab.Diagram, stop: float, end: tuple[float, ...], atol: float, solver: str
 ) -> None:
-    """The mixed error of the test set, at rtol 1e-7; errors of some hundred steps add up to a few."""
+    """The mixed error of the test set is a small multiple of rtol = 1e-7 after some hundred steps."""
     rtol = 1e-7
     found = ab.simulate(diagram, stop_time=stop, rtol=rtol, atol=atol, solver=solver)
     error = np.abs(found["y"][-1] - np.array(end)) / (atol / rtol + np.abs(end))
@@ -182,17 +182,17 @@ E5 = (
     "7.89e-10*u[1] - 1.1e7*u[1]*u[3] + 1.13e3*u[4] - 1.13e9*u[2]*u[3]",
     "1.1e7*u[1]*u[3] - 1.13e3*u[4]",
 )
-"""Enright, Hull, Lindberg 1975, with the end of Hairer and Wanner, *Solving ODEs II*, section IV.10."""
+"""Enright, Hull, Lindberg 1975; end time of Hairer and Wanner, *Solving ODEs II*, section IV.10."""
 E5_AT_10 = (1.7599259497677897e-3, 1.3846281519376516e-11, 7.6370038530073912e-13, 1.3082581134075777e-11)
 
 
-def test_e5_is_followed_until_nothing_but_rounding_is_left() -> None:
+def test_e5_is_integrated_until_only_rounding_errors_remain() -> None:
     diagram = equations(E5, (1.76e-3, 0.0, 0.0, 0.0))
     settings = {"rtol": 1e-9, "atol": 1e-24, "solver": "rodas5p"}
     early = ab.simulate(diagram, stop_time=10.0, **settings)["y"][-1]
     assert early == pytest.approx(E5_AT_10, rel=1e-8)
-    # y2 = y3 + y4 holds exactly, but rates of 1e-7 /s, rounded to 1e-23 /s, are taken over steps of hundreds
-    # of seconds: some 1e-21 of y2 stays behind when all else has decayed, with SciPy's Radau and BDF too.
+    # y2 = y3 + y4 holds exactly, but rates of 1e-7 1/s have rounding errors of 1e-23 1/s, integrated over
+    # steps of hundreds of seconds: about 1e-21 of y2 remains, with SciPy's Radau and BDF as well.
     late = ab.simulate(diagram, stop_time=1e13, **settings)["y"][-1]
     assert np.abs(late).max() < 1e-19
     assert abs(late[1] - late[2] - late[3]) < 1e-19

@@ -1,4 +1,4 @@
-"""Second-order integrators, moving limits, limited rates and sampled logic, against closed forms."""
+"""Second-order integrators, variable limits, limited rates and sampled logic compared with closed forms."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def run(request: pytest.FixtureRequest) -> Run:
 
 
 def close(found: np.ndarray, expected: np.ndarray, tolerance: float = 5e-9) -> None:
-    # rtol 1e-10 over a few hundred steps; RK4 of 0.01 on sines: h^4/120 = 1e-10
+    # rtol 1e-10 over a few hundred steps; RK4 with h = 0.01 s on sines: h^4/120 = 1e-10
     assert found == pytest.approx(expected, abs=tolerance)
 
 
@@ -86,7 +86,7 @@ def ball(rest_speed: float = 1e-6, height: float = 1.0, speed: float = 0.0, keep
 
 
 @NATIVE
-def test_a_spring_of_one_block(run: Run) -> None:
+def test_a_spring_and_mass_with_a_second_order_integrator(run: Run) -> None:
     builder = DiagramBuilder("d")
     mass = builder.add("mass", SecondOrderIntegrator(initial=1.0, initial_speed=2.0))
     builder.connect(builder.add("spring", Gain(gain=-4.0), mass["x"]), mass["u"])
@@ -96,8 +96,8 @@ def test_a_spring_of_one_block(run: Run) -> None:
 
 
 @NATIVE
-def test_a_ball_bounces_comes_to_rest_and_time_goes_on(run: Run) -> None:
-    """Its bounces would end at t1 (1 + e) / (1 - e); below the rest speed it lies still, exactly."""
+def test_a_ball_bounces_and_comes_to_rest_while_the_run_continues(run: Run) -> None:
+    """The bounces end at t1 (1 + e) / (1 - e); below the rest speed the ball is exactly at rest."""
     found = run(ball(), 4.0)
     t, first = found["t"], math.sqrt(2 / 9.81)
     starts, speed, start = [], 9.81 * first, first
@@ -105,7 +105,7 @@ def test_a_ball_bounces_comes_to_rest_and_time_goes_on(run: Run) -> None:
         speed *= 0.7
         starts.append((start, speed))
         start += 2 * speed / 9.81
-    assert start == pytest.approx(2.55863396558581, abs=1e-6)  # the published end of the bounces
+    assert start == pytest.approx(2.55863396558581, abs=1e-6)  # the published end time of the bounces
     expected = np.where(t < first, 1 - 9.81 * t**2 / 2, 0.0)
     for begins, v in starts:
         within = (t >= begins) & (t < begins + 2 * v / 9.81)
@@ -118,7 +118,7 @@ def test_a_ball_bounces_comes_to_rest_and_time_goes_on(run: Run) -> None:
 
 
 @NATIVE
-def test_a_ball_at_rest_is_thrown_up_again(run: Run) -> None:
+def test_a_mass_at_rest_on_its_limit_is_accelerated_away(run: Run) -> None:
     builder = DiagramBuilder("d")
     motion = SecondOrderIntegratorLimited(initial=0.5, lower=0.0)
     push = builder.add("push", Step(time=1.0, initial=-1.0, final=2.0))
@@ -146,7 +146,7 @@ def test_speed_and_position_have_limits(run: Run) -> None:
     assert found["mass/dx"][(abs(t - 2.5) > 0.01)] == pytest.approx(speed[abs(t - 2.5) > 0.01], abs=1e-9)
 
 
-def test_a_limit_of_the_position_needs_a_speed_of_zero() -> None:
+def test_limits_of_the_speed_must_include_zero_if_the_position_is_limited() -> None:
     message = r"x has a limit, and dx is held between -inf and -1\.0\. Allowed: lower_speed <= 0"
     with pytest.raises(InputError, match=message):
         SecondOrderIntegratorLimited(initial=1.0, lower=0.0, upper_speed=-1.0)
@@ -156,8 +156,8 @@ def test_a_limit_of_the_position_needs_a_speed_of_zero() -> None:
     SecondOrderIntegratorLimited(lower=0.0, lower_speed=1.0)
 
 
-def test_moving_limits(run: Run) -> None:
-    """The integral of a ramp that meets the falling limit 2 - t/2 at t = 4/3."""
+def test_an_integrator_with_variable_limits(run: Run) -> None:
+    """The integral of a ramp reaches the falling limit 2 - t/2 at t = 4/3."""
     for kind, name in ((SaturationDynamic, "held"), (DeadZoneDynamic, "rest")):
         builder = DiagramBuilder("d")
         t = builder.add("t", Clock())
@@ -193,7 +193,7 @@ def test_crossings_are_counted_and_timed(run: Run) -> None:
 
 
 def test_a_sine_whose_rate_is_limited(run: Run) -> None:
-    """sin t rises at 0.5 from 0 until it meets sin again; where |cos| <= 0.5 it follows."""
+    """The output rises with rate 0.5 from 0 until it reaches sin t, which it follows where |cos t| <= 0.5."""
     builder = DiagramBuilder("d")
     limited = builder.add(
         "limited", RateLimiterContinuous(rising=0.5, falling=-0.5), builder.add("u", SineWave())
@@ -214,7 +214,7 @@ def test_a_sine_whose_rate_is_limited(run: Run) -> None:
     expected = np.select(
         [t < up, t < leaves, t < down], [0.5 * t, np.sin(t), math.sin(leaves) - 0.5 * (t - leaves)], np.sin(t)
     )
-    # after meeting sin at `down` it rises faster than 0.5 at once: 0.5 again
+    # after it reaches sin t at `down`, sin t rises faster than 0.5: limited to 0.5 again
     value = math.sin(down)
     after = np.minimum(np.sin(t), value + 0.5 * (t - down)) if math.cos(down) > 0.5 else np.sin(t)
     close(found["limited/y"], np.where(t < down, expected, after), 2e-6)
@@ -227,7 +227,7 @@ def test_a_jump_becomes_a_ramp(run: Run) -> None:
     close(found["limited/y"], np.clip(2.0 * (found["t"] - 1.0), 0.0, 3.0), 1e-9)
 
 
-def test_limits_that_stand_still_limit_as_the_parameters_do(run: Run) -> None:
+def test_constant_limit_signals_agree_with_limit_parameters(run: Run) -> None:
     builder = DiagramBuilder("d")
     u = builder.add("u", SineWave())
     builder.add("fixed", RateLimiterContinuous(rising=0.5, falling=-0.3), u)
@@ -237,8 +237,8 @@ def test_limits_that_stand_still_limit_as_the_parameters_do(run: Run) -> None:
     close(found["moving/y"], found["fixed/y"], 1e-9)
 
 
-def test_a_limit_that_falls_below_the_rate_takes_hold(run: Run) -> None:
-    """u = t, limit 2 - t: followed until t = 1, then y' = 2 - t."""
+def test_a_rate_limit_that_falls_below_the_rate_of_the_input_takes_effect(run: Run) -> None:
+    """u = t, limit 2 - t: y = u until t = 1, then y' = 2 - t."""
     builder = DiagramBuilder("d")
     rising = builder.add(
         "rising", Sum(signs="+-"), builder.add("two", Constant(value=2.0)), builder.add("t", Clock())
@@ -251,8 +251,8 @@ def test_a_limit_that_falls_below_the_rate_takes_hold(run: Run) -> None:
     close(found["y/y"], np.where(t < 1.0, t, 1.0 + (0.5 - (2.0 - t) ** 2 / 2)), 1e-8)
 
 
-def test_a_jump_follows_a_limit_that_grows(run: Run) -> None:
-    """After a jump by 2 at 1 s with the limit t: t^2/2 - 1/2 = 2, met at sqrt(5) s."""
+def test_after_a_jump_the_output_rises_with_a_growing_rate_limit(run: Run) -> None:
+    """After a jump by 2 at 1 s with the rate limit t, y = t^2/2 - 1/2 reaches 2 at sqrt(5) s."""
     builder = DiagramBuilder("d")
     jump, clock = builder.add("u", Step(time=1.0, final=2.0)), builder.add("t", Clock())
     builder.add("y", RateLimiterDynamic(), clock, jump, builder.add("f", Constant(value=-1.0)))
@@ -265,7 +265,7 @@ def test_a_jump_follows_a_limit_that_grows(run: Run) -> None:
 
 
 def at_ticks(block: Block, *courses: list[float]) -> dict[str, list[float]]:
-    """Outputs of a block with the period 1 s for inputs that are given tick by tick."""
+    """Return the outputs of a block with the period 1 s for inputs given for each tick."""
     builder = DiagramBuilder("d")
     n = len(courses[0])
     fed = [
@@ -334,5 +334,5 @@ def test_a_delay_of_variable_length() -> None:
         builder.build()
 
 
-def test_they_are_in_the_library() -> None:
+def test_the_tested_blocks_are_in_the_library() -> None:
     assert {"SecondOrderIntegratorLimited", "RateLimiterContinuous", "EdgeDetection"} <= set(BLOCKS)

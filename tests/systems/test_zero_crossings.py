@@ -1,4 +1,4 @@
-"""Blocks that switch by their values: the instants are found exactly, by fixed and adaptive steps alike."""
+"""Switching blocks: the zero crossings are located exactly with fixed and adaptive steps."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ RUNS: dict[str, Run] = {"adaptive": native("rk45"), "fixed": native("rk4", 0.01)
 
 
 NATIVE = pytest.mark.parametrize("run", [RUNS["adaptive"], RUNS["fixed"]], ids=["adaptive", "fixed"])
-"""Tables that are read by index are beyond the reference, as CasADi does not know such reads."""
+"""The reference does not support indexed tables, which CasADi has no operation for."""
 
 
 @pytest.fixture(params=RUNS.values(), ids=list(RUNS))
@@ -93,12 +93,12 @@ def run(request: pytest.FixtureRequest) -> Run:
 
 
 def behind(block: Block, *sources: Block) -> Diagram:
-    """A block behind sources, with the integral of its first output, which tells when it switched."""
+    """Sources, a block, and the integral of its first output, which depends on the switching times."""
     return all_behind({"": block}, *sources)
 
 
 def all_behind(blocks: Mapping[str, Block], *sources: Block) -> Diagram:
-    """Blocks side by side behind the same sources; the integral of the block ``k`` is ``integral k``."""
+    """Blocks in parallel with the same sources; the integral of the block ``k`` is ``integral k``."""
     builder = DiagramBuilder("d")
     fed = [builder.add(f"source{k}", source) for k, source in enumerate(sources)]
     for key, block in blocks.items():
@@ -108,12 +108,12 @@ def all_behind(blocks: Mapping[str, Block], *sources: Block) -> Diagram:
 
 
 def close(found: np.ndarray, expected: np.ndarray, tolerance: float = 5e-9) -> None:
-    # rtol 1e-10 over a few hundred steps; RK4 of 0.01 on sines: h^4/120 = 1e-10
+    # rtol 1e-10 over a few hundred steps; RK4 with h = 0.01 s on sines: h^4/120 = 1e-10
     assert found == pytest.approx(expected, abs=tolerance)
 
 
 def time_above(level: float, t: np.ndarray) -> np.ndarray:
-    """How long sin has exceeded ``level`` by the time t, from its arcs."""
+    """Return how long the sine was above ``level`` until the time t."""
     first, last = math.asin(level), math.pi - math.asin(level)
     rounds = np.floor(t / (2 * math.pi))
     rest = t - 2 * math.pi * rounds
@@ -131,7 +131,7 @@ def test_the_absolute_value_of_a_sine(run: Run) -> None:
     close(found["integral/y"], 4.0 * whole + 2.0 * (1.0 - np.cos(found["t"] - math.pi * whole)), 2e-8)
 
 
-def test_the_derivative_of_an_absolute_value_is_smooth_between_events(run: Run) -> None:
+def test_the_derivative_of_an_absolute_value_jumps_only_at_events(run: Run) -> None:
     builder = DiagramBuilder("d")
     absolute = builder.add("abs", Abs(), builder.add("sine", SineWave()))
     builder.add("integral", Integrator(), builder.add("rate", Derivative(), absolute))
@@ -139,7 +139,7 @@ def test_the_derivative_of_an_absolute_value_is_smooth_between_events(run: Run) 
     close(found["integral/y"], np.abs(np.sin(found["t"])))
 
 
-def test_a_comparison_is_true_for_as_long_as_it_should(run: Run) -> None:
+def test_the_durations_of_comparisons_are_exact(run: Run) -> None:
     parts = {">": 1.0, ">=": 1.0, "<": 0.0, "<=": 0.0, "==": None, "~=": 2.0}
     cases = {
         f"{relation} {level:+g}".replace(".", ","): (relation, level)
@@ -154,7 +154,7 @@ def test_a_comparison_is_true_for_as_long_as_it_should(run: Run) -> None:
         close(found[f"integral {key}/y"], expected, 1e-9)
 
 
-def test_equal_signals_are_equal_until_one_moves(run: Run) -> None:
+def test_the_maximum_of_equal_signals_is_correct_until_one_changes(run: Run) -> None:
     """max(t, 1) equals 1 up to t = 1."""
     builder = DiagramBuilder("d")
     one = builder.add("one", Constant(value=1.0))
@@ -185,14 +185,14 @@ def test_the_greater_of_sine_and_cosine(run: Run) -> None:
     close(found["integral/y"], np.array([integral(t) for t in found["t"]]))
 
 
-def test_the_place_of_the_greatest_element(run: Run) -> None:
+def test_the_index_of_the_greatest_element(run: Run) -> None:
     builder = DiagramBuilder("d")
     parts = [builder.add(f"s{k}", SineWave(phase=-k * 2 * math.pi / 3)) for k in range(3)]
     three = builder.add("three", Mux(inputs=3), *parts)
     greatest = builder.add("greatest", Extremum(function="max"), three)
     builder.add("integral", Integrator(), greatest["index"])
     found = run(builder.build(), 2 * math.pi)
-    # element 1 leads around pi/2, 2 around 7 pi/6, 3 around 11 pi/6, each for a third of the turn
+    # element 1 is greatest around pi/2, 2 around 7 pi/6, 3 around 11 pi/6, each for a third of the period
     t, third = found["t"], 2 * math.pi / 3
     first = math.pi / 6
     expected = (
@@ -201,7 +201,7 @@ def test_the_place_of_the_greatest_element(run: Run) -> None:
     close(found["integral/y"], expected + 3 * np.clip(t - first - 2 * third, 0, None), 1e-9)
 
 
-def test_an_index_that_grows_throws_the_switch(run: Run) -> None:
+def test_a_growing_index_selects_the_inputs_of_a_multiport_switch(run: Run) -> None:
     values = [Constant(value=float(value)) for value in (5.0, -1.0, 2.0)]
     found = run(behind(MultiportSwitch(), Clock(), *values), 5.0)
     t = found["t"]
@@ -211,7 +211,7 @@ def test_an_index_that_grows_throws_the_switch(run: Run) -> None:
 
 
 def test_roundings_of_a_sine(run: Run) -> None:
-    """The integral of a sum of comparisons, each of which is known."""
+    """A rounded sine is a sum of comparisons, whose integrals are known."""
     functions = ("floor", "ceil", "round", "fix")
     blocks = {function: Rounding(function=function) for function in functions}
     found = run(all_behind(blocks, SineWave(amplitude=2.5)), 10.0)
@@ -234,7 +234,7 @@ def test_roundings_of_a_sine(run: Run) -> None:
 
 
 def test_remainders_of_a_sine(run: Run) -> None:
-    """u - n v with the count n a sum of comparisons, each of which is known."""
+    """The remainder is u - n v; the quotient n is a sum of comparisons, whose integrals are known."""
     for function, divisors in (("mod", (1.0, -0.7)), ("rem", (0.7, -1.0))):
         found = run(
             behind(Modulo(function=function), SineWave(amplitude=2.5), Constant(value=divisors)), 10.0
@@ -258,8 +258,8 @@ def remainder_integral(function: str, divisor: float, t: np.ndarray) -> np.ndarr
     return 2.5 * (1 - np.cos(t)) - step * turns
 
 
-def test_the_difference_of_turning_angles_jumps_where_they_are_opposite(run: Run) -> None:
-    """3 t - 1 wrapped: a sawtooth between -pi and pi, whose integral is that of its parabolas."""
+def test_the_difference_of_rotating_angles_jumps_when_they_are_opposite(run: Run) -> None:
+    """3 t - 1, wrapped to a sawtooth between -pi and pi; its integral consists of parabolas."""
     found = run(behind(AngleDifference(), Ramp(slope=3.0), Constant(value=1.0)), 10.0)
     angle = 3 * found["t"] - 1
     wrapped = np.mod(angle + math.pi, 2 * math.pi) - math.pi
@@ -271,8 +271,8 @@ METHODS = ("linear", "nearest", "flat")
 
 @pytest.mark.parametrize("count", [3, 20])
 @NATIVE
-def test_a_path_across_a_surface_meets_every_border(count: int, run: Run) -> None:
-    """The integral along a straight path, cell by cell by Gauss's rule, exact for the quadratics there."""
+def test_steps_end_at_every_cell_boundary_of_a_surface(count: int, run: Run) -> None:
+    """The integral along a straight path agrees with Gauss's rule for each cell, exact for quadratics."""
     random = np.random.default_rng(count)
     axes = [np.cumsum(random.uniform(0.5, 1.5, n)) * 3 / count for n in (count, count - 1)]
     table = random.normal(size=(count, count - 1))
@@ -305,8 +305,8 @@ def test_a_path_across_a_surface_meets_every_border(count: int, run: Run) -> Non
 
 @pytest.mark.parametrize("count", [4, 40])
 @NATIVE
-def test_an_interval_that_is_found_before_changes_at_an_event(count: int, run: Run) -> None:
-    """Index and fraction of a ramp; the index as a staircase, the fraction as a sawtooth."""
+def test_the_index_of_a_prelookup_changes_at_events(count: int, run: Run) -> None:
+    """For a ramp the index is a staircase and the fraction a sawtooth."""
     x = np.cumsum(np.random.default_rng(count).uniform(0.5, 1.5, count)) * 4 / count
     builder = DiagramBuilder("d")
     u = builder.add("u", Ramp(slope=1.0))
@@ -326,8 +326,8 @@ def test_an_interval_that_is_found_before_changes_at_an_event(count: int, run: R
         close(found[f"f {extrapolation}/y"], np.interp(t, fine, area), 1e-9)
 
 
-def test_the_kinks_of_a_curve_that_moves(run: Run) -> None:
-    """Points at 1 and 2 + t/2, values 0 and 1, read at t: 0, then (t - 1) / (1 + t/2), then 1 from t = 4."""
+def test_the_kinks_of_a_curve_with_variable_points(run: Run) -> None:
+    """Points at 1 and 2 + t/2, values 0 and 1, at t: 0, then (t - 1) / (1 + t/2), then 1 after t = 4."""
     builder = DiagramBuilder("d")
     positions = builder.add("x", Ramp(initial=[1.0, 2.0], slope=[0.0, 0.5]))
     curve = builder.add(
@@ -341,7 +341,7 @@ def test_the_kinks_of_a_curve_that_moves(run: Run) -> None:
     found = run(builder.build(), 6.0)
     t = found["t"]
 
-    def rising(s: np.ndarray) -> np.ndarray:  # of (s - 1) / (1 + s / 2) = 2 - 6 / (s + 2)
+    def rising(s: np.ndarray) -> np.ndarray:  # integral of (s - 1) / (1 + s / 2) = 2 - 6 / (s + 2)
         return 2 * (s - 1) - 6 * np.log((s + 2) / 3)
 
     expected = np.select([t < 1, t < 4], [0 * t, rising(np.maximum(t, 1))], rising(np.array(4.0)) + t - 4)
@@ -379,7 +379,7 @@ def test_the_kinks_and_steps_of_a_table(run: Run) -> None:
     def integral(end: float, method: str, extrapolation: str) -> float:
         total, nodes = 0.0, [b for b in borders if b < end] + [end]
         for a, b in pairwise(nodes):
-            m = (a + b) / 2  # each piece is a line
+            m = (a + b) / 2  # each piece is linear
             total += (b - a) * curve(m, method, extrapolation)
         return total
 
@@ -389,7 +389,7 @@ def test_the_kinks_and_steps_of_a_table(run: Run) -> None:
 
 
 def test_the_limits_of_a_drive(run: Run) -> None:
-    """Wanted 15, peak 10, line 20 (1 - w/100) with w = 20 t: 10 up to t = 2.5, then falling, -10 from 7.5."""
+    """Input 15, peak 10, limit 20 (1 - w/100), w = 20 t: 10 until t = 2.5, then falling, -10 after 7.5."""
     builder = DiagramBuilder("d")
     speed = builder.add("w", Gain(gain=20.0), builder.add("t", Clock()))
     drive = builder.add("drive", MotorDrive(), builder.add("wanted", Constant(value=15.0)), speed)
@@ -405,7 +405,7 @@ def test_the_limits_of_a_drive(run: Run) -> None:
 
 
 def test_a_mass_between_stops(run: Run) -> None:
-    """Against an elastic stop without damping: half a period of the spring, then back with the same speed."""
+    """An elastic stop without damping: contact for half a spring period, then the reversed speed."""
     builder = DiagramBuilder("d")
     stops = JointStops(lower=-1.0, upper=1.0, stiffness=100.0, damping=0.0)
     q = builder.add("q", Integrator(initial=0.0))
@@ -418,12 +418,12 @@ def test_a_mass_between_stops(run: Run) -> None:
     back = 1.0 - (t - 1.0 - half)
     final = -1.0 - np.sin(10 * (t - 3.0 - half)) / 10
     expected = np.select([t < 1, t < 1 + half, t < 3 + half], [t, inside, back], final)
-    # RK4 of 0.01 on a spring of 10 rad/s: (0.1)^4 / 120 of an amplitude of 0.1, a radian or six
+    # RK4 with h = 0.01 s on a spring of 10 rad/s: (0.1)^4 / 120 of the amplitude 0.1 per radian
     close(found["q/y"], expected, 2e-6)
 
 
-def test_modes_settle_through_a_chain(run: Run) -> None:
-    """Each answer depends on the one before: |-2| = 2, 2 > 1, so the switch gives 7."""
+def test_modes_of_a_chain_of_blocks_become_consistent(run: Run) -> None:
+    """Each mode depends on the one before: |-2| = 2, 2 > 1, so the switch outputs 7."""
     builder = DiagramBuilder("d")
     size = builder.add("size", Abs(), builder.add("u", Constant(value=-2.0)))
     slowly = builder.add("moved", Sum(signs="++"), size, builder.add("t", Clock()))
@@ -437,14 +437,14 @@ def test_modes_settle_through_a_chain(run: Run) -> None:
 
 
 @pytest.mark.parametrize("run", [RUNS["adaptive"], RUNS["fixed"]], ids=["adaptive", "fixed"])
-def test_a_root_behind_an_absolute_value_goes_past_its_zero(run: Run) -> None:
-    """With the mode as it is, a step past the zero asks for roots of negative numbers: it is cut short."""
+def test_a_square_root_of_an_absolute_value_is_integrated_across_its_zero(run: Run) -> None:
+    """With a constant mode, a step across the zero needs roots of negative numbers: the step is shortened."""
     builder = DiagramBuilder("d")
     root = builder.add("root", Sqrt(), builder.add("abs", Abs(), builder.add("sine", SineWave())))
     builder.add("integral", Integrator(), root)
     found = run(builder.build(), 4.0)
     assert np.isfinite(found["integral/y"]).all()
-    # Beta function: the integral of sqrt(sin) over half a turn; the root's slope is infinite at the ends
+    # Beta function: the integral of sqrt(sin) over half a period; its derivative is infinite at the ends
     half = math.gamma(0.75) * math.sqrt(math.pi) / math.gamma(1.25)
     at = np.searchsorted(found["t"], math.pi)
     assert found["integral/y"][at] == pytest.approx(half, abs=5e-3)
@@ -458,7 +458,7 @@ def test_without_zero_crossings_there_are_no_events() -> None:
     assert plain["integral/y"] == pytest.approx(exact["integral/y"] / 2.0, abs=1e-6)
 
 
-def test_what_only_changes_at_ticks_needs_no_events() -> None:
+def test_signals_that_change_only_at_ticks_cause_no_events() -> None:
     builder = DiagramBuilder("d")
     held = builder.add("held", ZeroOrderHold(sample_time=0.1), builder.add("sine", SineWave()))
     positive = builder.add("positive", CompareToZero(relation=">"), builder.add("abs", Abs(), held))
@@ -469,8 +469,8 @@ def test_what_only_changes_at_ticks_needs_no_events() -> None:
     assert result["integral/y"][-1] == pytest.approx(9.9, abs=1e-9)
 
 
-def test_an_event_at_a_recorded_instant_shows_the_new_value(run: Run) -> None:
-    """t reaches 0.5, 1 and 1.5 exactly at samples: signals are right-continuous there."""
+def test_a_sample_at_an_event_has_the_new_value(run: Run) -> None:
+    """t reaches 0.5, 1 and 1.5 exactly at samples, where signals are right-continuous."""
     builder = DiagramBuilder("d")
     t = builder.add("t", Clock())
     for k, level in enumerate((0.5, 1.0, 1.5)):
@@ -484,19 +484,19 @@ def test_an_event_at_a_recorded_instant_shows_the_new_value(run: Run) -> None:
 
 @pytest.mark.parametrize("run", [RUNS["adaptive"], RUNS["fixed"]], ids=["adaptive", "fixed"])
 def test_a_tank_that_empties_through_a_hole(run: Run) -> None:
-    """Torricelli: h' = -2 sqrt(h) from 1 is (1 - t)^2 up to t = 1, and then the tank stays empty."""
+    """Torricelli: h' = -2 sqrt(h) with h(0) = 1 is (1 - t)^2 until t = 1; then the tank stays empty."""
     builder = DiagramBuilder("d")
     level = builder.add("level", Integrator(initial=1.0))
     zero = builder.add("zero", Constant(value=0.0))
     positive = builder.add("positive", MinMax(function="max"), level, zero)
     builder.connect(builder.add("out", Gain(gain=-2.0), builder.add("root", Sqrt(), positive)), level["u"])
     found = run(builder.build(), 2.0)
-    # the root's slope grows without bound towards the end
+    # the derivative of the root is unbounded towards the end
     close(found["level/y"], np.clip(1.0 - found["t"], 0.0, None) ** 2, 1e-5)
 
 
-def test_a_dip_that_is_over_within_a_step_is_seen() -> None:
-    """A parabola that is below its level for 0.02 s only, without states that would hold the steps short."""
+def test_a_dip_that_is_shorter_than_a_step_is_detected() -> None:
+    """A parabola that is below its level for only 0.02 s, without states that limit the steps."""
     builder = DiagramBuilder("d")
     t = builder.add("t", Clock())
     shifted = builder.add("s", Sum(signs="+-"), t, builder.add("c", Constant(value=0.0)))
@@ -512,8 +512,8 @@ def test_a_dip_that_is_over_within_a_step_is_seen() -> None:
             assert result.run.events == 2
 
 
-def test_modes_settle_where_a_run_goes_on_with_other_parameters() -> None:
-    """At 1 s the level is above 0.5; with the threshold 2.8 it is not, though nothing has crossed it."""
+def test_modes_are_consistent_when_a_run_continues_with_other_parameters() -> None:
+    """At 1 s the level is above 0.5 but below the new threshold 2.8, without a crossing."""
     builder = DiagramBuilder("d")
     level = builder.add("level", Integrator(), builder.add("one", Constant(value=1.0)))
     above = builder.add("above", CompareToConstant(relation=">", constant=0.5), level)
