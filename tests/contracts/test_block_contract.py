@@ -25,14 +25,9 @@ from armblocks.diagram import (
     shape_of,
     trace_diagram,
 )
-from armblocks.diagram.block_equations import (
-    BlockEquations,
-    Group,
-    SlotKind,
-    natural,
-    spread,
-    tunable_slots,
-)
+from armblocks.diagram.block_equations import BlockEquations, Group
+from armblocks.diagram.features import Arguments, SlotKind, features_of
+from armblocks.diagram.flat_values import natural, spread, tunable_slots
 from armblocks.diagram.implicit import steps_with
 from armblocks.equations import Slot
 from armblocks.errors import InputError
@@ -90,25 +85,27 @@ def fitting_shapes(block: Block) -> Iterator[Shapes]:
 
 def all_equations(block: Block, shapes: Shapes) -> Function:
     """Return all values of the block's equations as a function of t, x, u, e and p."""
-    states = (*block.states(shapes), *block.discrete_states(shapes), *block.modes(shapes))
-    states += (*block.conditions(shapes), *block.delay_lines(shapes))
-    rates = [Slot(f"{name}'", shapes[name]) for name in block.rated_inputs]
+    features = features_of(block, shapes)
+    states = (*features.states, *features.discrete, *features.modes, *features.conditions, *features.delays)
+    rates = [Slot(f"{name}'", shapes[name]) for name in features.rated_inputs]
     ends = [
         [Slot(state.name, state.shape) for state in states],
         [Slot(name, shape) for name, shape in shapes.items()] + rates,
-        [Slot(guard.name, guard.shape) for guard in block.guards(shapes)],
+        [Slot(guard.name, guard.shape) for guard in features.guards],
         list(tunable_slots(block)),
     ]
     t, *symbols = SX.sym("t"), *(SX.sym("s", sum(slot.size for slot in slots)) for slots in ends)
     x, u, e, p = (dict(natural(slots, symbol)) for slots, symbol in zip(ends, symbols))
     if block.sampled:
         p["T"] = SX(0.1)
-    found = [block.outputs(t, x, u, p), block.derivatives(t, x, u, p), block.records(t, x, u, p)]
-    found += [block.updates(t, x, u, p), block.guard_values(t, x, u, p), block.mode_values(t, x, u, p)]
-    found += [block.condition_values(t, x, u, p), block.delay_times(t, x, u, p), block.initial_past(p)]
-    found += [{name: bound[k] for name, bound in block.delay_bounds(p).items()} for k in (0, 1)]
-    found += [block.resets(t, x, u, p, e) if block.guards(shapes) else {}, block.initial_outputs(p)]
-    found += [block.initial_states(p), dict(enumerate(map(SX, block.breakpoints(p))))]
+    found = [
+        equation(Arguments(t, x, u, p, e))
+        for kind, equation in features.equations.items()
+        if kind is not SlotKind.RESET or features.guards
+    ]
+    found += [features.starts(p), features.past(p), features.held(p), features.guesses(p)]
+    found += [{name: bound[k] for name, bound in features.delay_bounds(p).items()} for k in (0, 1)]
+    found += [dict(enumerate(map(SX, features.breakpoints(p))))]
     return Function("f", [t, *symbols], [SX(value) for group in found for value in group.values()])
 
 

@@ -1,7 +1,7 @@
 """Diagrams: blocks, connections, checks, and the translation into equations."""
 
 from armblocks.diagram.block import Block, Shapes, Signals
-from armblocks.diagram.block_equations import BlockEquations, SlotKind, block_equations
+from armblocks.diagram.block_equations import BlockEquations, block_equations
 from armblocks.diagram.builder import BlockHandle, DiagramBuilder
 from armblocks.diagram.bus import Bus, Carried
 from armblocks.diagram.check import check_diagram
@@ -16,6 +16,7 @@ from armblocks.diagram.conditional import (
 from armblocks.diagram.content_key import content_key
 from armblocks.diagram.diagram import ROTATIONS, Connection, Diagram, Note, Placement
 from armblocks.diagram.difference import DiagramDifference, diagram_difference
+from armblocks.diagram.features import SlotKind
 from armblocks.diagram.hierarchy import (
     FlatForm,
     diagram_views,

@@ -258,19 +258,6 @@ class Block(ABC):
         """Guards: quantities whose zero crossings are events."""
         return ()
 
-    def all_modes(self, inputs: Shapes) -> tuple[State, ...]:
-        """The modes, each with a flag that says whether it is a function of the present signals."""
-        return tuple(
-            dataclasses.replace(mode, follows=mode.follows or self.memoryless) for mode in self.modes(inputs)
-        )
-
-    def all_guards(self, inputs: Shapes) -> tuple[Guard, ...]:
-        """The guards, each with a flag that says whether it only locates a mode change."""
-        return tuple(
-            dataclasses.replace(guard, locates=guard.locates or self.memoryless)
-            for guard in self.guards(inputs)
-        )
-
     def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
         """The conditions that the equations read; each may depend on those before it."""
         return ()

@@ -10,37 +10,21 @@ of zero does not remove a dependence.
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from enum import Enum
 from functools import cached_property, lru_cache
 
-from casadi import SX, Function, densify, if_else, jtimes, substitute, vertcat
+from casadi import SX, Function, densify, jtimes, vertcat
 
 from armblocks.diagram.block import Block, Shapes, Signals
-from armblocks.diagram.conditional_equations import FIRE, ConditionalBlock
+from armblocks.diagram.conditional_equations import FIRE, conditional
+from armblocks.diagram.features import Arguments, Features, SlotKind, features_of
+from armblocks.diagram.flat_values import natural, spread, tunable_slots
+from armblocks.diagram.generated_modes import condition_answers, with_memory, with_modes_of_conditions
 from armblocks.diagram.parameter import shape_of
-from armblocks.diagram.port import Condition, DelayLine, Guard, State
-from armblocks.equations import Shape, Slot, call_with_constants, flatten, has_elementary, unflatten
+from armblocks.diagram.port import DelayLine, Guard, State
+from armblocks.equations import Shape, Slot, call_with_constants, has_elementary
 from armblocks.errors import DiagramError
-
-
-class SlotKind(Enum):
-    """The role of a value of a block."""
-
-    OUTPUT = "output"
-    DERIVATIVE = "derivative"
-    RECORD = "record"
-    UPDATE = "update"
-    GUARD = "guard value"
-    MODE = "mode value"
-    CONTRADICTION = "inconsistency of a mode"
-    RESET = "reset"
-    DELAYED = "delayed signal"
-    DELAYED_RATE = "derivative of a delayed signal"
-    DELAY = "delay"
-    CAPTURE = "capture"
 
 
 @dataclass(frozen=True)
@@ -116,6 +100,8 @@ class Group:
 class BlockEquations:
     """All equations of one block: its states and its groups of slots."""
 
+    features: Features
+    """What the block declares, gated by the subsystem that contains it."""
     states: tuple[State, ...]
     discrete: tuple[State, ...]
     """Discrete states, then delayed values, then their derivatives (``name'``), then modes."""
@@ -179,63 +165,25 @@ def block_equations(
     )
 
 
-def tunable_slots(block: Block) -> tuple[Slot, ...]:
-    """The tunable parameters of a block, in order."""
-    return tuple(
-        Slot(rule.name, shape_of(block.parameter_value(rule.name)), rule.unit)
-        for rule in block.inputs_of_the_run()
-    )
-
-
-def natural(slots: Sequence[Slot], flat: SX) -> Signals:
-    """Split a flat column into named values of natural shape."""
-    values: dict[str, SX] = {}
-    start = 0
-    for slot in slots:
-        values[slot.name] = unflatten(flat[start : start + slot.size], slot.shape)
-        start += slot.size
-    return values
-
-
-def spread(value: SX, shape: Shape) -> SX:
-    """The flat column of a value; a scalar is broadcast to the shape."""
-    slot = Slot("", shape)
-    if value.numel() == 1:
-        return densify(SX.ones(slot.size) * value)
-    return flatten(value, shape)
-
-
-def _gated(structure: _Structure) -> tuple[Block, dict[str, Shape]]:
-    """The block with its hidden inputs, if it is in a conditional subsystem, and the shapes of all inputs."""
-    shapes = dict(structure.input_shapes)
-    if not structure.hidden:
-        return structure.block, shapes
-    block = ConditionalBlock(
-        block=structure.block,
-        hidden=structure.hidden,
-        clocked=structure.clocked,
-        ticking=structure.settled or structure.clocked,
-    )
-    return block, shapes | dict.fromkeys(structure.hidden, ())
-
-
 @lru_cache(maxsize=1024)
 def _trace(structure: _Structure) -> BlockEquations:
-    block, shapes = _gated(structure)
-    states, discrete, lines = block.states(shapes), block.discrete_states(shapes), block.delay_lines(shapes)
-    past = tuple(State(f"{line.name}{mark}", line.shape, line.doc) for mark in ("", "'") for line in lines)
-    conditions = block.conditions(shapes)
+    own = features_of(structure.block, dict(structure.input_shapes))
+    if structure.hidden:
+        ticking = structure.settled or structure.clocked
+        own = conditional(own, structure.hidden, clocked=structure.clocked, ticking=ticking)
     # Conditions whose change is an event are modes; the others are evaluated directly.
-    located = () if structure.settled else tuple(entry for entry in conditions if entry.located)
-    asked = tuple(entry for entry in conditions if entry not in located)
-    modes, guards = _modes_and_guards(block, shapes, located)
-    discrete += tuple(dataclasses.replace(mode, name=mode.before) for mode in modes if mode.remembers)
+    located = () if structure.settled else tuple(entry for entry in own.conditions if entry.located)
+    asked = tuple(entry for entry in own.conditions if entry not in located)
+    features = with_modes_of_conditions(with_memory(own), located)
+    past = tuple(
+        State(f"{line.name}{mark}", line.shape, line.doc) for mark in ("", "'") for line in features.delays
+    )
     ends = {
-        "x": [Slot(state.name, state.shape) for state in states],
-        "z": [Slot(state.name, state.shape) for state in (*discrete, *past, *modes)],
-        "u": [Slot(name, shape) for name, shape in shapes.items()]
-        + [Slot(f"{name}'", shapes[name]) for name in structure.block.rated_inputs],
-        "e": [Slot(guard.name, guard.shape) for guard in guards],
+        "x": [Slot(state.name, state.shape) for state in features.states],
+        "z": [Slot(state.name, state.shape) for state in (*features.discrete, *past, *features.modes)],
+        "u": [Slot(name, shape) for name, shape in features.inputs.items()]
+        + [Slot(f"{name}'", features.inputs[name]) for name in features.rated_inputs],
+        "e": [Slot(guard.name, guard.shape) for guard in features.guards],
         "p": list(tunable_slots(structure.block)),
     }
     symbols = {letter: SX.sym(letter, sum(slot.size for slot in slots)) for letter, slots in ends.items()}
@@ -243,79 +191,55 @@ def _trace(structure: _Structure) -> BlockEquations:
     x, z, u, e, p = (dict(natural(slots, symbols[letter])) for letter, slots in ends.items())
     if structure.clocked:
         p["T"] = SX(structure.period)
-    x.update(z)
-    x.update(_answers(block, asked, t, x, u, p))
-    # Such a mode follows from its value before the event time, not from values during mode iteration.
-    earlier = x | {mode.name: x[mode.before] for mode in modes if mode.remembers}
-    if structure.settled:
-        x.update(block.mode_values(t, x, u, p))
-    quantities: Signals = block.condition_values(t, x, u, p) if located else {}
-    sides = {entry.name: _sided(quantities[entry.name], entry.closed) for entry in located}
-    answers = {entry.name: _positive(quantities[entry.name], entry.closed) for entry in located}
-    wrong = {name: SX(answer) != x[name] for name, answer in answers.items()}
-
-    state_shapes = {state.name: state.shape for state in (*states, *discrete, *modes)}
-    resets = {**block.resets(t, x, u, p, e), **_sides_after(located, x, e)}
-    captures = block.captures(t, x, u, p)
-    sought: dict[SlotKind, dict[str, Shape]] = {
-        SlotKind.OUTPUT: _output_shapes(structure.block, dict(structure.input_shapes)),
-        SlotKind.DERIVATIVE: {state.name: state.shape for state in states},
-        SlotKind.RECORD: {port.name: port.shape or () for port in block.record_ports()},
-        SlotKind.UPDATE: {state.name: state.shape for state in discrete if structure.clocked},
-        SlotKind.GUARD: {guard.name: guard.shape for guard in guards},
-        SlotKind.MODE: {mode.name: mode.shape for mode in modes},
-        SlotKind.CONTRADICTION: {mode.name: mode.shape for mode in modes},
-        SlotKind.RESET: {name: state_shapes[name] for name in resets if name in state_shapes},
-        SlotKind.DELAYED: {line.name: line.shape for line in lines},
-        SlotKind.DELAYED_RATE: {line.name: line.shape for line in lines},
-        SlotKind.DELAY: {line.name: () for line in lines},
-        SlotKind.CAPTURE: {name: state_shapes[name] for name in captures if name in state_shapes},
-    }
+    at = Arguments(t, {**x, **z}, u, p, e)
+    at = at.with_states(condition_answers(own, asked, at))
+    consistent = at.with_states(own.equations[SlotKind.MODE](at)) if structure.settled else at
     found = {
-        SlotKind.OUTPUT: block.outputs(t, x, u, p),
-        SlotKind.DERIVATIVE: block.derivatives(t, x, u, p),
-        SlotKind.RECORD: block.records(t, x, u, p),
-        SlotKind.UPDATE: block.updates(t, x, u, p),
-        SlotKind.GUARD: {**block.guard_values(t, x, u, p), **sides},
-        SlotKind.MODE: {**block.mode_values(t, earlier, u, p), **answers},
-        SlotKind.CONTRADICTION: {**block.contradictions(t, x, u, p), **wrong},
-        SlotKind.RESET: resets,
-        SlotKind.DELAYED: {line.name: u[line.input] for line in lines},
-        SlotKind.DELAYED_RATE: {line.name: u[f"{line.input}'"] for line in lines},
-        SlotKind.DELAY: block.delay_times(t, x, u, p),
-        SlotKind.CAPTURE: captures,
+        kind: features.equations[kind](at if kind is SlotKind.MODE else consistent)
+        for kind in SlotKind
+        if kind is not SlotKind.CONDITION
     }
+    sought = _sought(features, structure.clocked, found)
     for kind, values in found.items():
-        _check_complete(block, kind, list(sought[kind]), values)
+        _check_complete(structure.block, kind, list(sought[kind]), values)
     slots = [BlockSlot(kind, name, shape) for kind, named in sought.items() for name, shape in named.items()]
     flat = [spread(SX(found[slot.kind][slot.name]), slot.shape) for slot in slots]
     groups = _grouped(slots, flat, t, symbols, ends)
     return BlockEquations(
-        states=states,
-        discrete=(*discrete, *past, *modes),
-        modes=modes,
-        guards=guards,
+        features=own,
+        states=features.states,
+        discrete=(*features.discrete, *past, *features.modes),
+        modes=features.modes,
+        guards=features.guards,
         groups=groups,
-        delays=lines,
-        fixed_delays=frozenset(line.name for line in lines) - _moving_delays(groups),
+        delays=features.delays,
+        fixed_delays=frozenset(line.name for line in features.delays) - _moving_delays(groups),
     )
 
 
-def _modes_and_guards(
-    block: Block, shapes: Shapes, located: Sequence[Condition]
-) -> tuple[tuple[State, ...], tuple[Guard, ...]]:
-    """The modes and guards of a block, plus one of each for every located condition."""
-    modes = (State(entry.name, entry.shape, entry.doc, follows=True) for entry in located)
-    guards = (Guard(entry.name, entry.shape, entry.doc, locates=True) for entry in located)
-    return (*block.all_modes(shapes), *modes), (*block.all_guards(shapes), *guards)
-
-
-def _output_shapes(block: Block, inputs: Shapes) -> dict[str, Shape]:
-    """Shapes of the outputs that have equations."""
-    stated = {port.name: port.shape for port in block.output_ports() if port.shape is not None}
-    found = {**stated, **block.output_shapes(inputs)}
-    names = [port.name for port in block.output_ports() if port.name not in block.time_derivatives]
-    return {name: found[name] for name in names}
+def _sought(
+    features: Features, clocked: bool, found: Mapping[SlotKind, Signals]
+) -> dict[SlotKind, dict[str, Shape]]:
+    """The shapes of all values that the equations of each role have to give."""
+    held = (*features.states, *features.discrete, *features.modes)
+    states = {state.name: state.shape for state in held}
+    modes = {mode.name: mode.shape for mode in features.modes}
+    delayed = {line.name: line.shape for line in features.delays}
+    resets, captures = found[SlotKind.RESET], found[SlotKind.CAPTURE]
+    return {
+        SlotKind.OUTPUT: dict(features.outputs),
+        SlotKind.DERIVATIVE: {state.name: state.shape for state in features.states},
+        SlotKind.RECORD: dict(features.records),
+        SlotKind.UPDATE: {state.name: state.shape for state in features.discrete if clocked},
+        SlotKind.GUARD: {guard.name: guard.shape for guard in features.guards},
+        SlotKind.MODE: modes,
+        SlotKind.CONTRADICTION: modes,
+        SlotKind.RESET: {name: states[name] for name in resets if name in states},
+        SlotKind.DELAYED: delayed,
+        SlotKind.DELAYED_RATE: delayed,
+        SlotKind.DELAY: dict.fromkeys(delayed, ()),
+        SlotKind.CAPTURE: {name: states[name] for name in captures if name in states},
+    }
 
 
 def _moving_delays(groups: Sequence[Group]) -> frozenset[str]:
@@ -326,39 +250,6 @@ def _moving_delays(groups: Sequence[Group]) -> frozenset[str]:
         for slot in group.slots
         if slot.kind is SlotKind.DELAY and (group.timed or group.states or group.discrete or group.inputs)
     )
-
-
-def _positive(quantity: SX, closed: bool) -> SX:
-    return quantity >= 0.0 if closed else quantity > 0.0
-
-
-def _sides_after(located: Sequence[Condition], x: Signals, e: Signals) -> Signals:
-    """The new modes of conditions at events."""
-    return {
-        entry.name: if_else(e[entry.name] == 0.0, x[entry.name], e[entry.name] > 0.0) for entry in located
-    }
-
-
-def _sided(quantity: SX, closed: bool) -> SX:
-    """The quantity with an offset below any signal resolution, which assigns zero to one side."""
-    return quantity + 1e-300 if closed else quantity - 1e-300
-
-
-def _answers(block: Block, asked: Sequence[Condition], t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-    """Conditions from the present values, each substituted into those after it."""
-    unknown = {
-        entry.name: unflatten(SX.sym(entry.name, Slot(entry.name, entry.shape).size), entry.shape)
-        for entry in asked
-    }
-    quantities: Signals = block.condition_values(t, {**x, **unknown}, u, p) if asked else {}
-    found: dict[str, SX] = {}
-    for entry in asked:
-        quantity = SX(quantities[entry.name])
-        for name, value in found.items():
-            quantity = substitute(quantity, unknown[name], value)
-        answer = densify(SX(_positive(quantity, entry.closed)))
-        found[entry.name] = unflatten(spread(answer, entry.shape), entry.shape)
-    return found
 
 
 def _grouped(

@@ -46,11 +46,11 @@ def diagram_model(diagram: Diagram) -> Model:
     sampling = resolve_sampling(diagram, equations)
     moving = moving_blocks(diagram, equations)
     for name in free:
-        block, inputs = diagram.blocks[name], shapes.inputs[name]
         # Conditions that change at instants only need no events.
         still = name not in moving and name not in diagram.gates
-        if still and block.conditions(inputs) and not equations[name].states:
-            equations[name] = _equations(diagram, name, shapes, settled=not block.modes(inputs))
+        features = equations[name].features
+        if still and features.conditions and not features.states:
+            equations[name] = _equations(diagram, name, shapes, settled=not features.modes)
     for name, clock in sampling.clock_of.items():
         period = sampling.clocks[clock].period
         equations[name] = _equations(diagram, name, shapes, period=period)

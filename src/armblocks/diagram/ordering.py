@@ -6,8 +6,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from armblocks.diagram.block_equations import BlockEquations, SlotKind
+from armblocks.diagram.block_equations import BlockEquations
 from armblocks.diagram.diagram import Diagram
+from armblocks.diagram.features import SlotKind
 from armblocks.diagram.port import PortRef
 from armblocks.errors import AlgebraicLoopError
 

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from armblocks.diagram.block import Block
-from armblocks.diagram.block_equations import BlockEquations, SlotKind
+from armblocks.diagram.block_equations import BlockEquations
 from armblocks.diagram.components import strongly_connected
 from armblocks.diagram.diagram import Diagram
+from armblocks.diagram.features import SlotKind
 from armblocks.diagram.parameter import ParameterKind, parameter
 from armblocks.diagram.port import PortRef
 from armblocks.equations import SampleClock

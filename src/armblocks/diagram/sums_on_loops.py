@@ -11,8 +11,9 @@ from __future__ import annotations
 import casadi
 from casadi import SX, Function, substitute, which_depends
 
-from armblocks.diagram.block_equations import Group, SlotKind
+from armblocks.diagram.block_equations import Group
 from armblocks.diagram.components import strongly_connected
+from armblocks.diagram.features import SlotKind
 from armblocks.diagram.ordering import HELD, Evaluation, Network, Node
 
 MOST_UNKNOWNS = 16

@@ -20,13 +20,11 @@ from casadi import (
     vertcat,
 )
 
-from armblocks.diagram.block_equations import (
-    BlockSlot,
-    SlotKind,
-    spread,
-)
+from armblocks.diagram.block_equations import BlockSlot
 from armblocks.diagram.conditional_equations import FIRE, ON
 from armblocks.diagram.diagram import Diagram
+from armblocks.diagram.features import SlotKind
+from armblocks.diagram.flat_values import spread
 from armblocks.diagram.hierarchy import FlatForm, flatten_hierarchy
 from armblocks.diagram.implicit import solve_affine
 from armblocks.diagram.model import Model, diagram_model
@@ -125,7 +123,7 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
         initial_states=function("initial_states", p, x0=_initial_values(model, symbols)),
         initial_discrete=function("initial_discrete", p, z0=_initial_discrete(model, symbols)),
         initial_algebraic=function("initial_algebraic", p, w0=[loops.guesses]),
-        breakpoints=function("breakpoints", p, times=_breakpoints(diagram, symbols)),
+        breakpoints=function("breakpoints", p, times=_breakpoints(model, symbols)),
         aliases=_aliases(form, layout),
         delays=_delays(model, symbols, flow, loops, ends, products),
         loops=_linear_loops(loops, ends),
@@ -201,12 +199,12 @@ def _captured(model: Model, symbols: Symbols, flow: Tracing) -> dict[str, SX]:
     }
 
 
-def _breakpoints(diagram: Diagram, symbols: Symbols) -> list[SX]:
+def _breakpoints(model: Model, symbols: Symbols) -> list[SX]:
     """The breakpoints: times at which sources jump."""
     return [
         SX(time)
-        for name, block in diagram.blocks.items()
-        for time in block.breakpoints(symbols.parameters_of(name))
+        for name, equations in model.flow.equations.items()
+        for time in equations.features.breakpoints(symbols.parameters_of(name))
     ]
 
 
@@ -337,8 +335,7 @@ def _delays(
     for name, equations in model.flow.equations.items():
         if not equations.delays:
             continue
-        block = model.flow.diagram.blocks[name]
-        bounds = block.delay_bounds(symbols.parameters_of(name))
+        bounds = equations.features.delay_bounds(symbols.parameters_of(name))
         for line in equations.delays:
             kinds = (SlotKind.DELAYED, SlotKind.DELAYED_RATE, SlotKind.DELAY)
             u, du, tau = (flow.value(_value(model.flow, name, kind, line.name)) for kind in kinds)
@@ -458,7 +455,7 @@ def _parameter_values(diagram: Diagram) -> dict[str, Any]:
 def _initial_values(model: Model, symbols: Symbols) -> list[SX]:
     values: list[SX] = []
     for name, equations in model.flow.equations.items():
-        given = model.flow.diagram.blocks[name].initial_states(symbols.parameters_of(name))
+        given = equations.features.starts(symbols.parameters_of(name))
         values.extend(spread(SX(given[state.name]), state.shape) for state in equations.states)
     return values
 
@@ -466,11 +463,11 @@ def _initial_values(model: Model, symbols: Symbols) -> list[SX]:
 def _initial_discrete(model: Model, symbols: Symbols) -> list[SX]:
     values: list[SX] = []
     for name, equations in model.flow.equations.items():
-        block, p = model.flow.diagram.blocks[name], symbols.parameters_of(name)
-        given = {**block.initial_states(p), **block.initial_past(p)}
+        features, p = equations.features, symbols.parameters_of(name)
+        given = {**features.starts(p), **features.past(p)}
         values.extend(spread(SX(given.get(state.name, 0.0)), state.shape) for state in equations.discrete)
         if name in model.sampling.clock_of:
-            held = block.initial_outputs(p)
+            held = features.held(p)
             shapes = model.shapes.outputs[name]
             values.extend(spread(SX(held.get(port, 0.0)), shape) for port, shape in shapes.items())
     return values

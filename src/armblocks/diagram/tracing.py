@@ -18,12 +18,9 @@ from casadi import (
 from numpy.typing import NDArray
 
 from armblocks.diagram.block import Signals
-from armblocks.diagram.block_equations import (
-    SlotKind,
-    natural,
-    tunable_slots,
-)
 from armblocks.diagram.conditional_equations import ON
+from armblocks.diagram.features import SlotKind
+from armblocks.diagram.flat_values import natural, tunable_slots
 from armblocks.diagram.implicit import check_solvable, solve_affine
 from armblocks.diagram.model import Model
 from armblocks.diagram.ordering import HELD, Network, Node, Value
@@ -238,10 +235,10 @@ class Implicit:
 
 def _guess(network: Network, symbols: Symbols, value: Value, unknown: SX) -> SX:
     """The start value of an unknown: given by its block, else 0."""
-    block = network.diagram.blocks[value.node.block]
+    block, features = network.diagram.blocks[value.node.block], network.equations[value.node.block].features
     if value.node.order or value.kind is not SlotKind.OUTPUT or value.name not in block.implicit_outputs:
         return SX.zeros(unknown.numel())
-    guess = block.initial_guesses(symbols.parameters_of(value.node.block))[value.name]
+    guess = features.guesses(symbols.parameters_of(value.node.block))[value.name]
     return repmat(guess, unknown.numel(), 1) if guess.numel() == 1 else flatten(guess, guess.shape)
 
 

@@ -1,0 +1,103 @@
+"""Modes, guards and states that follow from declarations: from conditions, and from modes that remember.
+
+Each function takes features and gives features.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+from casadi import SX, densify, if_else, substitute
+
+from armblocks.diagram.block import Signals
+from armblocks.diagram.features import Arguments, Features, SlotKind
+from armblocks.diagram.flat_values import spread
+from armblocks.diagram.port import Condition, Guard, State
+from armblocks.equations import Slot, unflatten
+
+
+def with_memory(features: Features) -> Features:
+    """With a discrete state for every mode that remembers: its value before the event time.
+
+    Such a mode follows from this value, not from values during mode iteration.
+    """
+    remembering = [mode for mode in features.modes if mode.remembers]
+    if not remembering:
+        return features
+    modes = features.equations[SlotKind.MODE]
+
+    def earlier(at: Arguments) -> Signals:
+        return modes(at.with_states({mode.name: at.x[mode.before] for mode in remembering}))
+
+    before = (dataclasses.replace(mode, name=mode.before) for mode in remembering)
+    return dataclasses.replace(
+        features.with_equations({SlotKind.MODE: earlier}), discrete=(*features.discrete, *before)
+    )
+
+
+def with_modes_of_conditions(features: Features, located: Sequence[Condition]) -> Features:
+    """With a mode and a guard for each of these conditions: a change of the condition is an event."""
+    if not located:
+        return features
+    equations = features.equations
+
+    def guards(at: Arguments) -> Signals:
+        quantities = equations[SlotKind.CONDITION](at)
+        sides = {entry.name: _sided(quantities[entry.name], entry.closed) for entry in located}
+        return {**equations[SlotKind.GUARD](at), **sides}
+
+    def answers(at: Arguments) -> dict[str, SX]:
+        quantities = equations[SlotKind.CONDITION](at)
+        return {entry.name: _positive(quantities[entry.name], entry.closed) for entry in located}
+
+    def contradictions(at: Arguments) -> Signals:
+        wrong = {name: SX(answer) != at.x[name] for name, answer in answers(at).items()}
+        return {**equations[SlotKind.CONTRADICTION](at), **wrong}
+
+    def resets(at: Arguments) -> Signals:
+        after = {
+            entry.name: if_else(at.e[entry.name] == 0.0, at.x[entry.name], at.e[entry.name] > 0.0)
+            for entry in located
+        }
+        return {**equations[SlotKind.RESET](at), **after}
+
+    modes = (State(entry.name, entry.shape, entry.doc, follows=True) for entry in located)
+    added = (Guard(entry.name, entry.shape, entry.doc, locates=True) for entry in located)
+    changed = features.with_equations(
+        {
+            SlotKind.GUARD: guards,
+            SlotKind.MODE: lambda at: {**equations[SlotKind.MODE](at), **answers(at)},
+            SlotKind.CONTRADICTION: contradictions,
+            SlotKind.RESET: resets,
+        }
+    )
+    return dataclasses.replace(changed, modes=(*features.modes, *modes), guards=(*features.guards, *added))
+
+
+def condition_answers(features: Features, asked: Sequence[Condition], at: Arguments) -> Signals:
+    """Conditions from the present values, each substituted into those after it."""
+    if not asked:
+        return {}
+    unknown = {
+        entry.name: unflatten(SX.sym(entry.name, Slot(entry.name, entry.shape).size), entry.shape)
+        for entry in asked
+    }
+    quantities = features.equations[SlotKind.CONDITION](at.with_states(unknown))
+    found: dict[str, SX] = {}
+    for entry in asked:
+        quantity = SX(quantities[entry.name])
+        for name, value in found.items():
+            quantity = substitute(quantity, unknown[name], value)
+        answer = densify(SX(_positive(quantity, entry.closed)))
+        found[entry.name] = unflatten(spread(answer, entry.shape), entry.shape)
+    return found
+
+
+def _positive(quantity: SX, closed: bool) -> SX:
+    return quantity >= 0.0 if closed else quantity > 0.0
+
+
+def _sided(quantity: SX, closed: bool) -> SX:
+    """The quantity with an offset below any signal resolution, which assigns zero to one side."""
+    return quantity + 1e-300 if closed else quantity - 1e-300

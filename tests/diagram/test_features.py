@@ -1,0 +1,92 @@
+"""Features of a block: a conditional subsystem changes its equations by their role, whatever they compute."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+import pytest
+from casadi import SX, Function
+
+from armblocks.blocks import Backlash, IntegratorLimited, Relay, Saturation, TransportDelay, UnitDelay
+from armblocks.diagram import Block
+from armblocks.diagram.conditional_equations import ON, RESTART, conditional
+from armblocks.diagram.features import AT_TICKS, Arguments, Features, SlotKind, WhileOff, features_of
+
+BLOCKS = (
+    IntegratorLimited(initial=0.3),
+    Relay(),
+    Backlash(),
+    TransportDelay(),
+    Saturation(),
+    UnitDelay(sample_time=0.1, initial=0.7),
+)
+each_block = pytest.mark.parametrize("block", BLOCKS, ids=lambda block: type(block).__name__)
+
+
+def gated(block: Block, *gate: str) -> tuple[Features, Features]:
+    """The features of a block with one scalar input, alone and in a conditional subsystem."""
+    alone = features_of(block, {"u": ()})
+    return alone, conditional(alone, gate, clocked=block.sampled, ticking=block.sampled)
+
+
+def arguments(block: Block, features: Features, hidden: Mapping[str, float]) -> Arguments:
+    """Fixed pseudo-random states and inputs, no event; hidden inputs and states as given, else 0."""
+    random = np.random.default_rng(3)
+    held = (*features.states, *features.discrete, *features.modes, *features.conditions, *features.delays)
+    before = (mode.before for mode in features.modes if mode.remembers)
+    inputs = (*features.inputs, *(f"{name}'" for name in features.rated_inputs))
+
+    def drawn(names: Iterator[str]) -> dict[str, SX]:
+        return {
+            name: SX(hidden.get(name, 0.0) if name.startswith("?") else random.uniform(0.1, 0.9))
+            for name in names
+        }
+
+    states = drawn(iter((*(entry.name for entry in held), *before)))
+    parameters = {rule.name: SX(block.parameter_value(rule.name)) for rule in block.inputs_of_the_run()}
+    guards = {guard.name: SX(0.0) for guard in features.guards}
+    return Arguments(SX(0.37), states, drawn(iter(inputs)), {**parameters, "T": SX(0.1)}, guards)
+
+
+def number(value: SX) -> float:
+    return float(Function("f", [], [SX(value)])()["o0"])
+
+
+@each_block
+def test_while_the_control_is_off_an_equation_is_zero_kept_or_evaluated(block: Block) -> None:
+    alone, inside = gated(block, ON)
+    at = arguments(block, inside, {ON: 0.0})
+    assert set(inside.equations) == set(SlotKind)
+    for kind, equation in inside.equations.items():
+        plain = alone.equations[kind](at)
+        evaluated = kind.while_off is WhileOff.EVALUATED or (kind in AT_TICKS and not block.sampled)
+        for name, value in equation(at).items():
+            if name.startswith("?"):
+                continue
+            wanted = plain[name] if evaluated else at.x[name] if kind.while_off is WhileOff.KEPT else SX(0.0)
+            assert number(value) == number(wanted), (kind, name)
+
+
+@each_block
+def test_while_the_control_is_on_all_equations_are_those_of_the_block(block: Block) -> None:
+    alone, inside = gated(block, ON, RESTART)
+    at = arguments(block, inside, {ON: 1.0, "?works": 1.0})
+    for kind, equation in inside.equations.items():
+        found = {name: number(value) for name, value in equation(at).items() if not name.startswith("?")}
+        plain = {name: number(value) for name, value in alone.equations[kind](at).items()}
+        if kind is SlotKind.RESET:  # a restart may change all states; without one they stay
+            plain = {name: number(at.x[name]) for name in found} | plain
+        assert found == plain, kind
+
+
+@each_block
+def test_a_restart_gives_all_states_their_initial_values(block: Block) -> None:
+    alone, inside = gated(block, ON, RESTART)
+    at = arguments(block, inside, {ON: 1.0, RESTART: 1.0, "?works": 1.0})
+    after = inside.equations[SlotKind.RESET](at)
+    starts = alone.starts(at.p)
+    assert starts.keys() >= {state.name for state in (*alone.states, *alone.discrete)}
+    assert {name: number(after[name]) for name in starts} == {
+        name: number(start) for name, start in starts.items()
+    }
