@@ -1,4 +1,4 @@
-"""Drawings of diagrams: no blocks overlap, and the lines say what is connected."""
+"""Drawings of diagrams: blocks do not overlap, and the lines show the connections unambiguously."""
 
 import dataclasses
 import itertools
@@ -119,8 +119,8 @@ def test_blocks_do_not_overlap(diagram: Diagram) -> None:
         assert apart, (a.name, b.name)
 
 
-def test_a_reader_of_the_drawing_infers_the_diagram(diagram: Diagram) -> None:
-    """And every wire has a line: there is room on the sheets of well-kept diagrams."""
+def test_the_connections_can_be_read_from_the_drawing(diagram: Diagram) -> None:
+    """Every connection is drawn as a line, because these sheets have enough room."""
     wires, _, found, _ = routed(diagram)
     placed = boxes(diagram)
     ports = {
@@ -152,7 +152,7 @@ def test_a_drawing_is_valid_and_repeatable(diagram: Diagram) -> None:
         assert f"{name} ({block.title})" in names
 
 
-def test_every_shipped_block_has_a_face_of_sensible_size() -> None:
+def test_every_shipped_block_has_a_face_of_suitable_size() -> None:
     for name in BLOCKS:
         kind = BLOCKS[name]
         if any(rule.required for rule in kind.parameters()):
@@ -162,7 +162,7 @@ def test_every_shipped_block_has_a_face_of_sensible_size() -> None:
 
 
 @pytest.mark.parametrize("kind", BLOCKS.values(), ids=BLOCKS)
-def test_a_block_alone_is_drawn_within_its_picture(kind: type[Block]) -> None:
+def test_the_picture_of_a_single_block_contains_all_its_marks(kind: type[Block]) -> None:
     block = example_block(kind)
     picture = block_picture(block)
     ports = len(block.input_ports()) + len(block.output_ports())
@@ -174,8 +174,8 @@ def test_a_block_alone_is_drawn_within_its_picture(kind: type[Block]) -> None:
 
 
 @pytest.mark.parametrize("kind", BLOCKS.values(), ids=BLOCKS)
-def test_a_face_is_read_whole(kind: type[Block]) -> None:
-    """No text is cut, too small, beside the block, or over another one."""
+def test_all_text_of_a_face_is_readable(kind: type[Block]) -> None:
+    """No text is cut, too small, outside the block, or overlaps another text."""
     block = example_block(kind)
     box = sized_box("", block)
     faces = [(block, box), (block, dataclasses.replace(box, flipped=True))]
@@ -194,7 +194,7 @@ def test_a_face_is_read_whole(kind: type[Block]) -> None:
             assert b <= e or f <= a or d <= g or h <= c, [mark.text for mark in texts]
 
 
-def test_a_mask_shows_its_name() -> None:
+def test_the_face_of_a_masked_subsystem_shows_its_name() -> None:
     inner = DiagramBuilder("Servo")
     stiffness = inner.parameter("K", 3.0, doc="stiffness")
     inner.add("y", Outport(), inner.add("spring", Gain(gain=stiffness), inner.add("u", Inport())))
@@ -207,7 +207,7 @@ def test_a_mask_shows_its_name() -> None:
 @pytest.mark.parametrize(
     "name", ["JointServo", "ServoWithGearAndBrake", "a servo with its gear", "two_words_more"]
 )
-def test_a_mask_s_name_is_not_cut(name: str) -> None:
+def test_the_name_on_a_masked_subsystem_is_not_cut(name: str) -> None:
     inner = DiagramBuilder(name)
     stiffness = inner.parameter("K", 3.0, doc="stiffness")
     inner.add("y", Outport(), inner.add("spring", Gain(gain=stiffness), inner.add("u", Inport())))
@@ -215,7 +215,7 @@ def test_a_mask_s_name_is_not_cut(name: str) -> None:
     assert name.replace("_", " ") in " ".join(shown)
 
 
-def test_faces_show_formulas_that_are_short() -> None:
+def test_faces_show_short_formulas() -> None:
     for text, shown in (("1/K", "1/K"), ("K*K*K*K*K*K*K*K*K*K", "5.9e4")):
         block = Gain(gain=formula(text)).in_scope({"K": 3.0}, "spring")
         assert shown in {mark.text for mark in text_marks(block_picture(block))}
@@ -223,7 +223,7 @@ def test_faces_show_formulas_that_are_short() -> None:
     assert "[K 2]" in {mark.text for mark in text_marks(block_picture(constant))}
 
 
-def test_a_run_shows_on_the_sinks_faces() -> None:
+def test_faces_of_sinks_show_the_final_values_of_a_run() -> None:
     diagram = ab.load_diagram("kr180model")
     result = ab.simulate(diagram)
     texts = [mark.text for mark in text_marks(diagram_picture(diagram, result))]
@@ -246,12 +246,12 @@ def test_an_empty_diagram_has_a_drawing() -> None:
     assert "0 blocks." in diagram_picture(Diagram(name="empty", blocks={})).description
 
 
-# -- turned blocks, notes ------------------------------------------------------
+# -- rotated blocks, notes ------------------------------------------------------
 
 
 @pytest.mark.parametrize("rotation", [0, 90, 180, 270])
 @pytest.mark.parametrize("flipped", [False, True])
-def test_every_block_can_be_turned_and_its_ports_stay_on_its_edge(rotation: int, flipped: bool) -> None:
+def test_ports_of_every_rotated_block_are_on_its_edges(rotation: int, flipped: bool) -> None:
     for kind in BLOCKS.values():
         block = example_block(kind)
         upright = standing_box("b", block, Placement(x=30, y=40, flipped=flipped))
@@ -274,7 +274,7 @@ def test_every_block_can_be_turned_and_its_ports_stay_on_its_edge(rotation: int,
             assert abs(edge) < 1e-9
 
 
-def test_notes_stand_on_the_drawing_line_by_line() -> None:
+def test_notes_are_drawn_line_by_line() -> None:
     builder = DiagramBuilder("noted")
     builder.add("clock", BLOCKS["Clock"]())
     builder.place("clock", 0, 0)
