@@ -77,7 +77,7 @@ const LIST: Command[] = [
   { title: 'Arrange the sheet', run: () => void change({ kind: 'arrange' }) },
   { title: 'Fit the sheet into the window', keys: 'Space', run: () => sheetView.fit?.() },
   {
-    title: 'Out of the subsystem',
+    title: 'Leave the subsystem',
     keys: 'Esc',
     possible: () => Boolean(useStudio.getState().document?.inside.length),
     run: () => look(useStudio.getState().document!.inside.slice(0, -1)),

@@ -28,7 +28,7 @@ export const KEYS: KeysOf[] = [
     place: 'With the mouse on the sheet',
     sources: [],
     keys: [
-      ['Shift+drag', 'Take a block out of its wires, which close behind it'],
+      ['Shift+drag', 'Disconnect a block and connect its neighbours'],
       ['double click', 'Open a block or write its name; on the empty sheet add a block'],
       ['middle button', 'Move the sheet'],
       ['Ctrl+wheel', 'Zoom'],

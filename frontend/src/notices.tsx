@@ -21,7 +21,7 @@ export function Notices() {
         <Alert
           color="orange"
           icon={<IconAlertTriangle />}
-          title="The studio was started again and does not know this page"
+          title="The studio was restarted and does not accept this page"
         >
           Open the link that it printed in another tab. This tab then reconnects and sends your edits.
         </Alert>

@@ -208,7 +208,7 @@ def test_non_physical_values_are_marked_at_their_cells() -> None:
     found = robot_content(bad).findings
     assert [(f.link, f.columns) for f in found if "Friction" in f.what] == [("link2", ["Tc-"])]
     bare = replace(KIND.new(), links=(standard_dh("link1", a=1.0),))
-    assert "Nothing resists" in robot_content(bare).findings[0].what
+    assert "The last joint has no inertia" in robot_content(bare).findings[0].what
 
 
 def test_every_column_is_sent_to_the_page() -> None:

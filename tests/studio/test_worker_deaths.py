@@ -205,7 +205,7 @@ def test_a_hung_worker_is_killed_without_a_stop_request(
     async def talking(talk: Talk) -> None:
         document = await talk.ask("open_shipped", document_kind="diagram", name="falling_pendulum")
         run = await talk.ask("run", document=document)
-        assert (await talk.until(run, "failed"))["fault"]["what"] == "the run hangs: it was ended"
+        assert (await talk.until(run, "failed"))["fault"]["what"] == "the run does not respond; it was ended"
 
     talk(tmp_path, talking)
 
@@ -221,7 +221,8 @@ def test_a_paused_run_is_ended_at_the_time_limit(tmp_path: Path) -> None:
         await talk.ask("control", run=run, action="back")
         told = await talk.until(run, "failed")
         assert (
-            told["fault"]["what"] == f"the run has gone on for {run_process.MOST_SECONDS:g} s: it was ended"
+            told["fault"]["what"]
+            == f"the run exceeds its time limit of {run_process.MOST_SECONDS:g} s; it was ended"
         )
 
     talk(tmp_path, talking)
@@ -267,7 +268,7 @@ def test_a_run_whose_samples_do_not_fit_on_disk_is_reported(
         told = await talk.until(run, "failed", "done")
         assert told["state"] == "failed"
         assert told["fault"]["what"] == (
-            "the samples of the run cannot be kept (No space left on device): it was ended"
+            "the samples of the run cannot be stored (No space left on device); the run was ended"
         )
         again = await talk.ask("run", document=document)
         assert (await talk.until(again, "done", "failed"))["state"] == "done"

@@ -35,7 +35,7 @@ function FileNotice({ state, saveAs }: { state: DocumentState; saveAs: () => voi
         </Alert>
       )}
       {disk === 'gone' && (
-        <Alert color="yellow" icon={<IconFileAlert />} title={`${path} is deleted from the disk`}>
+        <Alert color="yellow" icon={<IconFileAlert />} title={`${path} was deleted from the disk`}>
           What it held is here and in the journal; saving writes the file again.
         </Alert>
       )}

@@ -22,11 +22,11 @@ export function RecoveryDialog() {
     if (!recoveries.length && useDialogs.getState().open === 'recovery') show(null)
   }, [recoveries, offered])
   return (
-    <Modal opened={opened} onClose={() => show(null)} title="Work that was not saved" size="lg">
+    <Modal opened={opened} onClose={() => show(null)} title="Unsaved work" size="lg">
       <Stack gap="sm">
         <Text size="sm" c="dimmed">
-          The studio ended before these were saved; its journal has kept them. No file has been changed. What
-          you leave for later stays in the menu.
+          The studio ended before these documents were saved. They can be recovered from its journal; no file
+          has been changed. Entries without a choice remain in the menu.
         </Text>
         {recoveries.map((recovery) => (
           <Offer key={recovery.document} recovery={recovery} />
@@ -55,14 +55,14 @@ function Offer({ recovery }: { recovery: Recovery }) {
         </div>
         {disk !== 'same' && (
           <Badge color="yellow" variant="light">
-            {disk === 'gone' ? 'the file is gone' : 'the file is newer'}
+            {disk === 'gone' ? 'the file was deleted' : 'the file is newer'}
           </Badge>
         )}
       </Group>
       {disk === 'changed' && (
         <Text size="sm" mt={6}>
-          Somebody has written {path} since. Keep both saves the recovered{' '}
-          {kind === 'robot' ? 'robot' : 'drawing'} as a file of its own beside it.
+          Another program has changed {path} since. Keep both saves the recovered{' '}
+          {kind === 'robot' ? 'robot' : 'drawing'} as a separate file beside it.
         </Text>
       )}
       {missing && (
@@ -77,7 +77,7 @@ function Offer({ recovery }: { recovery: Recovery }) {
           onClick={() => (sure ? act('discard') : setSure(true))}
           onBlur={() => setSure(false)}
         >
-          {sure ? 'Discard for good' : 'Discard'}
+          {sure ? 'Discard permanently' : 'Discard'}
         </Button>
         {disk === 'changed' ? (
           <>

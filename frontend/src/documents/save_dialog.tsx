@@ -52,7 +52,7 @@ function SaveAs() {
       <Stack gap="sm">
         <Autocomplete
           label="File"
-          description="A name in the project folder; folders are made: models/arm.json"
+          description="A name in the project folder; missing folders are created: models/arm.json"
           data-autofocus
           data={files.filter((file) => file !== path)}
           limit={8}

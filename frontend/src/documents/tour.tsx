@@ -26,26 +26,26 @@ const STOPS: Stop[] = [
     at: '.palette',
     title: 'The library',
     text:
-      'All blocks by family. Drag one to the sheet, onto a wire to put it in between. Faster: type its ' +
-      'name on the sheet.',
+      'All blocks by family. Drag a block to the sheet, or onto a wire to insert it. Faster: type its name ' +
+      'on the sheet.',
   },
   {
     at: '.run-controls',
     title: 'Run',
     text:
-      'Run (Ctrl+Enter), pause, step forward and back, stop. Beside it the stop time and the speed ' +
-      'against real time.',
+      'Run (Ctrl+Enter), pause, step forward and back, stop. To the right: stop time and speed relative ' +
+      'to real time.',
   },
   {
     at: '.scopes-panel, .chart',
     title: 'Scopes',
     text:
-      'What was recorded: zoom with the mouse, measure between cursors, export. Click a wire on the ' +
-      'sheet to log its signal too.',
+      'Recorded signals: zoom with the mouse, measure between cursors, export. Click a wire on the sheet ' +
+      'to log its signal as well.',
   },
   {
     at: '.timeline',
-    title: 'One time for everything',
+    title: 'The time cursor',
     text: 'Drag the cursor or play the run: scopes, values on wires and the arm all show this time.',
   },
   {
@@ -55,7 +55,7 @@ const STOPS: Stop[] = [
   },
   {
     at: '[aria-label="Menu"]',
-    title: 'Where to go on',
+    title: 'Next steps',
     text:
       'New diagrams, files and examples are in this menu. Ctrl+K finds every command, Ctrl+F every ' +
       'block, ? lists all keys.',

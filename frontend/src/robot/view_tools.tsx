@@ -94,7 +94,7 @@ export function ViewTools({
       <Button label="Save a picture (PNG)" icon={IconCamera} onClick={onPicture} />
       {film && filmKind() && (
         <Button
-          label={filming ? 'End the film' : 'Film the run from its start'}
+          label={filming ? 'Stop the video' : 'Record a video of the run'}
           icon={filming ? IconPlayerStopFilled : IconVideo}
           onClick={() => {
             if (filming) {

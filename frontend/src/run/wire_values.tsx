@@ -171,7 +171,7 @@ function WireTools({
         transform: legible((from[0] + to[0]) / 2, (from[1] + to[1]) / 2 - 6) + ' translate(-50%, -100%)',
       }}
     >
-      <Tooltip label={isLogged ? 'Do not log this signal' : 'Log this signal: it gets a scope of its own'}>
+      <Tooltip label={isLogged ? 'Do not log this signal' : 'Log this signal in a separate scope'}>
         <ActionIcon
           size="sm"
           variant={isLogged ? 'light' : 'subtle'}

@@ -111,7 +111,7 @@ function RunList({ runs }: { runs: KeptRun[] }) {
             ))}
           </div>
           {run.key !== shown && (
-            <Tooltip label="Forget this run">
+            <Tooltip label="Delete this run">
               <ActionIcon
                 size="xs"
                 variant="subtle"

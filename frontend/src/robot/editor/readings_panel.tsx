@@ -14,7 +14,7 @@ export function ReadingsPanel() {
   if (!shown) return null
   const names = shown.links.filter(({ moves }) => moves).map(({ name }) => name)
   const turns = shown.links.filter(({ moves }) => moves).map((link) => link.turns)
-  if (!names.length) return <p className="empty">No joint moves: there is nothing to read.</p>
+  if (!names.length) return <p className="empty">The robot has no movable joint.</p>
   if (!readings) return <p className="empty">Compiling the arm …</p>
   const { pose, position, rpy, jacobian, gravload, torque, manipulability, singular, limits } = readings
   const angle = (value: number) =>

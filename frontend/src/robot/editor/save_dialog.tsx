@@ -56,7 +56,7 @@ export function SaveDialog() {
         <Stack gap="sm">
           <TextInput
             label="File in this folder"
-            description="A robot file, .json; folders on the way are made."
+            description="A robot file, .json; missing folders are created."
             data-autofocus
             value={path}
             error={refused || undefined}
@@ -64,7 +64,7 @@ export function SaveDialog() {
           />
           {files.includes(path) && !refused && (
             <Text size="xs" c="dimmed">
-              There is a file of this name.
+              A file with this name exists.
             </Text>
           )}
           <Group justify="flex-end" gap="xs">

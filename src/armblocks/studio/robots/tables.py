@@ -107,7 +107,7 @@ def _friction_findings(robot: Robot) -> list[say.RobotFinding]:
                 say.RobotFinding(
                     link=link.name,
                     columns=[name for name, is_wrong in wrong.items() if is_wrong],
-                    what="Friction drives the joint instead of holding it.",
+                    what="Friction accelerates the joint instead of braking it.",
                     fix="Give B and Tc+ that are not below zero, and Tc- that is not above it.",
                 )
             )
@@ -124,7 +124,7 @@ def _weightless(robot: Robot) -> list[say.RobotFinding]:
         say.RobotFinding(
             link=last.name,
             columns=["mass"],
-            what="Nothing resists the last joint: it has no mass, no inertia and no rotor.",
+            what="The last joint has no inertia: no mass, no inertia tensor and no rotor.",
             fix="Give it a mass or an inertia, or Jm of its motor; poses and joint torques do not need it.",
         )
     ]

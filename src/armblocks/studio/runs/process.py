@@ -113,8 +113,12 @@ class RunProcess:
                 return await self._queue.get()
         except TimeoutError:
             if not self._broken:
-                long = f"has gone on for {MOST_SECONDS:g} s" if patience == rest else "hangs"
-                self._broken = f"the run {long}: it was ended"
+                long = (
+                    f"exceeds its time limit of {MOST_SECONDS:g} s"
+                    if patience == rest
+                    else "does not respond"
+                )
+                self._broken = f"the run {long}; it was ended"
             self._worker.process.kill()
             return await self._queue.get()
 
@@ -141,7 +145,7 @@ class RunProcess:
         try:
             await self._tell(frame)
         except OSError as error:
-            self._broken = f"the samples of the run cannot be kept ({error.strerror}): it was ended"
+            self._broken = f"the samples of the run cannot be stored ({error.strerror}); the run was ended"
             self._worker.process.kill()
 
     def _lost(self, last: say.RunProgress | None) -> say.RunProgress:
