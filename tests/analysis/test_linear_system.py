@@ -1,6 +1,6 @@
 """Linear systems compared with closed forms, identities and python-control.
 
-Each test imports python-control itself: the import takes seconds, and every worker process collects this
+Each test imports python-control in its body: the import takes seconds, and every worker process collects this
 file.
 """
 

@@ -92,7 +92,7 @@ def test_python_code_as_a_value_is_refused(refused: Refused) -> None:
     assert "no function named '__import__'" in text
 
 
-def test_a_folder_that_cannot_be_made_is_refused_before_the_run(refused: Refused, tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_created_is_refused_before_the_run(refused: Refused, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("", encoding="utf-8")
     text = refused("run", "kr180model", "--out", "file/inside")
     assert "the folder cannot be written" in text

@@ -69,7 +69,7 @@ def test_an_installation_without_the_studio_page_is_reported(
 def test_a_checkout_builds_the_page_once_and_reports_why_a_build_fails(tmp_path: Path) -> None:
     web, script = tmp_path / "web", tmp_path / "build_page.py"
     lines: list[str] = []
-    build_in_checkout(lines.append, web, script)  # not a checkout: nothing to build from
+    build_in_checkout(lines.append, web, script)  # not a checkout: there are no sources to build
     assert lines == []
     script.write_text("raise SystemExit(3)")
     with pytest.raises(FormatError, match=r"page of the studio could not be built.*install Node\.js"):

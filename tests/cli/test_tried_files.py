@@ -56,11 +56,11 @@ HOSTILE: dict[str, tuple[str | bytes, str]] = {
         document({"c": block("Clock"), "f": block("Expression", formula="open('x','w')")}, "c/y -> f/u"),
         "no function named 'open'",
     ),
-    "code in a file": (
+    "a Python function in a file": (
         document({"c": block("Clock"), "f": block("PythonFunction", function="evil.py:f")}, "c/y -> f/u"),
         "--trust",
     ),
-    "a robot of the system": (
+    "a system file as robot": (
         document(
             {"q": block("Constant", value=[0, 0]), "f": block("Fkine", robot="/etc/passwd")}, "q/y -> f/q"
         ),
@@ -70,7 +70,7 @@ HOSTILE: dict[str, tuple[str | bytes, str]] = {
         document({"c": block("Clock"), "f": block("ToFile", file="../../stolen.csv")}, "c/y -> f/u"),
         "stolen.csv",
     ),
-    "a run without end": (document(FED, "c/y -> x/u", settings={"stop_time": "inf"}), "stop_time"),
+    "an infinite stop time": (document(FED, "c/y -> x/u", settings={"stop_time": "inf"}), "stop_time"),
     "a tolerance of zero": (document(FED, "c/y -> x/u", settings={"rtol": 0}), "rtol"),
 }
 

@@ -1,4 +1,4 @@
-"""Features of a block: a conditional subsystem changes its equations by their role, whatever they compute."""
+"""Features of a block: a conditional subsystem changes its equations according to their role."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ each_block = pytest.mark.parametrize("block", BLOCKS, ids=lambda block: type(blo
 
 
 def gated(block: Block, *gate: str) -> tuple[Features, Features]:
-    """The features of a block with one scalar input, alone and in a conditional subsystem."""
+    """Return the features of a block with one scalar input, alone and in a conditional subsystem."""
     alone = features_of(block, {"u": ()})
     return alone, conditional(alone, gate, clocked=block.sampled, ticking=block.sampled)
 
 
 def arguments(block: Block, features: Features, hidden: Mapping[str, float]) -> Arguments:
-    """Fixed pseudo-random states and inputs, no event; hidden inputs and states as given, else 0."""
+    """Return pseudo-random states and inputs without events; hidden inputs and states are as given, or 0."""
     random = np.random.default_rng(3)
     held = (*features.states, *features.discrete, *features.modes, *features.conditions, *features.delays)
     before = (mode.before for mode in features.modes if mode.remembers)
@@ -54,7 +54,7 @@ def number(value: SX) -> float:
 
 
 @each_block
-def test_while_the_control_is_off_an_equation_is_zero_kept_or_evaluated(block: Block) -> None:
+def test_equations_of_a_disabled_block_are_zero_unchanged_or_evaluated(block: Block) -> None:
     alone, inside = gated(block, ON)
     at = arguments(block, inside, {ON: 0.0})
     assert set(inside.equations) == set(SlotKind)
@@ -69,19 +69,19 @@ def test_while_the_control_is_off_an_equation_is_zero_kept_or_evaluated(block: B
 
 
 @each_block
-def test_while_the_control_is_on_all_equations_are_those_of_the_block(block: Block) -> None:
+def test_equations_of_an_enabled_block_are_those_of_the_block_alone(block: Block) -> None:
     alone, inside = gated(block, ON, RESTART)
     at = arguments(block, inside, {ON: 1.0, "?works": 1.0})
     for kind, equation in inside.equations.items():
         found = {name: number(value) for name, value in equation(at).items() if not name.startswith("?")}
         plain = {name: number(value) for name, value in alone.equations[kind](at).items()}
-        if kind is SlotKind.RESET:  # a restart may change all states; without one they stay
+        if kind is SlotKind.RESET:  # a restart may change all states; without a restart they are unchanged
             plain = {name: number(at.x[name]) for name in found} | plain
         assert found == plain, kind
 
 
 @each_block
-def test_a_restart_gives_all_states_their_initial_values(block: Block) -> None:
+def test_a_restart_sets_all_states_to_their_initial_values(block: Block) -> None:
     alone, inside = gated(block, ON, RESTART)
     at = arguments(block, inside, {ON: 1.0, RESTART: 1.0, "?works": 1.0})
     after = inside.equations[SlotKind.RESET](at)

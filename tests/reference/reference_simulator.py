@@ -11,23 +11,23 @@ Newton's method solves. A sampled block's output is held between the ticks of it
 **Modes.** A mode is a function of the signals: ``mode_values`` (for a condition: whether its quantity is
 positive) at *every* evaluation, also inside a Runge-Kutta step. Only where that function reads the mode
 itself (a relay's hysteresis) does the mode have a memory: the value before the instant, or before the latest
-event at it. Where modes
-and signals depend on each other, both are evaluated again until no mode changes.
+event at it. Where modes and signals depend on each other, both are evaluated again until no mode changes.
 
-**Flow.** Between instants x follows the classical Runge-Kutta method with steps of at most ``step``. Within
-a step the modes of its start hold. The step is accepted when the modes by the signals are the same at all its
-stages, no guard has changed its sign, and no delayed jump has arrived. Otherwise bisection finds the shortest
-step that is not accepted, to 1e-14; its end is an instant.
+**Flow.** Between instants x follows the classical Runge-Kutta method with steps of at most ``step``. Within a
+step the modes are those of its start. The step is accepted if the signals give the same modes at all stages,
+no guard has changed its sign, and no delayed jump has arrived. Otherwise bisection finds the shortest step
+that is not accepted, to 1e-14; its end is an instant.
 
 **Instant.** An instant is t = 0, a tick, a breakpoint (a time at which a source jumps), a recorded time, or
 the time of an event. At an instant, in this order:
 
-1. left limits: values "just before" the instant, such as the held output of a subsystem that is disabled, are
-evaluated with the old modes and states;
+1. left limits: values "just before" the instant, such as the held output of a subsystem that is disabled,
+   are evaluated with the old modes and states;
 2. ticks: the outputs of all blocks whose clock ticks are evaluated with the others, from the previous
-discrete states; then all their discrete states are updated together;
+   discrete states; then all their discrete states are updated together;
 3. mode iteration: modes are made consistent with the signals; guards whose sign has changed fire, and
-``resets`` gives new states; controls of conditional subsystems act. This is repeated until nothing changes;
+   ``resets`` gives new states; controls of conditional subsystems act. This is repeated until nothing
+   changes;
 4. the instant is recorded: signals are right-continuous.
 
 **Conditional subsystems.** While a subsystem is disabled, the states of its blocks are constant and no guard

@@ -18,7 +18,7 @@ from armblocks.simulation import Simulation, SimulationResult, simulate
 
 
 def source_only() -> HybridSystem:
-    """``y = a t``: nothing to integrate."""
+    """A system without states: ``y = a t``."""
     return small_system(
         "source",
         signals=signature(("ramp/y", ())),

@@ -18,7 +18,7 @@ Torque = Callable[[float], np.ndarray]
 
 
 class StickingArm:
-    """``forward`` >= 0 and ``backward`` <= 0: Coulomb friction of the joints; ``viscous`` N m s/rad."""
+    """An arm with Coulomb friction, ``forward`` >= 0 and ``backward`` <= 0, and ``viscous``, N m s/rad."""
 
     def __init__(
         self, arm: ab.Arm, forward: np.ndarray, backward: np.ndarray, viscous: np.ndarray, tau: Torque

@@ -78,7 +78,7 @@ def test_a_mass_on_a_belt_sticks_and_slips_periodically(run: Run) -> None:
     """m v' = -k x - friction(v - V): the mass sticks until k x = Fs, then slips with friction Fc."""
     k, m, V, Fs, Fc = 4.0, 1.0, 0.5, 1.0, 0.6
     builder = ab.DiagramBuilder("belt")
-    # In belt coordinates: y = x - V t, so the friction block sees the relative speed.
+    # In belt coordinates, y = x - V t, the input of the friction block is the relative speed.
     mass = builder.add("mass", bl.StickSlipFriction(mass=m, coulomb=Fc, static=Fs))
     belt = builder.add("belt", bl.Ramp(slope=V))
     place = builder.add("place", bl.Sum(signs="++"), mass["x"], belt)
