@@ -12,7 +12,7 @@ first 0.1 s, 1000 ticks, and its time is multiplied by 100. The states at 0.1 s 
 clocks tick, bdsim's current loop reads the new torque one tick later.
 """
 
-# Drake's stubs do not fit what its functions take.
+# Drake's type stubs do not match its functions.
 # pyright: basic, reportMissingImports=false, reportAttributeAccessIssue=false, reportArgumentType=false
 # pyright: reportCallIssue=false, reportOptionalMemberAccess=false
 from __future__ import annotations

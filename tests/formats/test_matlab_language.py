@@ -27,7 +27,7 @@ def value(text: str) -> object:
         ("x = 2 + 3*4", [[14]]),
         ("x = -2^2", [[-4]]),
         ("x = 2^-1", [[0.5]]),
-        ("x = 2^3^2", [[64]]),  # from the left, unlike elsewhere
+        ("x = 2^3^2", [[64]]),  # left-associative in MATLAB
         ("x = --2", [[2]]),
         ("x = -0", [[0]]),
         ("x = (1 + 2)*3", [[9]]),
@@ -148,7 +148,7 @@ def test_expression_has_matlabs_value(text: str, expected: object) -> None:
         ("x = 'a...b'", "a...b"),
     ],
 )
-def test_text_is_read_as_matlab_reads_it(text: str, expected: str) -> None:
+def test_strings_have_the_value_that_matlab_gives_them(text: str, expected: str) -> None:
     assert value(text) == expected
 
 
@@ -163,7 +163,7 @@ def test_byte_order_mark_and_old_encodings_are_read() -> None:
     assert read_script(latin, "a.m").variables["x"] == "Unimation \xe9"
 
 
-def test_statement_broken_where_it_cannot_end_goes_on() -> None:
+def test_an_incomplete_statement_continues_on_the_next_line() -> None:
     found = read_script(b"x =\n2 +\n3; y\n= 4; z = [\n5 6];", "a.m").variables
     assert (found["x"], found["y"]) == (5, 4)
     np.testing.assert_array_equal(found["z"], [[5, 6]])

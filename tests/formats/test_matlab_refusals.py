@@ -225,12 +225,12 @@ def test_message_shows_the_line_and_what_is_supported() -> None:
     assert "Allowed: straight-line scripts of the Robotics Toolbox" in text
 
 
-def test_long_line_is_cut_in_the_message() -> None:
+def test_a_long_line_is_shortened_in_the_message() -> None:
     with pytest.raises(FormatError, match="…"):
         read_script(("x = [" + "1 " * 500 + "; 2]").encode(), "a.m")
 
 
-def test_robot_that_contradicts_itself_names_its_line() -> None:
+def test_the_error_for_an_inconsistent_robot_names_its_line() -> None:
     links = "; ".join(f"L{{{i}}} = link([0 1 0 0])" for i in (1, 2))
     script = f"{links};\nr = robot(L);\nr.links{{2}}.m = 1e400;"
     with pytest.raises(
@@ -312,6 +312,6 @@ def _read_or_refuse(data: bytes) -> None:
         except FormatError as error:
             assert error.where.startswith("fuzz.m")
         except Warning:
-            pass  # lines joined as on a printed page, friction that drives
+            pass  # warnings about joined lines and driving friction
         except ArmblocksError as error:
             pytest.fail(f"not located: {error}")

@@ -11,8 +11,8 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 
 VIOLATIONS = {
-    "A line imports only lines below it": ("robot", "import armblocks.face", "armblocks.face"),
-    "In the studio, a line imports only lines below it": (
+    "A layer imports only lower layers": ("robot", "import armblocks.face", "armblocks.face"),
+    "In the studio, a layer imports only lower layers": (
         "studio.sheet",
         "import armblocks.studio.runs.pace",
         "armblocks.studio.runs.pace",

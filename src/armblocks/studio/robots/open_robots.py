@@ -16,7 +16,7 @@ from armblocks.studio.robots.robot_kind import RobotKind
 
 @dataclasses.dataclass(eq=False, kw_only=True)
 class OpenRobot(OpenFile[RobotDocument]):
-    """A robot with its file, its journal, and the compiled arm of its present form."""
+    """A robot with its file, its journal, and the compiled equations of its present value."""
 
     notes: tuple[str, ...] = ()
     """Warnings issued while the file was read."""
