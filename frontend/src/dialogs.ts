@@ -23,7 +23,7 @@ interface Dialogs {
   /** Text typed into the search lists. */
   typed: string
   /**
-   * The subsystem whose mask is edited; `''` is the model. `ofSheet`: it is the subsystem of the visible sheet.
+   * The subsystem whose mask is edited; `''` is the model. `ofSheet`: the subsystem owns the visible sheet.
    */
   of: string
   ofSheet: boolean
