@@ -28,7 +28,7 @@ class Doubled(Block):
     sign: ClassVar[FaceSign] = Words("2 u")
 
     def input_ports(self):
-        return (Port("u", "what is doubled"),)
+        return (Port("u", "input"),)
 
     def output_ports(self):
         return (Port("y", "twice the input"),)
@@ -67,7 +67,7 @@ from armblocks.robot.joints.joint import Joint
 
 @dataclass(frozen=True, kw_only=True)
 class Screw(Joint):
-    """A turn of q rad about the axis, and a slide of 0.25 m a turn along it."""
+    """A rotation by q rad about the axis, with a translation of 0.25 m per radian along it."""
 
     letter: ClassVar[str] = "H"
     unit: ClassVar[str] = "rad"
@@ -89,7 +89,7 @@ arm = ab.load_robot("made.json")
 assert type(arm.robot.links[0].joint) is Screw
 pose = arm.fkine([0.4])
 assert np.allclose(pose[:3, 3], [0.0, 0.0, 0.1]) and np.isclose(pose[0, 1], -np.sin(0.4))
-# The weight along the screw, and the inertia of the turn and the slide together.
+# The gravity force along the axis, and the inertia of rotation and translation.
 assert np.allclose(arm.rne([0.4], [0.0], [0.0]), [2.0 * 9.81 * 0.25])
 assert np.allclose(arm.inertia([0.4]), [[0.3 + 2.0 * 0.1**2 + 2.0 * 0.25**2]])
 """
