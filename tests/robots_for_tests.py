@@ -147,8 +147,9 @@ def random_inertia(random: np.random.Generator) -> np.ndarray:
 
 
 def build_random_tree(seed: int, count: int = 7, *, chain: bool = False) -> Robot:
-    """Return a tree or chain of ``count`` links with joints of all types about random axes, a rotated base, a
-    tool and motors. The links are listed in random order.
+    """Return a random tree or chain of ``count`` links, listed in random order.
+
+    The joints have all types and random axes; the robot has a rotated base, a tool and motors.
     """
     random = np.random.default_rng(seed)
     links: list[Link] = []

@@ -1,4 +1,4 @@
-"""Complex arithmetic compared with Python's, whose last bits depend on the compiler."""
+"""Complex arithmetic compared with Python's, whose last bits depend on the C compiler of Python."""
 
 import cmath
 from itertools import pairwise

@@ -32,8 +32,7 @@ def invoke(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Res
 
 @pytest.fixture
 def refused(invoke: Callable[..., Result]) -> Callable[..., str]:
-    """Return a function that calls the command line with bad input, checks the exit, and returns the
-    message."""
+    """Return a function that calls the command line with bad input and returns the message."""
 
     def call(*arguments: str) -> str:
         result = invoke(*arguments)

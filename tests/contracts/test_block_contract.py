@@ -282,12 +282,12 @@ def test_comparisons_in_outputs_change_only_at_events_or_breakpoints(kind: type[
         for shapes in itertools.islice(fitting_shapes(block), 1):
             equations = block_equations(block, shapes)
             if not equations.guards:
-                assert not any(compares_what_moves(group, equations, shapes) for group in equations.groups), (
+                assert not any(compares_variables(group, equations, shapes) for group in equations.groups), (
                     block
                 )
 
 
-def compares_what_moves(group: Group, equations: BlockEquations, shapes: Shapes) -> bool:
+def compares_variables(group: Group, equations: BlockEquations, shapes: Shapes) -> bool:
     """Return whether outputs or derivatives depend on a comparison of time, states or inputs."""
     if not {slot.kind for slot in group.slots} & {SlotKind.OUTPUT, SlotKind.DERIVATIVE}:
         return False

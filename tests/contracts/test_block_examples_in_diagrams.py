@@ -1,5 +1,4 @@
-"""Contract tests of blocks in diagrams: worked examples in files, runs with changed parameters, refused
-values.
+"""Contract tests of blocks in diagrams: files, runs with changed parameters, refused values.
 
 The diagrams are the worked examples of the blocks, so that a new block is tested automatically.
 """

@@ -1,5 +1,4 @@
-"""When the inputs of a switching block jump, its output changes from the old to the new value without
-overshoot.
+"""When its inputs jump, the output of a switching block has no values beyond the old and the new one.
 
 At a jump, the mode iteration updates the modes in several passes. Events must not see the outputs between the
 passes.

@@ -47,8 +47,7 @@ def stability(tableau: RosenbrockTableau, z: complex) -> complex:
 
 @every_method
 def test_methods_are_l_stable(tableau: RosenbrockTableau) -> None:
-    """``|R| <= 1`` on the imaginary axis and thus, by the maximum principle, in the left half-plane; R tends
-    to zero.
+    """``|R| <= 1`` on the imaginary axis, thus in the left half-plane (maximum principle); R tends to zero.
 
     The rounding of the published digits limits the accuracy of both checks.
     """

@@ -1,5 +1,4 @@
-"""Formulas of blocks in NumPy: the required output at every recorded time as a function of the recorded
-inputs.
+"""Formulas of blocks in NumPy: the required outputs as functions of the recorded inputs.
 
 The formulas share no code with the blocks. They cover sources and switching blocks without memory, and hold
 at every recorded time of every run.

@@ -43,8 +43,7 @@ def read_symbols(expression: SX, symbols: Mapping[str, SX]) -> set[str]:
 
 
 def own_modes(block: Block, x: Mapping[str, SX], u: Mapping[str, SX], p: Mapping[str, SX]) -> dict[str, SX]:
-    """Return the mode of a rate limiter: y equals u while its rate is allowed, and otherwise approaches u at
-    a limit.
+    """Return the mode of a rate limiter, whose output follows or approaches the input at limited rates.
 
     The previous mode m is 1 (rising), -1 (falling) or 0 (following). If y has reached u, or follows it, the
     rate of u decides. After a jump of u above ``SMALLEST_JUMP`` the output must approach u again.

@@ -12,8 +12,7 @@ TO_COEFFICIENTS = np.linalg.inv(np.vander(PLACES, 4, increasing=True))
 
 
 class History:
-    """The history of a delayed signal. A *segment* is the part between two jumps; number 0 is before the
-    start."""
+    """The history of a delayed signal. A *segment* is the part between two jumps; 0 is before the start."""
 
     def __init__(self, size: int) -> None:
         self.size = size

@@ -1,5 +1,4 @@
-"""Runge-Kutta and Rosenbrock integrators in plain Python and NumPy: an independent reference for the native
-ones.
+"""Runge-Kutta and Rosenbrock integrators in NumPy: an independent reference for the native ones.
 
 Written from the description in Hairer, Norsett, Wanner I, II.4 to II.6, and II, IV.7. Only the tableaux are
 shared with the code under test.

@@ -106,8 +106,7 @@ def kinetics(name: str) -> HybridSystem:
 
 
 def heat(n: int) -> tuple[HybridSystem, np.ndarray, float]:
-    """Return a rod with cold ends as ``n`` states, its first mode, ``(n,)``, and the decay rate of the mode,
-    1/s.
+    """Return a rod with cold ends as ``n`` states, its first mode ``(n,)``, and the decay rate of the mode.
 
     The mode is also an eigenvector of the finite differences, so that the states are known exactly.
     """
@@ -130,8 +129,7 @@ def heat(n: int) -> tuple[HybridSystem, np.ndarray, float]:
 
 
 def pendulum() -> HybridSystem:
-    """A unit mass on a unit rod in Cartesian coordinates, of index 1: the acceleration determines the rod
-    force.
+    """A unit mass on a unit rod in Cartesian coordinates: an implicit equation of index 1 for the rod force.
 
     ``x'' = -w x``, ``y'' = -w y - g`` and ``x^2 + y^2 = 1``, differentiated twice; it starts horizontal, at
     rest.

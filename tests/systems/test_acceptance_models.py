@@ -1,5 +1,4 @@
-"""Acceptance tests of stiff systems, loops, arms, analysis and structure: comparison with independent
-results."""
+"""Acceptance tests of stiff systems, loops, arms, analysis and structure, with independent references."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""Modes are consistent with the signals after every jump, and when a signal touches or grazes a switching
-value.
+"""Modes are consistent with the signals after jumps, and where a signal touches a switching value.
 
 The references are formulas in NumPy, which hold at every recorded time for every tolerance.
 """

@@ -1,5 +1,4 @@
-"""Sensors and PID controllers of joints, and integrated poses, compared with closed forms, statistics and
-SciPy."""
+"""Joint sensors, PID controllers and integrated poses compared with closed forms, statistics and SciPy."""
 
 from __future__ import annotations
 
