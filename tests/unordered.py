@@ -9,7 +9,7 @@ from scipy.optimize import linear_sum_assignment
 
 
 def matched(found: Any, wanted: Any, tolerance: float = 1e-8) -> bool:
-    """Return whether both hold the same numbers in any order, each within ``tolerance * max(1, |wanted|)``.
+    """Return whether both have the same numbers in any order, each within ``tolerance * max(1, |wanted|)``.
 
     The numbers are paired such that the sum of distances is least. Sorting is not enough: where two real
     parts are equal up to rounding, the last bits of LAPACK's result decide the order.
