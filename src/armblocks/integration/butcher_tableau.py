@@ -1,4 +1,4 @@
-"""An explicit Runge-Kutta method as data: what the native integrator is generated from."""
+"""An explicit Runge-Kutta method as data. The native integrator is generated from it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from armblocks.errors import InputError
 Row = tuple[float, ...]
 
 CONSISTENCY = 1e-12
-"""Largest accepted residual of a row sum: rounding of published decimals; misprints give larger ones."""
+"""Largest accepted residual of a row sum. Rounded published decimals stay below it, misprints exceed it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,7 +92,7 @@ class ButcherTableau:
 
     @property
     def stages(self) -> int:
-        """Evaluations of the derivative that one step costs."""
+        """Number of derivative evaluations of one step."""
         return len(self.nodes)
 
     @property
@@ -127,8 +127,8 @@ class ButcherTableau:
 
     @property
     def measures_stiffness(self) -> bool:
-        """Whether its last two evaluations, both at a step's end, show the fastest rate (Hairer, Wanner II,
-        IV.2, equation (2.20))."""
+        """Whether the last two derivative evaluations are both at the end of a step. Their difference then
+        estimates the fastest rate (Hairer, Wanner II, IV.2, equation (2.20))."""
         return self.adaptive and self.stages > 1 and self.nodes[-1] == 1.0
 
     @cached_property
@@ -166,9 +166,10 @@ class ButcherTableau:
 
 
 def hermite_dense(weights: Row) -> tuple[Row, ...]:
-    """Cubic Hermite polynomial through both ends of a step, values and slopes, as rows of ``dense``.
+    """Cubic Hermite polynomial through the values and derivatives at both ends of a step, as rows of
+    ``dense``.
 
-    Its own error is of order ``h^4``, so a method up to order 4 keeps its order between the steps.
+    The interpolation error is of order ``h^4``, so the dense output of a method up to order 4 has its order.
     Source: Hairer, Norsett, Wanner, *Solving Ordinary Differential Equations I*, II.6, equation (6.7).
     """
     s = len(weights)

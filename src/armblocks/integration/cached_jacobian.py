@@ -46,7 +46,7 @@ def cached_jacobian(derivative: str, residual: str, trace: Callable[[], HybridSy
             tape = lambda: kept_tape(digest, lambda: _traced(trace).function)  # noqa: E731
             return CachedJacobian(pattern=pattern, digest=digest, tape=tape)
         except (ValueError, KeyError, TypeError):
-            pass  # a record of another version is computed again
+            pass  # a cache entry of another version: compute it again
     traced = _traced(trace)
     made = tape_of(traced.function)
     states, size = (slot.size for slot in (traced.function.inputs["x"], traced.function.outputs["T"]))

@@ -1,6 +1,6 @@
 """Clocks of a loop: tick times and updates.
 
-Tick ``k`` of a clock is at ``offset + k period``, one product and one sum, never accumulated.
+Tick ``k`` of a clock is at ``offset + k period``. Times are computed from ``k`` and never accumulated.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from armblocks.routines.values import Boolean, Real
 
 
 class Clocks:
-    """Writes ticks. ``point`` is the variable that holds the time of an evaluation."""
+    """Emits the code for ticks. ``point`` is the variable that holds the time of an evaluation."""
 
     def __init__(self, frame: Frame, evaluation: Evaluation, point: RealVariable) -> None:
         self.frame = frame
@@ -27,15 +27,15 @@ class Clocks:
         self.ticking = frame.vector(frame.places.ticking)
 
     def next_tick(self, clock: int) -> Real:
-        """When a clock ticks next."""
+        """The time of the next tick of a clock."""
         period, offset = self.frame.sizes.clocks[clock]
         product = self.numbers[clock].to_real() * period
         return product if offset == 0.0 else product + offset
 
     def capture(self, time: Real) -> None:
-        """Update without a marked clock, with the left limits of the states and the old ``z``.
+        """Call ``update`` without a marked clock, with the left limits of the states and the old ``z``.
 
-        At the start there is no left limit: ``z`` keeps its initial values.
+        At the start of the run there is no left limit: ``z`` keeps its initial values.
         """
         if not self.frame.sizes.captures:
             return
@@ -72,7 +72,7 @@ class Clocks:
         f.copy(places.new_z, places.z, f.sizes.discrete)
 
     def halt(self, time: Real) -> None:
-        """Return before the ticks at a time that a caller has requested."""
+        """Return before the ticks if ``time`` has reached the time at which the caller wants control."""
         if not self.count:
             return
         f = self.frame

@@ -1,4 +1,4 @@
-"""The course of a run: its division into pieces, and the actions between them."""
+"""The course of a run: its division into pieces, and the actions between two pieces."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Trial = Callable[[Real, Real], Real]
 
 
 class Course(ABC):
-    """Emits the bounds of steps other than their error, and the actions after an accepted step."""
+    """Emits the bounds of a step that do not come from its error, and the actions after an accepted step."""
 
     @abstractmethod
     def enter(self, stages: Stages) -> None:
@@ -41,10 +41,10 @@ class Course(ABC):
 
     @abstractmethod
     def not_finite(self, time: Real, finite: Boolean, accepted: Part) -> None:
-        """Handle steps of minimum length: where they are not finite, return or leave ``accepted``."""
+        """Handle a step of minimum length whose result is not finite: return, or leave ``accepted``."""
 
     def passed(self, time: Real, spacing: Real) -> Real:
-        """Grid points of fixed steps up to this time are in the past."""
+        """Grid points of fixed steps up to the returned time count as passed."""
         return time
 
     def bounded(self, time: Real, new_time: Real) -> Real:

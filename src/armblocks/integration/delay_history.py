@@ -3,11 +3,12 @@
 The history is a table at the end of the array of doubles. A row has a time, a flag for the middle of a step,
 and the value and exact derivative of every delayed signal. Each step adds two rows, its middle and its end;
 the quintic Hermite interpolant through three values and derivatives has the accuracy of the step. A signal
-may vary faster than the states (a root, a fast sine, no state at all): the step is then subdivided until the
-interpolant matches the signal within the tolerances. Where a derivative is not finite, the parabola through
-the three values replaces it. Where a signal or its derivative jumps, two rows have the same time: the left
-and the right limit. A line (one delayed scalar) reads only up to the next jump until its delayed time has
-passed the jump: its value is then smooth, and the loop ends a step exactly there.
+may vary faster than the states, for example a square root or a fast sine of time. The step is then subdivided
+until the interpolant matches the signal within the tolerances. Where a derivative is not finite, the parabola
+through the three values replaces it. Where a signal or its derivative jumps, two rows have the same time: the
+left and the right limit. A line (one delayed scalar) reads only the rows before the next jump until its
+delayed time reaches the jump. Its value is therefore smooth within a step, and the loop ends a step exactly
+at the jump.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ from armblocks.routines.values import Boolean, Integer, Real
 
 SAME_ABOVE = 1.0 + 2.0**-50
 MOST_PIECES = 256
-"""Maximum number of pieces of one step: on both sides of a root's singularity they shrink and grow by 48
-powers of two."""
+"""Maximum number of pieces of one step. Toward the singularity of a square root the length of the pieces
+shrinks by up to 48 powers of two, and it grows again behind it."""
 ROWS_OF_A_STEP = 2 * MOST_PIECES + 6
 """Maximum number of rows that one step adds, including events at its end and the row for comparison."""
 NO_SLOPE = sys.float_info.max
@@ -102,7 +103,7 @@ class DelayHistory:
         """Value and derivative of a line's signal at a past time."""
         first, last = self.first_rows(counts)[line], self.last_rows(counts)[line]
         newest = counts[Count.HISTORY_ROWS] - 1
-        # A middle row whose end row does not exist yet is not a start for the search.
+        # The search does not start at a middle row whose end row does not exist yet.
         newest = newest - self.middle(reals, newest).to_integer()
         last = select(last < 0, newest, last)
         # The last row at or before the time, by bisection; the first one if there is none.
@@ -119,8 +120,9 @@ class DelayHistory:
         i = low.value
         before = instant < self.time(reals, i)
         with r.when(before | (i >= last)):
-            # A rounding error after the last row: extrapolate linearly. Before the first row that can be read
-            # the signal has the value of that row: there may be a jump or a bend between them.
+            # A time after the last row differs from it by rounding only: extrapolate linearly. Before the
+            # first readable row the signal has the value of that row, because a jump or bend may lie between
+            # them.
             past = select(before, 0.0, instant - self.time(reals, i))
             known = self.slope(reals, i, line)
             known = select(is_slope(known), known, 0.0)
@@ -170,7 +172,7 @@ class DelayHistory:
     def fill(
         self, r: Routine, t: Reals, x: Reals, reals: Reals, counts: Integers, p: Reals, middle: Real | float
     ) -> Integer:
-        """Write the row after the last one, without counting it; return its index."""
+        """Write the row after the last one without increasing the number of rows; return its index."""
         rows = counts[Count.HISTORY_ROWS]
         z, unknowns = (reals.after(place) for place in (self.places.z, self.places.trial_w))
         reals[self.entry(rows, 0)] = t[0]
@@ -216,8 +218,8 @@ class DelayHistory:
         s: Real,
         factor: Real,
     ) -> Boolean:
-        """Whether the quintic of the last three rows at ``s`` (-1 to 1) is further from a signal at the point
-        than ``factor`` times the tolerances."""
+        """Whether the quintic through the last three rows, at ``s`` (-1 to 1), deviates from a signal at the
+        point by more than ``factor`` times the tolerances."""
         rows = self.fill(r, t, x, reals, counts, p, 0.0)
         start, centre, end = (rows - back for back in (3, 2, 1))
         H = 0.5 * (self.time(reals, end) - self.time(reals, start))
@@ -278,14 +280,14 @@ class DelayHistory:
     # Room.
 
     def _make_room(self, r: Routine, now: Real, reals: Reals, counts: Integers) -> Boolean:
-        """Drop rows that no line can reach any more; return whether there is memory for another step."""
+        """Drop rows that no line can read any more; return whether there is memory for another step."""
         places = self.places
         capacity = counts[Count.HISTORY_ROOM]
         needed = counts[Count.HISTORY_ROWS] + ROWS_OF_A_STEP
         with r.when(needed <= capacity):
             r.return_(r.constant_boolean(True))
         oldest = now - reals[places.longest]
-        # The first row to keep: the end of a step, the last one before all readable times.
+        # Keep the rows from the last end of a step that is earlier than all readable times.
         keep, i = r.integer(0), r.integer(0)
         with r.loop() as search:
             here = i.value
@@ -305,7 +307,7 @@ class DelayHistory:
             reals[target] = reals[target + shift]
         for k in range(self.count):
             first, last = self.first_rows(counts), self.last_rows(counts)
-            # The first row may be dropped; -1 where the last one is the newest.
+            # ``first`` becomes 0 if its row was dropped. -1 in ``last`` means the newest row and stays.
             for rows, unknown in ((first, 0), (last, last[k])):
                 shifted = rows[k] - gone
                 rows[k] = select(shifted >= 0, shifted, unknown)

@@ -14,11 +14,11 @@ from armblocks.routines.memory import RealVariable
 from armblocks.routines.values import Boolean, Real
 
 HIGH_ORDER = 7
-"""From this method order on, steps are too long for one quintic of the history."""
+"""For methods of this order and higher, the steps are too long for one quintic of the history."""
 
 
 class Delays:
-    """Emits the code of a loop for delayed signals. ``point`` holds the time of an evaluation."""
+    """Emits the code for delayed signals. ``point`` is the variable that holds the time of an evaluation."""
 
     def __init__(
         self,
@@ -76,8 +76,8 @@ class Delays:
         """Store an accepted step in the history, in pieces with a middle and an end.
 
         A piece is the whole step, half of a step for methods of high order, or shorter where the quintic
-        deviates from a signal. After half of the maximum number of pieces the tolerance grows, so that the
-        rest fits into the other half.
+        deviates from a signal. After half of the maximum number of pieces the tolerance grows with each
+        piece, so that the rest of the step needs no more than the other half.
         """
         f, r, history = self.frame, self.frame.r, self.history
         self.records.extra_stages_once(time, h)
@@ -117,8 +117,8 @@ class Delays:
             pieces.leave_when(b >= new_time)
 
     def _point(self, part: float, a: Real, b: Real, time: Real, new_time: Real, h: Real) -> None:
-        """Write the state within the piece from ``a`` to ``b`` to ``new_x``, and evaluate the system
-        there."""
+        """Write the state at the fraction ``part`` of the piece from ``a`` to ``b`` into ``new_x``, and
+        evaluate the system there."""
         f, places = self.frame, self.frame.places
         x, y = f.vector(places.new_x), f.vector(places.y)
         instant = b if part == 1.0 else fma(part, b - a, a)

@@ -1,7 +1,7 @@
 """Symbolic analysis of a sparse Gaussian elimination: pivot order and fill-in, without numbers or LLVM.
 
 The matrix ``diagonal - h J`` of a stiff step has the same sparsity pattern at every step, so the analysis is
-done once. Pivots are on the diagonal; their quality is checked numerically at every step.
+done once. Pivots are on the diagonal. Every step checks the accuracy of the solution numerically.
 """
 
 from __future__ import annotations
@@ -26,10 +26,12 @@ class JacobianPattern:
 
 @dataclass(frozen=True, kw_only=True)
 class Elimination:
-    """``A = L U`` in the order ``columns[0], columns[1], …`` of the unknowns; all places count in this order.
+    """``A = L U`` with the unknowns in the order ``columns[0], columns[1], …``; places are indices in this
+    order.
 
-    Row ``i`` is equation ``equations[i]``. ``entries[i]`` are pairs of an entry of J and its place in row i,
-    ``lower[i]`` and ``upper[i]`` the places of L and U in it, beside the diagonal, rising.
+    Row ``i`` is equation ``equations[i]``. ``entries[i]`` are pairs of an entry of J and its place in row i.
+    ``lower[i]`` and ``upper[i]`` are the places of the entries of L and U in row i without the diagonal, in
+    ascending order.
     """
 
     columns: tuple[int, ...]
@@ -40,7 +42,7 @@ class Elimination:
 
     @property
     def filled(self) -> int:
-        """Numbers in L and U together."""
+        """Number of entries of L and U together."""
         return len(self.columns) + sum(map(len, self.lower)) + sum(map(len, self.upper))
 
 
@@ -91,10 +93,10 @@ def plan_elimination(pattern: JacobianPattern) -> Elimination:
 
 
 def _match(pattern: JacobianPattern) -> list[int]:
-    """The equation for every unknown: a state's own, and implicit ones by augmenting paths.
+    """The equation of every unknown: its derivative for a state, else an implicit one by augmenting paths.
 
-    Where no complete matching exists the rest is assigned arbitrarily: the matrix is singular, which the
-    numerical check detects.
+    Where no complete matching exists, the remaining unknowns get arbitrary equations. The matrix is then
+    singular, which the numerical check detects.
     """
     n, size = pattern.states, pattern.size
     equation_of = list(range(n)) + [-1] * (size - n)
@@ -103,7 +105,7 @@ def _match(pattern: JacobianPattern) -> list[int]:
         if row >= n and column >= n:
             unknowns[row].append(column)
     for start in range(n, size):
-        reached: dict[int, int] = {}  # unknown: the equation from which it was reached
+        reached: dict[int, int] = {}  # each unknown with the equation from which it was reached
         queue = [start]
         free = -1
         while queue and free < 0:
@@ -126,7 +128,8 @@ def _match(pattern: JacobianPattern) -> list[int]:
 
 
 def _least_degree(neighbours: Sequence[set[int]]) -> list[int]:
-    """Repeatedly eliminate an unknown with the fewest neighbours, and connect these with each other."""
+    """Repeatedly eliminate an unknown with the fewest neighbours, and connect its neighbours to each
+    other."""
     around = [set(near) for near in neighbours]
     heap = [(len(near), place) for place, near in enumerate(around)]
     heapq.heapify(heap)

@@ -11,7 +11,7 @@ from armblocks.routines.memory import Reals
 
 
 class Evaluation:
-    """Emits evaluations; arrays of one element hold the time."""
+    """Emits evaluations of the system. The time of an evaluation is an array of one element."""
 
     def __init__(self, frame: Frame, history: DelayHistory | None) -> None:
         self.frame = frame
@@ -23,7 +23,7 @@ class Evaluation:
         self.unknowns = frame.vector(places.trial_w) if sizes.hybrid else nowhere
 
     def solve(self, t: Reals, x: Reals) -> None:
-        """The delayed values at a point into ``z``, the unknowns of implicit equations into ``trial_w``."""
+        """Write the delayed values at a point into ``z``, and the implicit unknowns into ``trial_w``."""
         f = self.frame
         if self.history:
             f.r.call(self.history.read, t, x, f.reals, f.counts, f.p)
@@ -37,13 +37,14 @@ class Evaluation:
         f.r.call(system_functions.derivative, t, x, self.z, self.unknowns, f.p, xd)
 
     def jacobian(self, t: Reals, x: Reals, space: LinearSpace) -> None:
-        """The derivatives of the flow and of the implicit equations at a point, into the scratch."""
+        """Write the Jacobians of the flow and of the implicit equations at a point into the scratch
+        memory."""
         self.solve(t, x)
         f, scratch = self.frame, self.frame.arrays.scratch
         J, T = scratch.after(space.J), scratch.after(space.T)
         f.r.call(system_functions.flow_jacobian, t, x, self.z, self.unknowns, f.p, J, T)
 
     def accept_unknowns(self) -> None:
-        """Set ``w`` to the last solution."""
+        """Set ``w`` to the solution found last."""
         places = self.frame.places
         self.frame.copy(places.trial_w, places.w, self.frame.sizes.algebraic)

@@ -1,6 +1,7 @@
 """Event location within a step: the first time at which a guard fires, on the dense output.
 
-Where the dense output is not accurate enough, the end of a shorter step decides.
+Where the dense output is not accurate enough, the loop takes a shorter step and evaluates the guards at its
+end.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ LAST_PLACE = 2.0**-52
 FINEST = 2.0**-12
 """Minimum distance of guard evaluations, as a fraction of a step."""
 NEAR_START = 2.0**-6
-"""Fraction of a step up to which the dense output is inaccurate relative to the change since the step's
-start."""
+"""Events within this fraction of a step after its start are doubtful: the error of the dense output may be as
+large as the change since the start."""
 
 
 class EventSearch:
@@ -37,12 +38,13 @@ class EventSearch:
         self.y, self.new_x = (self.frame.vector(place) for place in (places.y, places.new_x))
 
     def first_event(self, time: Real) -> None:
-        """If a guard fires within the step, end the step at the first such time.
+        """If a guard fires within the step, shorten the step to the first such time.
 
-        The step is searched in windows, at the middle and the end of each. A window starts with an eighth of
-        the step, grows while the guards are smooth, and is halved where a guard may have touched zero and
-        returned (``dips``). Then follows bisection on "some guard has fired", so that the first of several
-        events is found. The step ends after the zero, where the guard has fired.
+        The step is searched in windows. The guards are evaluated at the middle and the end of each window.
+        The first window is an eighth of the step. Windows grow while the guards are smooth, and are halved
+        where a guard may have touched zero and returned (``dips``). Bisection on the condition "some guard
+        has fired" then finds the first of several events. The step ends just after the zero, where the guard
+        has fired.
         """
         f, r = self.frame, self.frame.r
         low, high, doubt = r.real(time), r.real(time), r.integer(0)
@@ -51,7 +53,7 @@ class EventSearch:
         with r.part() as search:
             with r.part() as attempt:
                 h, end = f.h.value, f.new_time.value
-                # A step across the boundary of a mode has no stages, and cannot be repeated.
+                # A step across the boundary of a mode has no stages of its method and cannot be shortened.
                 divisible = h > 2.0 * self.crossing(time)
                 self.records.extra_stages_once(time, h)
                 with r.part() as judged:
@@ -78,7 +80,8 @@ class EventSearch:
             f.new_time.value = select(new_time * SAME_ABOVE >= known, known, new_time)
 
     def _scan(self, time: Real, h: Real, low: RealVariable, high: RealVariable, found: Part) -> None:
-        """Search the windows of a step; leave ``found`` with a bracket in which a guard has fired."""
+        """Search the windows of a step. Where a guard fires, leave ``found``; ``low`` and ``high`` bracket
+        it."""
         f, r, places = self.frame, self.frame.r, self.frame.places
         end = f.new_time.value
         low.value = time
@@ -90,8 +93,8 @@ class EventSearch:
             a = low.value
             middle = fma(0.5, scan[0], a)
             reached = a + scan[0]
-            # A rest shorter than half a window is added to the window; so is the whole rest if the middle of
-            # a window equals one of its ends.
+            # The window takes the rest of the step if the rest is shorter than half a window, or if rounding
+            # makes the middle of the window equal to one of its ends.
             whole = fma(0.5, scan[0], reached) >= end
             apart = (middle > a) & (middle < reached)
             whole = whole | ~apart
@@ -128,9 +131,10 @@ class EventSearch:
         return self.events.watch(minimum(instant, self.frame.clamp.value), self.new_x)
 
     def _take_signs_before(self, instant: Real, time: Real) -> None:
-        """Just before the event, all guards take their signs: one may have passed zero against its direction.
+        """Store the signs of all guards just before the event.
 
-        That is no event, but it is the side from which the guard comes at this instant.
+        A guard may have crossed zero against its direction in this step. That crossing is no event, but the
+        guard needs its present sign for the comparison at the event.
         """
         f, r = self.frame, self.frame.r
         h = f.h.value
@@ -139,11 +143,11 @@ class EventSearch:
             r.call(self.functions.take_signs, f.reals, r.constant_boolean(False))
 
     def _judge(self, doubt: IntegerVariable, instant: Real, time: Real, h: Real) -> None:
-        """Whether an event on the dense output is doubtful, and why.
+        """Set ``doubt`` to the reason why an event on the dense output is doubtful, or to 0.
 
-        The dense output is inaccurate near the start of the step, and where a guard is near zero there. A
-        guard that leaves zero as a high power of time may have the wrong sign on the dense output, but not at
-        the ends of steps: a mass that starts to move from rest does not cross zero.
+        An event is doubtful near the start of the step, and where its guard is near zero at the start. A
+        guard that leaves zero like a high power of time, such as the position of a mass that starts from
+        rest, may have the wrong sign on the dense output. At the ends of steps its sign is correct.
         """
         f, r, functions, t = self.frame, self.frame.r, self.functions, self.events.point.memory
         self.watch_inside(instant, time, h)
@@ -155,10 +159,11 @@ class EventSearch:
         doubt.value = select(early & (found == 0), NEXT_TO_ZERO, found)
 
     def _take_shorter(self, instant: Real, undecided: Boolean, time: Real, h: Real, attempt: Part) -> None:
-        """Take a step to the time of a doubtful event; the guards at its end are valid.
+        """Take a step to the time of a doubtful event and evaluate the guards at its end.
 
-        If no guard has fired there, an eighth of the step is searched instead, unless that is shorter. A
-        guard without a sign gets one halfway to that time.
+        If no guard has fired there, an eighth of the original step is taken and searched, unless the event is
+        even earlier. If the guard had no sign at the start, the step goes only halfway to the event, and the
+        guard gets its sign there.
         """
         f, r, crossing = self.frame, self.frame.r, self.crossing(time)
         distance, shorter = instant - time, 0.125 * h
@@ -174,7 +179,7 @@ class EventSearch:
                 attempt.again()
             step.leave_unless(self.events.watch(minimum(new_time.value, f.clamp.value), self.y) == 0)
             with r.when(last):
-                # No shorter, so that steps without an event do not become tiny.
+                # Not shorter than the length of ``cross``, so that steps without an event do not become tiny.
                 step.leave_when(f.h.value > 0.5 * crossing)
                 new_time.value = time + crossing
                 step.again()
@@ -198,7 +203,7 @@ class EventSearch:
             f.vector(places.guard_slopes)[i] = float("nan")
 
     def _grow_from(self, h: Real) -> None:
-        """An adaptive step after this one grows from its length."""
+        """Limit the next adaptive step to ``GROW`` times the length ``h``."""
         if self.method.tableau.adaptive:
             length = self.frame.scalar[Scalar.STEP]
             length.value = minimum(length.value, GROW * h)
@@ -213,9 +218,9 @@ class EventSearch:
     def _bisect(self, low: RealVariable, high: RealVariable, time: Real, h: Real) -> None:
         """Bisect until ``high`` is the first time, to one unit in the last place, at which a guard has fired.
 
-        No guard has fired at ``low``, some guard has at ``high``. Times within four units in the last place
-        are equal, so an event at a recorded time or a tick coincides with it. Near time 0 the unit is that of
-        a millionth of the run.
+        At ``low`` no guard has fired, at ``high`` some guard has. Times within four units in the last place
+        are one instant, so an event at a recorded time or a tick coincides with it. For times below a
+        millionth of the length of the run, the unit in the last place is the one at that time.
         """
         r = self.frame.r
         closest = (LAST_PLACE * 1e-6) * self.frame.reals[Scalar.SPAN]
@@ -229,7 +234,7 @@ class EventSearch:
                 high.value = middle
 
     def shortest(self, time: Real) -> Real:
-        """A length that is negligible relative to the time."""
+        """A step length that is negligible relative to the time."""
         return 2.0**-46 * maximum(time, self.frame.reals[Scalar.SPAN])
 
     def crossing(self, time: Real) -> Real:
@@ -237,10 +242,10 @@ class EventSearch:
         return 8.0 * self.shortest(time)
 
     def cross(self, time: Real) -> None:
-        """A step of negligible length along the old derivative, after which some guard must have fired.
+        """Take a step of negligible length along the last derivative. Some guard must have fired at its end.
 
-        The equations of a mode may be undefined beyond its boundary, such as the root of a quantity that
-        changes its sign.
+        It crosses the boundary of a mode beyond which the equations of that mode are undefined, for example
+        where the argument of a square root becomes negative.
         """
         f, method = self.frame, self.method
         new_time = minimum(time + self.crossing(time), f.end.value)

@@ -1,9 +1,10 @@
-"""Events of a loop: guards whose sign changes, and what follows at that instant.
+"""Events of a loop: guards whose sign changes, resets, and mode iteration.
 
-A guard fires where its sign is the opposite of the one it had after the last step, tick or event, in a step
-that its direction allows. A zero takes no side: a guard that is zero keeps its last sign, and one that is
-zero at the start counts with the sign that it takes first. Right after it fired, a zero guard of one
-direction is on the side that it came from, and one of both directions counts with the sign it takes first.
+A guard fires when its sign is the opposite of its stored sign and the change has the direction of the guard.
+Signs are stored after every step, tick and event. A guard with the value zero keeps its stored sign. A guard
+that is zero at the start of the run has no sign until its value is nonzero. If a guard is zero right after it
+fired, its stored sign depends on its direction: a guard of one direction gets the sign that it had before the
+event, and a guard of both directions has no sign until its value is nonzero.
 """
 
 from __future__ import annotations
@@ -20,11 +21,12 @@ from armblocks.routines.memory import IntegerVariable, Reals, RealVariable
 from armblocks.routines.values import Boolean, Integer, Real
 
 TURNS_TOGETHER, MOST_TURNS = 8, 32
-"""Modes are changed together in so many turns, and one for each mode; in all, so many turns for each mode."""
+"""Mode iteration changes all inconsistent modes together in the first ``TURNS_TOGETHER`` iterations plus one
+for each mode. It ends after ``MOST_TURNS`` iterations for each mode."""
 
 
 class Events:
-    """Writes what a loop does for guards. ``point`` holds the time of an evaluation."""
+    """Emits the code for guards and modes. ``point`` is the variable that holds the time of an evaluation."""
 
     def __init__(
         self, frame: Frame, method: Method, records: Records, evaluation: Evaluation, point: RealVariable
@@ -41,7 +43,8 @@ class Events:
         self.x, self.new_x = frame.vector(places.x), frame.vector(places.new_x)
 
     def watch(self, time: Real, x: Reals) -> Integer:
-        """Evaluate all guards and mark those that fire; how many do."""
+        """Evaluate all guards and mark those that fire; return the number of them and of inconsistent
+        modes."""
         f = self.frame
         self.point.value = time
         t = self.point.memory
@@ -49,10 +52,10 @@ class Events:
         return f.r.call(self.functions.watch, t, x, f.reals, f.p)
 
     def make_modes_consistent(self, time: Real) -> None:
-        """At the start, resets without events: modes and states take the values that the signals ask for.
+        """At the start of the run, apply resets without events until states and modes are consistent.
 
-        A mode may move a signal on which another one depends, so this is repeated until nothing changes, at
-        most as often as there are guards.
+        A mode may change a signal on which another mode depends. The reset is therefore repeated until
+        nothing changes, at most once for each guard.
         """
         f, r, places = self.frame, self.frame.r, self.frame.places
         left, fired = Count.AT_START, f.vector(places.fired)
@@ -81,7 +84,7 @@ class Events:
             f.counts[left] = 0
 
     def _follow_at_start(self) -> None:
-        """Modes that follow the signals, before anything with a memory is asked."""
+        """Make the modes consistent that are functions of the signals, before those with memory."""
         f, r, functions, t = self.frame, self.frame.r, self.functions, self.point.memory
         turns = r.integer(0)
         with r.loop() as loop:
@@ -95,7 +98,7 @@ class Events:
             r.call(functions.take_followers, f.reals)
 
     def reset(self) -> None:
-        """``new_x`` and ``new_z`` after the events that are marked in ``fired``."""
+        """Compute ``new_x`` and ``new_z`` for the events that are marked in ``fired``."""
         f, places = self.frame, self.frame.places
         z, unknowns, fired, new_z = (
             f.vector(place) for place in (places.z, places.trial_w, places.fired, places.new_z)
@@ -104,22 +107,22 @@ class Events:
         f.r.call(system_functions.reset, t, self.x, z, unknowns, f.p, fired, self.new_x, new_z)
 
     def take_reset(self) -> None:
-        """States and discrete variables become what the reset makes of them."""
+        """Copy the states and discrete variables of the reset to ``x`` and ``z``."""
         f, places = self.frame, self.frame.places
         f.copy(places.new_x, places.x, f.n)
         f.copy(places.new_z, places.z, f.sizes.discrete)
 
     def fire(self, time: Real) -> None:
-        """Make modes consistent and fire guards, in turns, until nothing is left to change.
+        """Iterate over modes and guards until all modes are consistent and no guard fires.
 
-        First the modes that follow the signals: those whose guards have passed zero here, and those that
-        contradict their conditions. Until they are consistent, signals are not those of this instant, and
-        nothing with a memory may act on them. Then all other guards that fire cause one reset. Where none
-        fires, modes with a memory that contradict their conditions take their consistent values.
+        1. Modes that are functions of the signals are made consistent. Before that the signals do not have
+           their values of this instant, so no state or mode with memory may change.
+        2. All other guards that fire cause one reset.
+        3. If none fires, inconsistent modes with memory take their consistent values.
 
-        Contradicting modes change together in the first turns, then the first of them alone, which ends for
-        every complementarity problem with a P-matrix (Murty 1974, the least index rule). Where that does not
-        end either, no choice of the modes is consistent.
+        In the first iterations all inconsistent modes change together, then only the first of them. With this
+        least index rule the iteration ends for every complementarity problem with a P-matrix (Murty 1974). If
+        it still does not end, the run ends: no choice of the modes is consistent.
         """
         f, r, functions = self.frame, self.frame.r, self.functions
         yes, no = r.constant_boolean(True), r.constant_boolean(False)
@@ -127,7 +130,7 @@ class Events:
         with r.loop() as turns:
             turns.leave_when(self.watch(time, self.x) == 0)
             f.count[Count.FRESH].value = 1
-            # A turn counts as a step, so that a call of few steps ends soon also where there are many events.
+            # An iteration counts as a step, so that a call with few steps returns soon even at many events.
             f.taken.value = f.taken.value + 1
             if self.modes:
                 with r.when(r.call(functions.any_contradicts, f.reals, yes)):
@@ -153,7 +156,7 @@ class Events:
             slopes[i] = float("nan")
 
     def _follow(self, time: Real, quiet_turns: IntegerVariable) -> None:
-        """One turn of the modes that follow the signals."""
+        """One iteration of the modes that are functions of the signals."""
         f, r, functions = self.frame, self.frame.r, self.functions
         r.call(functions.any_fired, f.reals, r.constant_boolean(True))
         self._count_quiet_turn(time, quiet_turns)
@@ -166,7 +169,7 @@ class Events:
             r.call(functions.take_tangent_signs, f.reals)
 
     def _settle(self, time: Real, quiet_turns: IntegerVariable) -> None:
-        """One turn of the modes with a memory, without an event."""
+        """One iteration of the modes with memory, without an event."""
         f, r = self.frame, self.frame.r
         r.call(self.functions.take_signs, f.reals, r.constant_boolean(False))
         self._count_quiet_turn(time, quiet_turns)
@@ -176,7 +179,7 @@ class Events:
         self._take_fired_signs()
 
     def _capture_again(self) -> None:
-        """Before the events of a turn act: what goes with modes that remember is captured as it is now."""
+        """Capture the present values that belong to modes with memory, before the reset of this iteration."""
         f, r, places = self.frame, self.frame.r, self.frame.places
         if not f.sizes.recaptured:
             return
@@ -192,7 +195,7 @@ class Events:
             z[recaptured[i]] = new_z[recaptured[i]]
 
     def _remember_modes(self) -> None:
-        """What a mode is now is what it was before, for what comes next."""
+        """Store the present modes as the previous values that modes with memory read."""
         f = self.frame
         if not f.sizes.remembered:
             return
@@ -203,7 +206,7 @@ class Events:
             z[of_before[i]] = z[of_modes[i]]
 
     def _end_moment(self) -> None:
-        """Guards that were silenced begin anew, and what holds for this instant alone is over."""
+        """Give silenced guards their present signs, and set the momentary values to 0."""
         f, r = self.frame, self.frame.r
         if self.functions.begin_anew:
             r.call(self.functions.begin_anew, f.reals)
@@ -213,36 +216,38 @@ class Events:
                 z[momentary[i]] = 0.0
 
     def _count_quiet_turn(self, time: Real, quiet_turns: IntegerVariable) -> None:
-        """Return after too many turns without an event."""
+        """Count an iteration without an event; return from the loop after too many of them."""
         self._count_events(time, quiet_turns.value == 0, bounds=False)
         quiet_turns.value = quiet_turns.value + 1
         few = quiet_turns.value < MOST_TURNS * self.modes
         self.frame.leave_unless(few, Status.INCONSISTENT_MODES)
 
     def _hold(self, quiet_turns: IntegerVariable, *, follows: bool) -> None:
-        """Modes that are consistent keep their values; late, only the first of the others changes."""
+        """Keep the values of consistent modes. After many iterations only the first inconsistent mode
+        changes."""
         f, r = self.frame, self.frame.r
         one_by_one = quiet_turns.value > TURNS_TOGETHER + self.modes
         r.call(self.functions.hold_modes, f.reals, r.constant_boolean(follows), one_by_one)
 
     def _take_fired_signs(self) -> None:
-        """Guards that fired take the sign that the reset gives them; the others keep theirs."""
+        """Store the signs after the reset of the guards that fired; the others keep their stored signs."""
         f, r, t = self.frame, self.frame.r, self.point.memory
         self.evaluation.solve(t, self.x)
         self.functions.evaluate(r, t, self.x, f.reals, f.p)
         r.call(self.functions.take_signs, f.reals, r.constant_boolean(True))
 
     def _count_events(self, time: Real, first: Boolean, *, bounds: bool) -> None:
-        """Return where events follow one another without end; the first step after an event is short."""
+        """Count the events; return from the loop if they are endless. ``bounds``: limit the next step."""
         f = self.frame
         bound = f.r.call(self.functions.note_events, time, f.reals, f.counts, first)
         if bounds:
             f.scalar[Scalar.BOUND].value = bound
-        # A negative bound is how the count of events says that there is no end to them.
+        # ``note_events`` returns a negative bound for endless events.
         f.leave_unless(bound >= 0.0, Status.ENDLESS_EVENTS)
 
     def stop(self, time: Real) -> None:
-        """Where a guard that ends the run is positive, record this instant, if it is not, and return."""
+        """If a guard that ends the run is positive, record this instant, unless it is recorded, and
+        return."""
         f, r = self.frame, self.frame.r
         if not f.sizes.stops:
             return

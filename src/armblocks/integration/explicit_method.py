@@ -11,13 +11,13 @@ from armblocks.routines.arithmetic import fma, maximum, select, square_root
 from armblocks.routines.values import Real
 
 CHECK_EVERY = 16
-"""Steps between two checks of what bounds them: a power of two."""
+"""Number of steps between two checks for stability-limited steps: a power of two."""
 NEAR_BORDER = 0.97
-"""Fraction of the stability interval: a longer step is limited by stability (3.2 of 3.3, as in Hairer's
-DOPRI5)."""
+"""Fraction of the stability interval beyond which a step counts as stability-limited (3.2 of 3.3, as in
+Hairer's DOPRI5)."""
 STIFF_CHECKS, CALM_CHECKS = 250, 6
-"""Number of checks with a stability-limited step (4000 steps) after which the system counts as stiff, and
-number of consecutive other checks that reset the count."""
+"""Number of checks with a stability-limited step after which the system counts as stiff (4000 steps), and
+number of consecutive checks without one that reset the count."""
 
 
 class ExplicitMethod(Method):
@@ -49,7 +49,7 @@ class ExplicitMethod(Method):
         for k, node in enumerate(tableau.extra_nodes):
             self.move(tableau.extra_matrix[k], h)
             self.evaluate(fma(node, h, time), self.y, tableau.stages + 1 + k)
-        # The extra stages went through y: give it the new state again, by the same operations.
+        # The extra stages used y as memory: compute the new state in it again, by the same operations.
         self.move(tableau.weights, h)
 
     def error_norm(self, h: Real, error: Row) -> Real:
@@ -63,19 +63,20 @@ class ExplicitMethod(Method):
         return select(denominator == 0.0, 0.0, norm)
 
     def change(self, h: Real) -> Real:
-        """Norm of ``h`` times the change of the derivative: to the end, and to a stage in the middle.
+        """The larger norm of ``h`` times the change of the derivative from the start to the end and to a
+        middle stage.
 
-        A long step may span a whole period, at whose end the derivative equals that at its start.
+        The end alone is not enough: a long step may span a whole period, after which the derivative repeats.
         """
         nodes = self.butcher.nodes
         middle = min(range(1, self.butcher.stages), key=lambda stage: abs(nodes[stage] - 0.5))
         return maximum(super().change(h), self.norm(h, change_to(middle)))
 
     def watch(self, h: Real) -> None:
-        """Check whether stability limits the step; if it has done so for long, pause before the next one.
+        """Check whether stability limits the step; pause if it has limited many of the steps.
 
-        A step is stability-limited where ``h`` times the fastest rate reaches the border of the stability
-        region. Six consecutive other checks reset the count (Hairer, Wanner II, IV.2).
+        A step is stability-limited if ``h`` times the fastest rate reaches the border of the stability
+        region. Six consecutive checks without such a step reset the count (Hairer, Wanner II, IV.2).
         """
         if not self.butcher.measures_stiffness:
             return

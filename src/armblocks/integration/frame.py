@@ -10,7 +10,7 @@ from armblocks.routines.routine import Part, Routine
 from armblocks.routines.values import Boolean, Integer
 
 SAME_ABOVE, SAME_BELOW = 1.0 + 2.0**-50, 1.0 - 2.0**-50
-"""Two times within these factors of one another are the same instant."""
+"""Two times are the same instant if their ratio is between these factors."""
 
 REALS = (Scalar.TIME, Scalar.STEP, Scalar.TRIED)
 COUNTS = (
@@ -38,8 +38,8 @@ class Arrays:
     record and ``out`` their states, ``(N, n)``; ``out_z``, ``out_w`` are likewise the discrete variables and
     the unknowns. ``ends`` are the ends of the segments between breakpoints and ``clamps`` the latest time at
     which each segment may evaluate its derivative. ``saved_reals`` and ``saved_counts`` receive the state
-    from which a run with a later end would continue; ``scratch`` has room for the linear equations of a step.
-    The loop returns after ``max_steps`` accepted steps at the latest.
+    from which a run with a later end would continue. ``scratch`` is the memory for the linear equations of a
+    step. The loop returns after at most ``max_steps`` accepted steps.
     """
 
     reals: Reals
@@ -92,11 +92,11 @@ class Frame:
         """Steps accepted in this call."""
         self.status = r.integer(Status.DONE)
         self.h = r.real(0.0)
-        """Length of the step being tried."""
+        """Length of the current trial step."""
         self.new_time = r.real(0.0)
-        """Time at its end."""
+        """Time at the end of the trial step."""
         self.whole: Part | None = None
-        """The block of the whole loop: leaving it returns the status."""
+        """The part that contains the whole loop: leaving it returns the status."""
 
     @property
     def time(self) -> RealVariable:
@@ -128,7 +128,7 @@ class Frame:
             self.leave(status)
 
     def keep(self) -> None:
-        """Write the variables back into the arrays."""
+        """Write the variables to the arrays."""
         for place, variable in self.scalar.items():
             self.reals[place] = variable.value
         for place, counter in self.count.items():
@@ -136,6 +136,6 @@ class Frame:
 
 
 def copy(r: Routine, source: Reals, target: Reals, count: int) -> None:
-    """Copy a number of values."""
+    """Copy ``count`` values."""
     for i in r.each(count):
         target[i] = source[i]

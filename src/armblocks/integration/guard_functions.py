@@ -16,25 +16,25 @@ MOST_AT_ONCE = 1000
 CLOSE = 1e-12
 """Relative distance below which events count as close."""
 MOST_CROWDED, CROWD = 100_000, 1e-8
-"""Number of consecutive events within this relative distance that count as endless: the run advances by less
-than a thousandth of its time meanwhile."""
+"""Number of consecutive events at most this relative distance apart that count as endless. The run advances
+by less than a thousandth of its time during them."""
 SHRINKING, SHRUNK = 10, 2.0**-46
-"""Number of consecutive events of a guard with shrinking distances, down to this relative distance (about 100
-units in the last place), that count as the start of infinitely many events (Zeno behaviour)."""
+"""Zeno behaviour: a guard has fired at least this many times in a row at shrinking distances, and the last
+distance is below this fraction of the time (about 100 units in the last place)."""
 SHORT = 0.01
-"""The first step after an event, relative to the time since the previous event of the guard."""
+"""Maximum first step after an event, relative to the time between the last two events of the guard."""
 
 UNDECIDED, NEXT_TO_ZERO = 2, 1
 """Reasons for a doubtful event: the fired guard had no sign at the start of the step, or was near zero."""
 NEAR = 2.0**-3
-"""Near zero: less than this fraction of its value at the end of the step."""
+"""A guard is near zero at the start of a step if it is below this fraction of its value at the end."""
 
 
 class GuardFunctions:
     """The functions of a program for the guards of a system.
 
-    All have ``reals``, the array of the run with the guards' vectors; a guard's direction is 1 where it
-    fires upwards, -1 downwards, 0 both ways.
+    All functions take ``reals``, the array of the run with the guards' vectors. The direction of a guard is 1
+    if it fires upwards, -1 if downwards, 0 for both.
     """
 
     def __init__(self, program: Program, workspace: Workspace, sizes: LoopSizes) -> None:
@@ -72,8 +72,8 @@ class GuardFunctions:
             r.call(system_functions.guards, t, x, z, unknowns, p, values)
 
     def _watch(self, r: Routine, t: Reals, x: Reals, reals: Reals, p: Reals) -> Integer:
-        """Evaluate the guards with ``trial_w`` and mark in ``fired`` which ones fire and whether upwards;
-        returns their number and the number of inconsistent modes."""
+        """Evaluate the guards with ``trial_w`` and mark in ``fired`` those that fire, with the direction.
+        Returns the number of guards that fire plus the number of inconsistent modes."""
         places = self.places
         self.evaluate(r, t, x, reals, p)
         values, signs, fired, contradictions = (
@@ -97,8 +97,8 @@ class GuardFunctions:
         return total.value
 
     def _doubt(self, r: Routine, reals: Reals) -> Integer:
-        """Whether a marked guard had no sign at the start of the step, or was near zero there; the guards are
-        those at its end."""
+        """The reason why a marked guard is doubtful, or 0: it had no sign at the start of the step, or was
+        near zero there. The values in ``guards`` are those at the end of the step."""
         places, found = self.places, r.integer(0)
         for i in r.each(self.count):
             fired, known, before, after = (
@@ -112,7 +112,7 @@ class GuardFunctions:
         return found.value
 
     def _any_returned(self, r: Routine, reals: Reals) -> Boolean:
-        """Whether a guard without a sign at the start of the step has got one, and is zero at its end."""
+        """Whether a guard without a sign at the start of the step has a sign now and is zero at the end."""
         places, found = self.places, r.boolean(False)
         for i in r.each(self.count):
             before, now, value = (
@@ -122,8 +122,9 @@ class GuardFunctions:
         return found.value
 
     def _any_fired(self, r: Routine, reals: Reals, locating: Boolean) -> Boolean:
-        """Whether a guard of one kind is marked (those that only locate mode changes, or all others); clears
-        the marks of the other kind. Guards of derivatives belong to both kinds."""
+        """Whether a guard of one kind is marked; clears the marks of the other kind. With ``locating`` the
+        kind is the guards that only locate mode changes, else all others. Guards of derivatives belong to
+        both."""
         found, fired = r.boolean(False), reals.after(self.places.fired)
         locates = r.integers("guard.locates", self.locating)
         for i in r.each(self.count):
@@ -135,7 +136,8 @@ class GuardFunctions:
         return found.value
 
     def _any_contradicts(self, r: Routine, reals: Reals, follows: Boolean) -> Boolean:
-        """Whether a mode of one kind (those that follow the signals, or all others) is inconsistent."""
+        """Whether an inconsistent mode is a function of the signals (``follows``), or whether another one
+        is."""
         found, contradictions = r.boolean(False), reals.after(self.places.contradictions)
         followers = r.integers("mode.follows", self.followers)
         for i in r.each(len(self.modes)):
@@ -144,8 +146,9 @@ class GuardFunctions:
         return found.value
 
     def _hold_modes(self, r: Routine, reals: Reals, follows: Boolean, only_first: Boolean) -> None:
-        """Inconsistent modes of one kind (those that follow the signals, or all others) take the values of
-        the reset, all of them or only the first. All other modes are unchanged."""
+        """Keep in ``new_z`` the values of the reset for inconsistent modes of one kind, all or only the
+        first; give all other modes their old values. ``follows`` selects modes that are functions of the
+        signals, else the rest."""
         z, new_z, contradictions = (
             reals.after(place) for place in (self.places.z, self.places.new_z, self.places.contradictions)
         )
@@ -159,7 +162,7 @@ class GuardFunctions:
             held.value = kept | (contradicts & only_first)
 
     def _take_followers(self, r: Routine, reals: Reals) -> None:
-        """Modes that follow the signals, and derivatives, take the values of the reset."""
+        """Copy the values of the reset for modes that are functions of the signals, and for derivatives."""
         places = self.places
         x, new_x, z, new_z = (
             reals.after(place) for place in (places.x, places.new_x, places.z, places.new_z)
@@ -186,14 +189,17 @@ class GuardFunctions:
             signs[i] = select(fired[i] != 0.0, sign(values[i]), signs[i])
 
     def _dips(self, r: Routine, reals: Reals, half: Real) -> Integer:
-        """Count the guards that may have touched zero and returned between three values of equal sign,
-        ``half`` apart.
+        """Count the guards that may have touched zero and returned within a window, although its three
+        values, ``half`` apart, have the same sign.
 
-        With A, M, B the values at the beginning, in the middle and at the end, as distances from zero, the
-        parabola through them is M + (B - A) s / 2 + C s^2 / 2, C = A - 2 M + B, for s from -1 to 1. It is
-        doubtful where its extremum lies between them, near zero; and where it begins at another slope than
-        that at which the window before this one ended: a cubic that turns such a difference D, times half
-        the window, is D / 5 away from the parabola, so half of D has to be less than the distances.
+        A, M, B are the distances from zero at the beginning, in the middle and at the end. The parabola
+        through them is M + (B - A) s / 2 + C s^2 / 2 with C = A - 2 M + B, for s from -1 to 1. A guard may
+        have touched zero in two cases:
+
+        - The minimum of the parabola lies inside the window and near zero.
+        - The initial derivative of the parabola differs from the derivative at the end of the previous
+          window. Let D be the difference times half the window. A cubic with the derivative of the previous
+          window deviates from the parabola by D / 5. The guard is safe if D / 2 is less than A, M and B.
         """
         total = r.integer(0)
         for i in r.each(self.count):
@@ -202,7 +208,7 @@ class GuardFunctions:
             rise = B - A
             bend = A - M + (B - M)
             inside = abs(rise) < 1.98 * bend
-            # least = M - rise^2 / (8 bend), doubtful by a quarter of the bend
+            # The minimum is M - rise^2 / (8 bend). It is near zero if it is below a quarter of the bend.
             eight = 8.0 * bend
             least = fma(eight, M, -1.0 * (rise * rise))
             near = least < 0.25 * bend * eight
@@ -221,8 +227,8 @@ class GuardFunctions:
     def _turns(
         self, reals: Reals, half: Real, i: Integer | int, side: Real, distances: tuple[Real, Real, Real]
     ) -> Boolean:
-        """Whether a guard's slope differs from that at the end of the previous window; false where that is
-        NaN."""
+        """Whether the derivative of a guard differs too much from that at the end of the previous window.
+        False where the previous one is NaN."""
         A, M, B = distances
         known = side * reals.after(self.places.guard_slopes)[i]
         now = fma(-1.5, A, fma(2.0, M, -0.5 * B))
@@ -232,7 +238,7 @@ class GuardFunctions:
         return (least > 0.0) & doubtful
 
     def _note_slopes(self, r: Routine, reals: Reals, half: Real) -> None:
-        """Store the slope at the end of the parabola through the last three values of each guard."""
+        """Store the derivative at the end of the parabola through the last three values of each guard."""
         for i in r.each(self.count):
             A, M, B = self._window(reals, i)
             rise = fma(1.5, B, fma(-2.0, M, 0.5 * A))
@@ -247,22 +253,23 @@ class GuardFunctions:
             now, known, mark = sign(values[i]), signs[i], fired[i]
             has_fired, nonzero = mark != 0.0, now != 0.0
             side = select(nonzero, now, known)
-            # A guard with one direction that is reset to its zero gets the opposite sign: a ball on the floor
-            # that still falls bounces again.
+            # A guard of one direction that is zero after its reset gets the sign opposite to the crossing. So
+            # a ball that is placed on the floor with a downward speed bounces again.
             directed = directions[i] != 0.0
             back = select(directed & has_fired, -1.0 * mark, now)
             after = select(has_fired, select(nonzero, now, back), known)
             signs[i] = select(only_fired, after, side)
 
     def _begin_anew(self, r: Routine, reals: Reals) -> None:
-        """The signs of silenced guards become those of their values, also where these are zero."""
+        """Set the signs of silenced guards to those of their values, 0 included."""
         places = self.places
         values, signs, z = (reals.after(place) for place in (places.guards, places.signs, places.z))
         for guard, place in self._silenced(r):
             signs[guard] = select(z[place] == 0.0, signs[guard], sign(values[guard]))
 
     def _silenced(self, r: Routine) -> Iterator[tuple[Integer, Integer]]:
-        """The guards that a momentary value silences, each with its place, in a loop of the routine."""
+        """A loop of the routine over the silenced guards; yields each with the place of its momentary
+        value."""
         if not self.silenced:
             return
         guards, places = zip(*self.silenced)
@@ -271,15 +278,14 @@ class GuardFunctions:
             yield of_guards[i], of_places[i]
 
     def _note_events(self, r: Routine, t: Real, reals: Reals, counts: Integers, first: Boolean) -> Real:
-        """Count the events of an event time, and the consecutive close ones; returns a bound for the next
+        """Count the events at a time, and the consecutive close ones. Returns the maximum length of the next
         step, negative for endless events.
 
-        ``first`` is false for further mode iterations at the same time: only guards that were not yet counted
-        count.
+        ``first`` is false in further mode iterations at the same time. A guard is counted once at each time.
 
-        Events follow closely where less than ``CLOSE`` of the time lies between them. A series with shrinking
-        distances, such as a bouncing ball, may end by itself. It counts as endless only where the distances
-        reach the rounding error of time, or after ``MOST_CROWDED`` consecutive events.
+        Events are close if their distance is below ``CLOSE`` times the time. A series with shrinking
+        distances, such as a bouncing ball, may end. It counts as endless only if the distances reach the
+        rounding error of time, or after ``MOST_CROWDED`` consecutive events.
         """
         places = self.places
         bound = r.real(float("inf"))

@@ -4,8 +4,9 @@
 dense elimination with row pivoting, and halved steps while the residual does not fall. It starts from the
 ``w`` of the last accepted step, so a repeated step gives identical results.
 
-If it does not converge, or the Jacobian is singular, ``w`` becomes NaN: the step is repeated with a shorter
-length, and if this fails the run ends as for any other NaN, and the cause is then diagnosed.
+If Newton's method does not converge, or the Jacobian is singular, ``w`` becomes NaN. The loop then repeats
+the step with a shorter length. If that fails, the run ends as for any other NaN, and Python diagnoses the
+cause.
 """
 
 from __future__ import annotations
@@ -21,9 +22,10 @@ from armblocks.routines.values import Real
 ITERATIONS = 50
 HALVINGS = 12
 CONVERGED = 1e-13
-"""Last correction over ``1 + |w|``; the one after it would be of the order of its square."""
+"""Convergence: the last correction relative to ``1 + |w|`` is below this. The next correction would be of the
+order of its square."""
 ACCEPTABLE = 1e-9
-"""The same where rounding keeps the corrections from falling further."""
+"""The same limit where rounding errors keep the corrections from decreasing further."""
 
 
 def define_solve(
@@ -91,7 +93,7 @@ class _Newton:
         return total.value
 
     def correction(self) -> Real:
-        """The largest correction over ``1 + |w|``; NaN where one is."""
+        """The largest correction relative to ``1 + |w|``; NaN if a correction is NaN."""
         largest = self.r.real(0.0)
         for i in self.r.range(0, self.n):
             value = self.trial[i]
@@ -102,7 +104,7 @@ class _Newton:
         return largest.value
 
     def walk(self, before: Real) -> None:
-        """``w -= lambda d`` with ``lambda`` halved until the residual falls, a dozen times at most."""
+        """``w -= lambda d``, with ``lambda`` halved at most a dozen times until the residual decreases."""
         r = self.r
         length = r.real(1.0)
         with r.loop() as shorter:
@@ -110,7 +112,8 @@ class _Newton:
             for i in r.range(0, self.n):
                 d, start = self.residual[i], self.before[i]
                 self.trial[i] = fma(factor, d, start)
-            # The factors of the Jacobian are used up: their first row takes the new residual.
+            # The factors of the Jacobian are no longer needed: the new residual takes the memory of their
+            # first row.
             r.call(residual, *self.point, self.trial, self.p, self.jacobian)
             after = self.square(self.jacobian)
             fell = after <= before

@@ -2,19 +2,19 @@
 
 At an instant (a tick, an event, a breakpoint, the start) the loop does the following, in native code:
 
-1. the flow is integrated up to it with the old values; the step ends exactly there, and where states store
-left limits, ``update`` is called without a marked clock;
+1. the flow is integrated up to the instant with the old values, and a step ends exactly there; if states
+store left limits, ``update`` is called without a marked clock;
 2. all clocks that tick now are marked and ``update`` gives ``z``;
-3. modes that follow the signals become consistent; then guards whose sign the jump has changed fire, and so
-   do those whose zero was located here, and ``reset`` gives ``x`` and ``z``; where none fires, other modes
-   that contradict their conditions take their consistent values; this is repeated until nothing changes;
+3. mode iteration: modes that are functions of the signals are made consistent; then ``reset`` gives ``x`` and
+   ``z`` for the guards that fire, because the jump changed their sign or their zero was located here; if none
+   fires, inconsistent modes with memory take their consistent values; this is repeated until nothing changes;
 4. the instant is recorded: signals are right-continuous;
-5. the integration restarts. The first step after an event is at most a hundredth of the time since the
-   event before it, and later ones grow tenfold at most: so that no step passes over bounces of decreasing
-   length.
+5. the integration restarts. The first step after an event is at most a hundredth of the time between the last
+   two events, and each later step at most ten times the one before. No step can then pass over bounces whose
+   distances shrink.
 
-Times within four units in the last place are equal: so 3 times 0.1 s and 0.3 s coincide although their
-doubles differ, and a breakpoint or a recorded instant coincides with a tick likewise.
+Times within four units in the last place are one instant. So 3 times 0.1 s and 0.3 s coincide although their
+doubles differ, and a tick can coincide with a breakpoint or a recorded time.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from armblocks.routines.values import Boolean, Real
 class Instants(Course):
     """Pieces end at ticks, events, breakpoints, and where a delayed signal jumps.
 
-    ``point`` holds the time of an evaluation.
+    ``point`` is the variable that holds the time of an evaluation.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class Instants(Course):
         self.x = frame.vector(frame.places.x)
 
     def enter(self, stages: Stages) -> None:
-        """Go on where the last call stopped; the ends of the current piece are worked out again."""
+        """Continue where the last call stopped; the end of the current piece is computed again."""
         f, r = self.frame, self.frame.r
         if self.delays:
             self.delays.bound_steps()
@@ -73,7 +73,8 @@ class Instants(Course):
         self.instant()
 
     def begin_piece(self) -> None:
-        """How far the steps may go: to the next tick or the segment's end, whichever is earlier."""
+        """Set the end of the next piece: the next tick, the next jump of a delayed signal, or the segment's
+        end."""
         f = self.frame
         last = f.segments - 1
         segment = f.count[Count.SEGMENT].value
@@ -81,7 +82,7 @@ class Instants(Course):
         end = f.arrays.ends[segment]
         self.segment_end.value = end
         f.clamp.value = f.arrays.clamps[segment]
-        # A tick a few rounding errors before the end is at the end.
+        # A tick within rounding before the end of the segment belongs to the end.
         shortest = end * SAME_BELOW
         earliest = end
         for clock in range(self.clocks.count):
@@ -93,12 +94,13 @@ class Instants(Course):
         f.end.value = earliest
 
     def instant(self) -> None:
-        """Ticks, events and records at the time reached; goes on at the start of the next piece."""
+        """Process ticks and events at the time reached and record it; continue at the start of the next
+        piece."""
         f = self.frame
         time = f.time.value
         until = time * SAME_ABOVE
-        # A record that is one instant with a tick or breakpoint is of that instant. An event is located to
-        # the last place: what is recorded later comes later.
+        # A sample time within rounding of a tick or breakpoint is recorded with it. An event is located to
+        # the last place: a sample time after it, however close, is not recorded with it.
         known = time >= f.end.value * SAME_BELOW
         recorded = select(known, until, time)
         self.clocks.capture(time)
@@ -128,7 +130,7 @@ class Instants(Course):
             self.delays.make_room()
 
     def first_step(self, time: Real) -> None:
-        """The length of the step after a start; after a tick, the length that was to come next."""
+        """Choose the length of the step after a restart; after a tick the proposed length stays."""
         f = self.frame
         with f.r.when(f.count[Count.FRESH].value != 0):
             choose_first_step(f, self.method, self.records, time)
@@ -136,7 +138,7 @@ class Instants(Course):
             length.value = minimum(length.value, f.scalar[Scalar.BOUND].value)
 
     def try_finite(self, trial: Trial, time: Real, new_time: Real) -> None:
-        """Try a fixed step, shorter where its end is not finite; at last one across the border of a mode."""
+        """Try a fixed step; quarter it while its end is not finite, then cross the boundary of a mode."""
         f, r, method = self.frame, self.frame.r, self.method
         end_row = method.K(method.tableau.end_row)
         if not self.search:
@@ -154,7 +156,7 @@ class Instants(Course):
             self.search.cross(time)
 
     def not_finite(self, time: Real, finite: Boolean, accepted: Part) -> None:
-        """Steps have become as short as they can be: cross the border of a mode, if that is the cause."""
+        """If steps of minimum length are not finite, cross the boundary of a mode, else return."""
         if self.search:
             with self.frame.r.unless(finite):
                 self.search.cross(time)
@@ -163,11 +165,12 @@ class Instants(Course):
             self.frame.leave_unless(finite, Status.NON_FINITE)
 
     def passed(self, time: Real, spacing: Real) -> Real:
-        """Grid instants up to this time are behind: one a rounding error after a tick is the tick."""
+        """Grid points up to the returned time count as passed: one within rounding after a tick is the
+        tick."""
         return fma(spacing, 1e-9, time)
 
     def bounded(self, time: Real, new_time: Real) -> Real:
-        """The end of a fixed step, sooner right after an event."""
+        """The end of a fixed step, which is earlier right after an event."""
         f = self.frame
         following = (time.bits() + 10).from_bits()
         soon = maximum(time + f.scalar[Scalar.BOUND].value, following)
@@ -176,14 +179,14 @@ class Instants(Course):
         return minimum(soon, new_time)
 
     def next_length(self, proposed: Real) -> Real:
-        """A step that was cut short by a tick says nothing against the length that was to be tried."""
+        """The length of the next step. A step that was shortened to end at a tick does not reduce it."""
         f = self.frame
         length = f.scalar[Scalar.STEP].value
         cut = f.new_time.value >= f.end.value
         return select(cut, maximum(proposed, length), proposed)
 
     def accept(self, stages: Stages) -> None:
-        """Events within the step, its samples, then the new point becomes the old one."""
+        """Locate the first event within the step, record its samples, and make its end the new point."""
         f, r, places, records = self.frame, self.frame.r, self.frame.places, self.records
         if self.search:
             self.search.happened.value = 0
@@ -194,8 +197,8 @@ class Instants(Course):
         new_time = f.new_time.value
         before = new_time * SAME_BELOW
         if self.search:
-            # An event is located to the last place: a record before it shows what was before it, unless a
-            # tick or breakpoint is at this instant as well.
+            # An event is located to the last place: a sample time just before it is recorded with the values
+            # before the event, unless a tick or breakpoint is at this instant as well.
             apart = (self.search.happened.value != 0) & (new_time < f.end.value * SAME_BELOW)
             before = select(apart, (new_time.bits() - 1).from_bits(), before)
         records.samples(time, before, h)
@@ -212,7 +215,8 @@ class Instants(Course):
         with r.unless((self.search.happened.value != 0) | ends if self.search else ends):
             f.copy(places.slope(self.method.tableau.end_row), places.slope(0), f.n)
             if f.sizes.algebraic or self.delays:
-                # The samples may have changed it; a zero of the same equations is found again at once.
+                # Recording samples may have changed ``trial_w``. Newton's method finds the same solution
+                # quickly.
                 self.point.value = minimum(new_time, f.clamp.value)
                 self.evaluation.solve(self.point.memory, self.x)
                 self.evaluation.accept_unknowns()

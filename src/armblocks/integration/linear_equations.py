@@ -19,22 +19,22 @@ from armblocks.routines.routine import Function, Program, Routine
 from armblocks.routines.values import Boolean, Integer, Real
 
 SMALL = 8
-"""Up to this size the whole matrix is eliminated with pivoting, which is fastest."""
+"""Up to this size the whole matrix is eliminated with pivoting, which is the fastest way."""
 FULL = 0.5
 """The same applies if L and U have this fraction of all entries."""
 SCALING_ROUNDS = 6
-"""Rounds in which the bound of the rates comes down to within a factor of about two, for most matrices."""
+"""Iterations after which the bound of the rates is within a factor of about two, for most matrices."""
 LEFT_OVER = 1e-7
-"""Relative residual above which the elimination without pivoting counts as failed. A Rosenbrock method with
-a Jacobian this wrong is still far more accurate than the tolerances that it is chosen for."""
+"""Relative residual above which the elimination without pivoting counts as failed. An error of this size in
+the Jacobian causes an error far below the usual tolerances of a Rosenbrock method."""
 
 
 class LinearSpace:
-    """Where the numbers of the linear equations lie in ``scratch``, memory that no step leaves to the next.
+    """The positions of the linear equations in ``scratch``. No step reads what an earlier step wrote there.
 
-    ``J`` and ``T`` are what the system's ``flow_jacobian`` writes; ``right`` and ``solution`` are numbered as
-    the equations and unknowns are. ``swaps`` and ``whole``, whether the whole matrix was eliminated, are
-    integers.
+    The system's ``flow_jacobian`` writes ``J`` and ``T``. ``right`` has the order of the equations,
+    ``solution`` that of the unknowns. ``swaps`` are integers, and so is ``whole``: whether the whole matrix
+    was eliminated.
     """
 
     def __init__(self, pattern: JacobianPattern) -> None:
@@ -61,8 +61,8 @@ class LinearSpace:
 class LinearEquations:
     """The functions of a program that factor the matrix of a step and solve for its right sides.
 
-    ``gamma`` is that of the method. :attr:`factor` is the cheapest elimination, :attr:`factor_whole` the one
-    with pivoting.
+    ``gamma`` is the coefficient of the method. :attr:`factor` is the cheapest elimination,
+    :attr:`factor_whole` the one with pivoting.
     """
 
     def __init__(self, program: Program, space: LinearSpace, gamma: float) -> None:
@@ -72,8 +72,8 @@ class LinearEquations:
         self.factor_whole = program.define(whole.factor_whole, inlined=False)
         self.factor: Function[[Reals, Real], None] = self.factor_whole
         self.solved_well: Function[[Reals, Real], Boolean] | None = None
-        """Whether the solution with ``h`` is good enough: no row leaves more over than a part of its own
-        terms' sizes. None where it is anyway."""
+        """Whether the solution with the step ``h`` is accurate: the residual of every row is small relative
+        to the terms of the row. None for elimination with pivoting, which needs no check."""
         if space.plan is not None:
             sparse = _Sparse(space, space.plan, 1.0 / gamma)
             self.factor = program.define(sparse.factor, inlined=False)
@@ -85,9 +85,9 @@ class LinearEquations:
     def rate_bound(self) -> Function[[Reals], Real]:
         """An upper bound of the magnitudes of the eigenvalues of ``J``.
 
-        For any positive v, that is ``max_i (|J| v)_i / v_i`` (Collatz, Wielandt; Horn, Johnson, Matrix
-        Analysis, 8.1.31 and 8.1.18). A few rounds of ``v = sqrt(v |J| v)`` make v fit the scales of the
-        states.
+        For any positive v, ``max_i (|J| v)_i / v_i`` is such a bound (Collatz, Wielandt; Horn, Johnson,
+        Matrix Analysis, 8.1.31 and 8.1.18). A few iterations of ``v = sqrt(v |J| v)`` adapt v to the scales
+        of the states.
         """
         space = self.space
 
@@ -127,7 +127,7 @@ class _Whole:
         self.solve_sparse: Function[[Reals], None] | None = None
 
     def factor_whole(self, r: Routine, scratch: Reals, h: Real) -> None:
-        """``E / gamma - h J``, then its factors in place."""
+        """Compute ``E / gamma - h J`` and factor it in place."""
         space, size = self.space, self.size
         pattern = space.pattern
         matrix, J = scratch.after(space.matrix), scratch.after(space.J)
@@ -145,7 +145,7 @@ class _Whole:
         self.elimination(scratch).factor(r)
 
     def solve_linear(self, r: Routine, scratch: Reals) -> None:
-        """The solution of the right side in ``scratch``, by the factors that were made last."""
+        """Solve for the right side in ``scratch`` with the factors computed last."""
         space = self.space
         if self.solve_sparse is not None:
             with r.unless(scratch.integers[space.whole] != 0):
@@ -167,7 +167,7 @@ class _Whole:
 
 
 class _Sparse:
-    """Elimination along a plan: its places are constants of the program, its loops run over them."""
+    """Sparse elimination by a plan: the places of the entries are constants of the program."""
 
     def __init__(self, space: LinearSpace, plan: Elimination, diagonal: float) -> None:
         self.space = space
@@ -175,25 +175,25 @@ class _Sparse:
         self.diagonal = [diagonal if column < space.n else 0.0 for column in plan.columns]
 
     def entries(self, r: Routine) -> Rows:
-        """The entries of J in each row: their numbers, and their places in the row."""
+        """The entries of J in each row: their indices, and their places in the row."""
         flat = [pair for row in self.plan.entries for pair in row]
         numbers = r.integers("entry.of", [number for number, _ in flat])
         places = r.integers("entry.place", [place for _, place in flat])
         return Rows(r, places, r.integers("entry.ends", _ends(self.plan.entries)), numbers)
 
     def lower(self, r: Routine) -> Rows:
-        """The entries of L in each row, beside the diagonal."""
+        """The entries of L in each row, without the diagonal."""
         places = r.integers("lower.place", [k for row in self.plan.lower for k in row])
         return Rows(r, places, r.integers("lower.ends", _ends(self.plan.lower)))
 
     def upper(self, r: Routine) -> Rows:
-        """The entries of U in each row, beside the diagonal: their numbers lie after those of L."""
+        """The entries of U in each row, without the diagonal: stored after those of L."""
         first = sum(map(len, self.plan.lower))
         places = r.integers("upper.place", [0] * first + [k for row in self.plan.upper for k in row])
         return Rows(r, places, r.integers("upper.ends", [first + end for end in _ends(self.plan.upper)]))
 
     def factor(self, r: Routine, scratch: Reals, h: Real) -> None:
-        """The factors of ``E / gamma - h J``, row by row."""
+        """Compute the factors of ``E / gamma - h J``, row by row."""
         space = self.space
         J, work, pivots, factors = (
             scratch.after(place) for place in (space.J, space.work, space.pivots, space.lower)
@@ -246,7 +246,7 @@ class _Sparse:
             solution[unknowns[i]] = value
 
     def solved_well(self, r: Routine, scratch: Reals, h: Real) -> Boolean:
-        """Whether no row of the solved equations leaves more over than a part of its own terms' sizes."""
+        """Whether the residual of every solved equation is small relative to the terms of the equation."""
         space = self.space
         J, right, solution = (scratch.after(place) for place in (space.J, space.right, space.solution))
         entries, diagonal = self.entries(r), r.reals("diagonal.of", self.diagonal)
@@ -271,7 +271,7 @@ class _Sparse:
 
 
 class Rows:
-    """Entries of a sparse matrix row by row: the ``places`` of all, and where each row ends."""
+    """Entries of a sparse matrix by rows: the ``places`` of all entries, and the end of each row in them."""
 
     def __init__(self, r: Routine, places: Integers, ends: Integers, numbers: Integers | None = None) -> None:
         self._routine = r
@@ -285,7 +285,7 @@ class Rows:
 
 
 def _ends(rows: Sequence[Sequence[object]]) -> list[int]:
-    """Where each row begins in all of them put together, and the end of the last."""
+    """The start of each row in the concatenation of all rows, and the end of the last row."""
     ends = [0]
     for row in rows:
         ends.append(ends[-1] + len(row))

@@ -1,14 +1,14 @@
 """The whole loop of a one-step method as one native function around the functions of a system.
 
 One call takes many steps: stages, error estimate, step control, values at the sample instants, ticks, events
-and restarts at breakpoints, without returning to Python. All of its state lies in two flat arrays
-(:mod:`armblocks.integration.workspace`), so a run can stop after any number of steps and go on with the same
-bits.
+and restarts at breakpoints, without returning to Python. The whole state of the loop is in two flat arrays
+(:mod:`armblocks.integration.workspace`). A run can therefore stop after any number of steps and continue with
+bitwise identical results.
 
 The loop has these parts: a :class:`~armblocks.integration.method.Method` takes a step,
 :class:`~armblocks.integration.step_control.Steps` chooses its length, a
-:class:`~armblocks.integration.course.Course` determines where steps end and the actions there. A system
-without ticks and events has :class:`~armblocks.integration.segments.Segments`, any other
+:class:`~armblocks.integration.course.Course` determines where steps end and the actions there. The course is
+:class:`~armblocks.integration.segments.Segments` for a system without ticks and events, else
 :class:`~armblocks.integration.instants.Instants` with its clocks, events and delayed signals.
 """
 
@@ -39,12 +39,12 @@ from armblocks.routines.routine import Program, Routine
 from armblocks.routines.values import Integer
 
 POINTERS = 12
-"""Arrays among the arguments of the loop; the number of steps comes after them."""
+"""Number of arrays among the arguments of the loop; the last argument is the number of steps."""
 
 
 @lru_cache(maxsize=64)
 def loop_text(tableau: Tableau, sizes: LoopSizes, pattern: JacobianPattern | None) -> Mapping[str, str]:
-    """LLVM IR by symbol of a loop, ``advance``, and its functions: the same for all systems of one shape."""
+    """LLVM IR of the loop ``advance`` and its functions, by symbol. Systems of equal sizes share it."""
     program = Program()
     space = None if pattern is None else LinearSpace(pattern)
     define_loop(program, "advance", tableau, Workspace(tableau, sizes), sizes, space)
@@ -59,10 +59,10 @@ def define_loop(
     sizes: LoopSizes,
     space: LinearSpace | None = None,
 ) -> None:
-    """Define the loop of a method for a system; its result is a ``Status``.
+    """Define the loop of a method for a system. The loop returns a ``Status``.
 
-    The system's functions (:mod:`armblocks.integration.system_functions`) are external. The linear
-    equations of a Rosenbrock method lie in ``space``.
+    The system's functions (:mod:`armblocks.integration.system_functions`) are external. ``space`` is the
+    memory for the linear equations of a Rosenbrock method.
     """
 
     def loop(
@@ -123,7 +123,7 @@ class _Loop:
         self.steps = Steps(frame, self.method, records, self.course)
 
     def write(self) -> None:
-        """The whole body, up to the variables back in the arrays."""
+        """The whole body; at the end the variables are written to the arrays."""
         f, r = self.frame, self.frame.r
         with r.part() as f.whole, r.stages(INSTANT, START, STEP) as stages:
             self.course.enter(stages)
@@ -138,7 +138,7 @@ class _Loop:
         f.keep()
 
     def start(self) -> None:
-        """First derivative of a segment, the samples at its very start, the first step's length."""
+        """Evaluate the first derivative of a segment, record samples at its start, choose the first step."""
         f, method = self.frame, self.method
         time = f.time.value
         method.evaluate(time, method.x, 0)

@@ -1,7 +1,7 @@
 """The common part of one-step methods: error norm, first step, dense output.
 
-Everything is written for vectors of ``n`` states that lie in the workspace: the old state ``x``, the new one
-``y`` and the rows of ``K``. The enclosing loop makes all decisions.
+The code works on vectors of ``n`` states in the workspace: the old state ``x``, the new state ``y`` and the
+rows of ``K``. The enclosing loop makes all decisions.
 """
 
 from __future__ import annotations
@@ -55,11 +55,11 @@ class Method(ABC):
     # The step.
 
     def prepare(self, time: Real) -> None:  # noqa: B027  # most methods need nothing
-        """The part of a step that does not depend on its length."""
+        """Compute the part of a step that does not depend on its length."""
 
     @abstractmethod
     def stages(self, time: Real, h: Real, new_time: Real) -> None:
-        """All stages, the new state into y and the derivative there into row ``end_row`` of K."""
+        """Compute all stages. The new state is written to y, its derivative to row ``end_row`` of K."""
 
     @property
     def has_extra_stages(self) -> bool:
@@ -81,7 +81,8 @@ class Method(ABC):
         """Check at intervals whether another method is faster; pause if so."""
 
     def set_point(self, time: Real) -> Reals:
-        """The time of an evaluation, clamped before a breakpoint, where the old value of a jump is valid."""
+        """The time of an evaluation. Before a breakpoint it is clamped, so that a source keeps its old
+        value."""
         self._point.value = minimum(time, self.frame.clamp.value)
         return self._point.memory
 
@@ -96,7 +97,7 @@ class Method(ABC):
             self.y[i] = fma(h, self.combination(weights, i), self.x[i])
 
     def all_finite(self, *vectors: Reals) -> Boolean:
-        """Whether every element of the vectors is finite: ``0 v`` is NaN for an infinity or a NaN."""
+        """Whether every element of the vectors is finite. ``0 v`` is NaN where v is infinite or NaN."""
         total = self.r.real(0.0)
         for i in self.r.each(self.n):
             found = total.value
@@ -106,7 +107,7 @@ class Method(ABC):
         return total.value == 0.0
 
     def weighted(self, weights: Row) -> Callable[[Index], Real]:
-        """Elements of ``sum_j weights[j] K[j]`` over what is allowed in the step to y."""
+        """Elements of ``sum_j weights[j] K[j]`` divided by the tolerance of the step to y."""
 
         def element(i: Index) -> Real:
             before, after = abs(self.x[i]), abs(self.y[i])
@@ -137,7 +138,7 @@ class Method(ABC):
         self.evaluate(time + h0, self.y, 1)
         d2 = self.mean_square(weighted(lambda i: self.K(1)[i] - self.K(0)[i])) / h0
         steepest = maximum(d2, d1)
-        # Held inside the range of inverse_root; beyond it the other bounds decide anyway.
+        # Clamped to the range of inverse_root. Outside it another bound limits the step.
         bounded = maximum(minimum(100.0 * steepest, 1e300), 1e-300)
         h1 = select(
             steepest <= 1e-15,

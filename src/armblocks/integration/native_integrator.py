@@ -43,7 +43,7 @@ class RunPoint:
     history of delayed signals (rows of :mod:`armblocks.integration.delay_history`; none at the start of a
     run).
 
-    ``begun``: the ticks at this time have happened already.
+    ``begun``: the ticks at this time are already processed.
     """
 
     time: float
@@ -65,10 +65,10 @@ class NativeIntegrator:
         tableau: Tableau,
         pattern: JacobianPattern | None = None,
     ) -> None:
-        """``digests`` are those of the tapes, which ``tape(name)`` gives if the disk cache lacks the code.
+        """``digests`` identify the tapes. ``tape(name)`` returns a tape if the disk cache lacks its code.
 
-        ``derivative`` alone for a system that only flows, else also those of :func:`needed_tapes`. A
-        Rosenbrock method needs the ``pattern`` of ``flow_jacobian`` too, and its tape.
+        A system without events and ticks needs only ``derivative``, others also :func:`needed_tapes`. A
+        Rosenbrock method also needs the ``pattern`` of ``flow_jacobian`` and its tape.
         """
         self.tableau = tableau
         self.space = None if pattern is None else LinearSpace(pattern)
@@ -109,22 +109,22 @@ class NativeIntegrator:
     ) -> Integration:
         """A run from ``start`` to ``stop``, ready for its first step.
 
-        ``start`` is the state ``(n,)`` at ``samples[0]``, or a point. ``samples`` (N,) s, rising strictly:
-        the instants that are recorded, and, where no ``stop`` is said, how long the run is. ``breakpoints``
-        (nb,) s, in any order: a step ends exactly on each that lies inside, what comes before sees ``f`` at
-        most at the last double before it, and what comes after starts anew. ``step`` s: grid of a fixed-step
-        method (its instants are ``k step``); ``rtol``, ``atol``, ``max_step`` s: for adaptive methods. With a
-        ``checkpoint`` the run goes on from there, as the run that left it would have. With
-        ``watch_stiffness`` it pauses, :attr:`Integration.wants_other`, where a method for stiff systems, or
-        an explicit one again, does better. ``span`` s: roughly the length of the run, beside which
-        events near the time 0 are told apart (default: ``stop``). Nothing is checked.
+        ``start`` is the state ``(n,)`` at ``samples[0]``, or a point. ``samples`` (N,) s, strictly ascending:
+        the recorded times; the last one is the default of ``stop``. ``breakpoints`` (nb,) s, in any order: a
+        step ends exactly on each one inside the run. Before it ``f`` is evaluated at most at the last double
+        before it, and after it the integration restarts. ``step`` s: grid of a fixed-step method (its times
+        are ``k step``); ``rtol``, ``atol``, ``max_step`` s: for adaptive methods. With a ``checkpoint`` the
+        run continues from there, with the results of the run that wrote it. With ``watch_stiffness`` it
+        pauses where a method for stiff systems, or an explicit method again, is faster
+        (:attr:`Integration.wants_other`). ``span`` s: approximate length of the run, for the resolution of
+        events near time 0 (default: ``stop``). Arguments are not checked.
         """
         if not isinstance(start, RunPoint):
             start = RunPoint(time=float(samples[0]), x=start)
         begins, stop = start.time, float(samples[-1]) if stop is None else stop
         if checkpoint is not None:
             begins = float(checkpoint.reals[Scalar.TIME])
-        # A set and not np.unique, which would load all of numpy.ma for these few numbers.
+        # A set instead of np.unique, which would load all of numpy.ma.
         inside = np.array(sorted({float(time) for time in breakpoints if begins < time <= stop}))
         ends = inside if inside.size and inside[-1] == stop else np.append(inside, stop)
         clamps = ends.copy()
@@ -148,7 +148,7 @@ class NativeIntegrator:
             run.counts[Count.SAMPLE] = 1
             run.status = Status.DONE
         elif stop <= begins:
-            run.counts[Count.SEGMENT] = run.counts[Count.SEGMENTS]  # the instant itself, and no step
+            run.counts[Count.SEGMENT] = run.counts[Count.SEGMENTS]  # process the instant, take no step
         return run
 
     def take_over(self, run: Integration) -> Integration:
@@ -168,7 +168,7 @@ class NativeIntegrator:
         return new
 
     def advance(self, addresses: tuple[int, ...], max_steps: int) -> Status:
-        """The native call. It releases the interpreter lock."""
+        """Call the native loop. The call releases the interpreter lock."""
         return Status(self._advance(*addresses, max_steps))
 
 
@@ -196,7 +196,7 @@ class Checkpoint:
 
 
 class Integration:
-    """One run: its whole state is in two arrays, so results do not depend on the division into calls."""
+    """One run. Its whole state is in two arrays, so the results do not depend on how many calls it takes."""
 
     def __init__(
         self,
@@ -215,27 +215,28 @@ class Integration:
         self.counts[Count.SEGMENTS] = ends.size
         self.status = Status.PAUSED
         self._saved = _checkpoint(self, np.full_like(self.reals, np.nan), np.zeros_like(self.counts))
-        # Parameters, sample instants, ends of the segments, and how late each may evaluate its derivative.
+        # Parameters, sample times, ends of the segments, and the latest evaluation time of each segment.
         self.course = (np.ascontiguousarray(p), np.ascontiguousarray(samples), ends, clamps)
         self._scratch = np.empty(1 if integrator.space is None else integrator.space.length)
         self.record(samples, records)
 
     def record(self, samples: Vector, records: tuple[Vector, Vector, Vector] | None = None) -> None:
-        """Record at these times from now on, (N,) s, into new arrays if none are given."""
+        """Record at the times ``samples``, (N,) s, from now on, into new arrays if none are given."""
         sizes, (p, _, ends, clamps) = self.integrator.sizes, self.course
         if records is None:
             x, z, w = (np.empty((samples.size, n)) for n in (sizes.states, sizes.discrete, sizes.algebraic))
             records = x, z, w
         self.states, self.discrete, self.algebraic = records
-        """At the sample instants, states ``(N, n)``, discrete variables ``(N, nz)`` and unknowns of the
-        implicit equations ``(N, nw)``: valid up to ``recorded``."""
+        """States ``(N, n)``, discrete variables ``(N, nz)`` and unknowns of the implicit equations ``(N,
+        nw)`` at the sample times. The first ``recorded`` rows are valid."""
         self.counts[Count.SAMPLE] = 0
         self.counts[Count.SAMPLES] = samples.size
         self.course = (p, np.ascontiguousarray(samples), ends, clamps)
         self._take_addresses()
 
     def make_room(self, numbers: int) -> None:
-        """Enlarge the memory of the delay history to at least this size."""
+        """Enlarge the array of doubles, which contains the delay history, to at least ``numbers``
+        elements."""
         if numbers <= self._room:
             return
         more = np.zeros(numbers - self._room)
@@ -367,9 +368,10 @@ class Integration:
         return self._vector(self.integrator.workspace.trial_w, self.integrator.sizes.algebraic)
 
     def watch(self, changes: int) -> None:
-        """Pause where another method does better; ``changes``: 1 and the number of changes so far, 0 for no.
+        """Pause where another method is faster. ``changes``: 1 plus the number of changes so far, or 0 for
+        never.
 
-        A method that is not for stiff systems comes back the later, the more often it has come back before.
+        With each change, more checks are required before an explicit method takes over again.
         """
         self.counts[Count.WATCHING] = changes
         if not self._explicit:
@@ -377,8 +379,8 @@ class Integration:
 
     @property
     def wants_other(self) -> bool:
-        """Whether it paused because another method does better from here on: stability has held an explicit
-        one short for long, or an explicit one could for long have taken the same steps."""
+        """Whether the run paused because another method is faster from here on: stability has limited the
+        steps of an explicit method, or an explicit method could have taken the steps of a stiff one."""
         if self.status is not Status.PAUSED or not self.counts[Count.WATCHING]:
             return False
         if self._explicit:
@@ -400,7 +402,7 @@ class Integration:
         return int(self.counts[Count.EVENTS])
 
     def positive(self, guards: Sequence[int]) -> list[int]:
-        """The guards among some that are positive at the present time."""
+        """Those of ``guards`` that are positive at the present time."""
         signs = self._vector(self.integrator.workspace.signs, len(self.integrator.sizes.directions))
         return [guard for guard in guards if signs[guard] > 0.0]
 
@@ -410,7 +412,7 @@ class Integration:
 
     @property
     def repeating_guards(self) -> list[int]:
-        """The guards that fired in most of the latest events that follow one another closely."""
+        """The guards that fired in most of the latest consecutive close events."""
         places, count = self.integrator.workspace, len(self.integrator.sizes.directions)
         repeats = self.reals[places.repeats : places.repeats + count]
         return [int(k) for k in np.flatnonzero((repeats > 0.0) & (repeats >= 0.5 * repeats.max(initial=0.0)))]
@@ -434,7 +436,7 @@ class Integration:
 
     @property
     def state(self) -> Vector:
-        """State there, ``(n,)``: a view."""
+        """State at :attr:`time`, ``(n,)``: a view."""
         return self._vector(self.integrator.workspace.x, self.integrator.states)
 
     def _vector(self, place: int, size: int) -> Vector:
@@ -442,7 +444,7 @@ class Integration:
 
     @property
     def last_step(self) -> float:
-        """Length of the step tried last, s."""
+        """Length of the last trial step, s."""
         return float(self.reals[Scalar.TRIED])
 
     @property
@@ -470,12 +472,13 @@ class Integration:
         return self._vector(self.integrator.workspace.slope(0), rows * n).reshape(rows, n)
 
     def weighted_errors(self) -> Vector:
-        """Error of every state in the step tried last, over what is allowed, ``(n,)`` (adaptive methods)."""
+        """Error of every state in the last trial step, divided by its tolerance, ``(n,)`` (adaptive
+        methods)."""
         weights = np.array(self.integrator.tableau.error_row)
         return self._weighted(weights @ self._stage_derivatives()[: weights.size])
 
     def weighted_changes(self) -> Vector:
-        """By how much the derivative changed in the step tried last, as ``weighted_errors``, ``(n,)``."""
+        """Change of the derivative in the last trial step, scaled as :attr:`weighted_errors`, ``(n,)``."""
         K = self._stage_derivatives()
         return self._weighted(K[self.integrator.tableau.end_row] - K[0])
 
@@ -485,7 +488,7 @@ class Integration:
         return np.abs(self.last_step * slope) / (atol + rtol * np.maximum(np.abs(self.state), np.abs(after)))
 
     def first_non_finite_stage(self) -> tuple[float, Vector]:
-        """Time and state at which the derivative of the step tried last became NaN or infinite first."""
+        """Time and state of the first stage of the last trial step with a NaN or infinite derivative."""
         tableau = self.integrator.tableau
         K, h, clamp = self._stage_derivatives(), self.last_step, self.course[3][self.counts[Count.SEGMENT]]
         first = tableau.first_stage

@@ -1,4 +1,4 @@
-"""Gaussian elimination of a full matrix with row pivoting, as a routine writes it."""
+"""Gaussian elimination of a full matrix with row pivoting, as code of a routine."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from armblocks.routines.values import Integer, Real
 
 @dataclass(frozen=True, kw_only=True)
 class PivotedElimination:
-    """``P A = L U`` in place of a ``matrix`` of ``size`` rows, one after the other.
+    """``P A = L U``, in place, of a ``matrix`` of ``size`` rows that are stored one after the other.
 
-    ``pivots`` gets the reciprocals of the diagonal of ``U``, ``swaps`` the row that each row was exchanged
-    with: both have ``size`` elements. Where the matrix is singular, solutions are infinite or NaN.
+    ``pivots`` receives the reciprocals of the diagonal of ``U``, and ``swaps`` the row with which each row
+    was exchanged. Both have ``size`` elements. Solutions with a singular matrix are infinite or NaN.
     """
 
     size: int
@@ -61,7 +61,7 @@ class PivotedElimination:
 
     def solve(self, r: Routine, y: Reals) -> None:
         """Solve for the right side ``y``, in its place."""
-        # Whole rows were exchanged, those of L as well, so the right side is permuted before anything else.
+        # Whole rows were exchanged, also in L, so the right side is permuted before the substitution.
         for k in r.range(0, self.size):
             row = self.swaps[k]
             a, b = y[k], y[row]

@@ -1,4 +1,4 @@
-"""Records of a run: the sample instants that a step passes, and the checkpoint for a longer run."""
+"""Recording of a run: the samples within each step, and the checkpoint for a longer run."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from armblocks.routines.values import Boolean, Integer, Real
 
 
 class Records:
-    """Writes the recording of states, and of discrete variables and unknowns where there are any."""
+    """Emits the recording of states, discrete variables and implicit unknowns."""
 
     def __init__(self, frame: Frame, method: Method, evaluation: Evaluation, point: Reals) -> None:
         self.frame = frame
@@ -23,9 +23,9 @@ class Records:
         """Whether the extra stages of the step are evaluated."""
 
     def samples(self, time: Real, until: Real, h: Real | None) -> None:
-        """Record every sample instant not after ``until``: the state itself there, interpolated before.
+        """Record all sample times up to ``until``: the state y at ``until``, interpolated states before it.
 
-        Without a step ``h`` there is no before, and the state is x.
+        If ``h`` is None there is no step, and all these sample times are recorded with the state x.
         """
         f, r, method = self.frame, self.frame.r, self.method
         with r.loop() as loop:
@@ -46,7 +46,7 @@ class Records:
             f.increase(Count.SAMPLE)
 
     def others(self, instant: Real, sample: Integer, x: Reals) -> None:
-        """What else than the state a sample instant records: ``z``, and ``w`` for the state just written."""
+        """Record ``z`` and ``w`` of a sample; ``w`` is solved for the recorded state ``x``."""
         f, places, sizes = self.frame, self.frame.places, self.frame.sizes
         if sizes.delays or sizes.algebraic:
             self.point[0] = instant
@@ -59,7 +59,7 @@ class Records:
                 copy(f.r, f.vector(place), out.after(sample * count), count)
 
     def extra_stages_once(self, time: Real, h: Real) -> None:
-        """The stages that only the dense output needs, where a step needs them for the first time."""
+        """Evaluate the extra stages of the dense output, unless this is already done for the present step."""
         if not self.method.has_extra_stages:
             return
         with self.frame.r.when(self.extra_done.value == 0):
@@ -67,11 +67,12 @@ class Records:
             self.extra_done.value = 1
 
     def checkpoint(self, condition: Boolean) -> None:
-        """Save the state, once, before the end of the run first bounds a step: a longer run goes on here.
+        """Save the state once, before the first step that the end of the run limits. A longer run continues
+        here.
 
-        The first step after a start is saved as the start, because the end bounds the choice of its length. A
-        step that ends at the instant of the run's end counts as bounded: a longer run records that instant
-        with this step.
+        Before the first step after a restart, the restart itself is saved, because the end of the run limits
+        the choice of the first step's length. A step that would end at the end of the run without the limit
+        counts as limited too, because a longer run records that time with this step.
         """
         f, r, arrays = self.frame, self.frame.r, self.frame.arrays
         unsaved = f.count[Count.SAVED].value == 0
@@ -85,7 +86,7 @@ class Records:
             f.count[Count.SAVED].value = 1
 
     def _length(self) -> Integer | int:
-        """Length of the array of doubles, with the history of delayed signals as far as it is kept."""
+        """Length of the array of doubles including the stored rows of the delay history."""
         f, places = self.frame, self.frame.places
         if not f.sizes.delays:
             return places.size

@@ -1,10 +1,10 @@
 """Rosenbrock methods: Jacobian, linear equations, stages.
 
-Rows of K are the derivative at the step's start, the stages, and the derivative at its end, so that all else
-(error norm, first step, values between the steps) is that of the explicit methods. The Jacobian is evaluated
-once a step, also where the step is tried again shorter. Its entries that are infinite or NaN (the derivative
-of a root at zero) count as zero: the derivative itself is finite there, and the error estimate sees what they
-lack.
+The rows of K are the derivative at the start of the step, the stages, and the derivative at its end. Error
+norm, first step and dense output are therefore shared with the explicit methods. The Jacobian is evaluated
+once a step, also if the step is repeated with a shorter length. Infinite and NaN entries of the Jacobian (the
+derivative of a square root at zero) are replaced by zero. The derivative of the state is finite there, and
+the error estimate includes the effect of the replacement.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from armblocks.routines.memory import Reals
 from armblocks.routines.values import Real
 
 STABLE_BELOW, STABLE_CHECKS = 2.0, 16
-"""Bound of step times fastest rate below which an explicit method could take the same step, and the number of
-consecutive checks (times four after each return) after which it takes over."""
+"""An explicit method could take a step if its length times the fastest rate is below this bound; and the
+number of consecutive checks with this result after which it takes over (times four after each return)."""
 
 
 class RosenbrockMethod(Method):
@@ -51,7 +51,7 @@ class RosenbrockMethod(Method):
             self.scratch[k] = select(value.finite, value, 0.0)
 
     def stages(self, time: Real, h: Real, new_time: Real) -> None:
-        """All stages, the new state into y and the derivatives into their rows of K."""
+        """Compute all stages. The new state is written to y, the derivatives to their rows of K."""
         r, tableau = self.r, self.rosenbrock
         self._time = time
         r.call(self.equations.factor, self.scratch, h)
@@ -74,7 +74,8 @@ class RosenbrockMethod(Method):
         self.evaluate(new_time, self.y, tableau.end_row)
 
     def error_norm(self, h: Real, error: Row) -> Real:
-        """That of the embedded method, or of the values in the middle of the step, whichever is larger."""
+        """The norm of the embedded estimate or of the defect in the middle of the step, whichever is
+        larger."""
         assert self._time is not None
         r, tableau = self.r, self.rosenbrock
         ends = self.norm(h, error)
@@ -95,13 +96,13 @@ class RosenbrockMethod(Method):
             self.right.after(self.n)[i] = 0.0
         r.call(self.equations.solve, self.scratch)
         between = h * self.mean_square(weighted)
-        # A NaN of either is the result: it makes the step be tried shorter.
+        # If either is NaN the result is NaN, and the step is repeated with a shorter length.
         return select(between < ends, ends, between + ends * 0.0)
 
     def watch(self, h: Real) -> None:
-        """Check whether an explicit method could take equally long steps; pause if it could for long.
+        """Check whether an explicit method could take equally long steps; pause if many checks agree.
 
-        With implicit equations the rates are not those of the flow's Jacobian, and nothing returns.
+        With implicit equations the flow's Jacobian does not give the rates, so the method never changes back.
         """
         if self.space.size != self.n:
             return

@@ -23,16 +23,16 @@ class RosenbrockTableau:
         x_new = x + h * sum_j weights[j] k[j]
         x(t + theta h) = x + h * sum_j (sum_m dense[j][m] theta^(m+1)) k[j]
 
-    This is the form in which no product with ``J`` is left (Hairer, Wanner II, IV.7, equation (7.25), with
-    ``u = h k``); :func:`from_textbook` makes it from ``alpha``, ``Gamma``, ``b``. The estimate of the error
-    is ``h * sum_j error[j] k[j]``, of order ``error_order``; without ``error`` the step is fixed. An adaptive
-    step also checks its dense output: the defect ``r = f - x'`` in the middle of the step gives the error
-    ``(I / gamma - h J)^-1 h r`` of a stiff system, which has to be below the tolerance as well. Otherwise
-    steps would grow without bound where fast dynamics follow slow inputs, with an accurate result at their
-    ends only.
+    This form needs no product with ``J`` (Hairer, Wanner II, IV.7, equation (7.25), with ``u = h k``).
+    :func:`from_textbook` computes it from ``alpha``, ``Gamma``, ``b``. The error estimate is ``h * sum_j
+    error[j] k[j]``, of order ``error_order``. A method without ``error`` has a fixed step. An adaptive step
+    also checks its dense output: the defect ``r = f - x'`` in the middle of the step gives the error ``(I /
+    gamma - h J)^-1 h r`` of a stiff system, which must be below the tolerance as well. Without this check,
+    steps would grow without bound where fast dynamics follow slow inputs. The result would then be accurate
+    at the ends of the steps only.
 
-    Where implicit equations ``0 = g(t, x, w)`` belong to the system, ``J`` and ``T`` are those along their
-    solution ``w(t, x)``: the matrix gets the rows of ``g`` below it and is eliminated as a whole.
+    If the system has implicit equations ``0 = g(t, x, w)``, ``J`` and ``T`` are total derivatives along their
+    solution ``w(t, x)``: the rows of ``g`` are appended to the matrix, which is eliminated as a whole.
     """
 
     name: str
@@ -70,7 +70,7 @@ class RosenbrockTableau:
                     allowed="row i of a matrix has i numbers; see RosenbrockTableau",
                     fix=f"correct '{field}'",
                 )
-        # Back in the textbook's form, rows add up to the nodes, to the weights of T, to one and to zero.
+        # In the textbook's form, the rows add up to the nodes, to the weights of T, to one and to zero.
         inverse = np.eye(s) / self.gamma - _square(self.couplings)
         sums = np.linalg.solve(inverse, np.ones(s))
         checks = {f"matrix row {i}": (float(_square(self.matrix)[i] @ sums), self.nodes[i]) for i in range(s)}
@@ -81,7 +81,7 @@ class RosenbrockTableau:
         if self.error is not None:
             checks["error"] = (float(np.array(self.error) @ sums), 0.0)
         for what, (found, expected) in checks.items():
-            # Published with 15 or 16 digits, in products with numbers of up to 300.
+            # The coefficients are published with 15 or 16 digits and are multiplied by numbers of up to 300.
             if abs(found - expected) > 100 * CONSISTENCY * max(1.0, abs(expected)):
                 raise InputError(
                     f"{what} adds up to {found!r}",
@@ -102,8 +102,8 @@ class RosenbrockTableau:
 
     @property
     def rows(self) -> int:
-        """Rows of ``K``: the derivative at the step's start, the stages, the derivative at its end; and the
-        state and the derivative in its middle."""
+        """Rows of ``K``: the derivative at the start of the step, the stages, the derivative at the end, and
+        the state and the derivative in the middle."""
         return self.stages + 4
 
     @property
@@ -134,7 +134,7 @@ class RosenbrockTableau:
 
     @property
     def real_stability(self) -> float:
-        """Length of the interval of absolute stability on the negative real axis: all of it."""
+        """Length of the interval of absolute stability on the negative real axis: infinite."""
         return float("inf")
 
     @property
@@ -165,7 +165,7 @@ class RosenbrockTableau:
 
 
 Tableau = ButcherTableau | RosenbrockTableau
-"""A method as data, of either kind."""
+"""An explicit or a Rosenbrock method as data."""
 
 
 def from_textbook(
@@ -182,7 +182,7 @@ def from_textbook(
     + h gamma_i T`` with ``alpha_i``, ``gamma_i`` the sums of the rows, ``x_new = x + h sum_j b[j] k[j]``
     (Hairer, Wanner II, IV.7, equation (7.4)). Row i of ``alpha`` has i numbers, row i of ``gamma`` i + 1;
     ``dense`` and ``error`` are weights of these ``k``. The fields are computed as fractions and rounded once,
-    because the result of a library's matrix inversion differs from processor to processor.
+    because the last digits of a library's matrix inversion depend on the processor.
     """
     inverse = _inverse(gamma)
     return {
@@ -198,7 +198,7 @@ def from_textbook(
 
 
 def _inverse(gamma: Sequence[Sequence[float]]) -> list[list[Fraction]]:
-    """The inverse of a lower triangle, as its rows, by forward substitution."""
+    """The rows of the inverse of a lower triangular matrix, by forward substitution."""
     rows: list[list[Fraction]] = []
     for i, row in enumerate(gamma):
         exact = [Fraction(entry) for entry in row]
@@ -208,7 +208,7 @@ def _inverse(gamma: Sequence[Sequence[float]]) -> list[list[Fraction]]:
 
 
 def _over(weights: Sequence[float], inverse: Sequence[Sequence[Fraction]]) -> Row:
-    """A row of weights, perhaps shorter, times the triangle ``inverse``."""
+    """A row of weights times the triangular matrix ``inverse``; a shorter row counts as padded with zeros."""
     exact = [Fraction(weight) for weight in weights]
     return tuple(
         float(sum((exact[k] * inverse[k][j] for k in range(j, len(exact))), Fraction(0)))
@@ -233,7 +233,7 @@ def stiffly_accurate_dense(weights: Row, inner: Sequence[Row]) -> tuple[Row, ...
 
 
 def _square(rows: Sequence[Sequence[float]]) -> np.ndarray:
-    """A lower triangle as a square matrix."""
+    """A lower triangular matrix as a square array."""
     matrix = np.zeros((len(rows), len(rows)))
     for i, row in enumerate(rows):
         matrix[i, : len(row)] = row

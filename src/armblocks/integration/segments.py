@@ -12,7 +12,7 @@ from armblocks.routines.values import Boolean, Real
 
 
 class Segments(Course):
-    """Integrate segment by segment, with a restart at each breakpoint."""
+    """Integrates segment by segment, with a restart at each breakpoint."""
 
     def __init__(self, frame: Frame, method: Method, records: Records) -> None:
         self.frame = frame
@@ -64,7 +64,7 @@ class Segments(Course):
 
 
 def choose_first_step(frame: Frame, method: Method, records: Records, time: Real) -> None:
-    """The length of the first step, from the derivative and limited by the end of the run."""
+    """Choose the length of the first step from the derivative, limited by the end of the run."""
     interval = frame.end.value - time
     length, bounded = method.first_step(time, interval, frame.max_step)
     records.checkpoint(bounded & (frame.end.value >= frame.last_end))

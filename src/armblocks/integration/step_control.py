@@ -1,8 +1,8 @@
-"""Control of the step: adaptive steps by their error, fixed steps on a grid, and runs of minimum steps.
+"""Step control: adaptive steps from the error estimate, fixed steps on a grid, detection of minimum steps.
 
-Step control is that of SciPy's ``RK45`` (Hairer, Norsett, Wanner I, II.4): root-mean-square norm of the error
-over ``atol + rtol max(|x|, |x_new|)``, safety 0.9, factors 0.2 to 10, no growth right after a rejection, the
-same choice of the first step. Step counts can therefore be laid beside SciPy's.
+Adaptive step control is that of SciPy's ``RK45`` (Hairer, Norsett, Wanner I, II.4): root-mean-square norm of
+the error over ``atol + rtol max(|x|, |x_new|)``, safety factor 0.9, step factors 0.2 to 10, no growth right
+after a rejection, the same choice of the first step. Step counts are therefore comparable with SciPy's.
 """
 
 from __future__ import annotations
@@ -18,18 +18,20 @@ from armblocks.routines.values import Real
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
 SHORT_EVERY, SHORT_BACK = 64, 8
-"""Steps between two checks (a power of two), and how many checks each takes back that finds nothing wrong."""
+"""Number of steps between two checks for needlessly short steps (a power of two), and the decrease of their
+count at a check that finds none."""
 SHORT_CHANGE, RESOLVED = 1000.0, 4.0
-"""What a step that is short for good reason changes at least, in tolerances: ``h |f(end) - f(start)|``. A
-jump of ``f`` passes where it is below 1 over the least weight of the error, some hundreds; a smooth solution
-of rate L changes by ``(h L)^2 / rtol``, where the error makes ``(h L)^2`` about 10 to 50 times
-``rtol^(2/(q + 1))`` for a method whose error is of order q; ``RESOLVED`` is less."""
+"""A step is needlessly short if ``h |f(end) - f(start)|``, in units of the tolerance, is below the smaller of
+``SHORT_CHANGE`` and ``RESOLVED * rtol^(2/(q + 1) - 1)``; q is the order of the error estimate. A step across
+a jump of ``f`` is accepted once this change is below 1 over the smallest weight of the error, some hundreds.
+For a smooth solution of rate L the change is ``(h L)^2 / rtol``, and the error estimate makes ``(h L)^2``
+about 10 to 50 times ``rtol^(2/(q + 1))``, which is more than ``RESOLVED``."""
 MOST_STEPS = 1e8
-"""A run of minimum steps is ended where it has more steps than these before it."""
+"""A run with needlessly short steps ends if it would need more than this number of further steps."""
 
 
 class Steps:
-    """Writes one accepted step of the loop: trials until the error is small enough, or one fixed step."""
+    """Emits one accepted step of the loop: trials until the error is small enough, or one fixed step."""
 
     def __init__(self, frame: Frame, method: Method, records: Records, course: Course) -> None:
         self.frame = frame
@@ -38,7 +40,7 @@ class Steps:
         self.course = course
 
     def write(self) -> None:
-        """The step, up to the place where it is accepted."""
+        """Emit the step up to its acceptance."""
         error = self.method.tableau.error_row
         if error is not None:
             self._adaptive(error)
@@ -46,7 +48,7 @@ class Steps:
             self._fixed()
 
     def trial(self, time: Real, new_time: Real) -> Real:
-        """Stages of a step to ``new_time``; gives its length."""
+        """Emit the stages of a step to ``new_time``; return its length."""
         f = self.frame
         if f.sizes.hybrid:
             self.records.extra_done.value = 0
@@ -73,14 +75,16 @@ class Steps:
             with r.part() as attempt:
                 h = self.trial(time, minimum(time + length.value, f.end.value))
                 norm = method.error_norm(h, error)
-                # 1e-30 stands for an exact zero: the factor is at its upper bound long before.
+                # 1e-30 replaces an exact zero. The step factor reaches its upper bound far above this norm.
                 bounded = minimum(maximum(norm, 1e-30), 1e30)
                 ideal = SAFETY * inverse_root(bounded, method.tableau.error_order + 1)
-                # An infinite new state makes its own error vanish beside it, so it is checked apart.
+                # An infinite new state makes the tolerance infinite and the norm zero, so it is checked
+                # separately.
                 accepted.leave_when((norm < 1.0) & method.all_finite(method.y))
                 f.increase(Count.REJECTED)
                 growth.value = 1.0
-                # A NaN compares false and takes the strongest reduction; so does an infinite new state.
+                # A NaN norm compares false, so the step is reduced by SHRINK; likewise for an infinite new
+                # state.
                 measured = norm >= 1.0
                 shrunk = h * select(measured, maximum(ideal, SHRINK), SHRINK)
                 length.value = shrunk
@@ -94,18 +98,18 @@ class Steps:
         f.scalar[Scalar.STEP].value = following
 
     def _watch_short_steps(self, h: Real) -> None:
-        """Now and then, check whether steps stay short though next to nothing changes; end such a run.
+        """Every ``SHORT_EVERY`` steps, check whether the step is needlessly short; end the run if most are.
 
-        Where equations jump without an event, such as a sign that answers itself, steps shrink until the jump
-        is within the tolerance, however good the method is. The same is seen where stability holds an
-        explicit method short. Steps that an end or ``max_step`` cuts say nothing.
+        If the equations jump without an event, for example a sign in a feedback loop, every method shrinks
+        its steps until the jump is within the tolerance. Stability has the same effect on the steps of an
+        explicit method. Steps that are limited by the end of a piece or by ``max_step`` are not checked.
         """
         f, r, method = self.frame, self.frame.r, self.method
         tableau, short = method.tableau, f.count[Count.SHORT]
         with r.when(f.count[Count.ACCEPTED].value & (SHORT_EVERY - 1) == 0):
             new_time = f.new_time.value
             with r.when((new_time < f.end.value) & (h < f.max_step)):
-                # rtol^(2/(q+1) - 1), that is rtol^(-1/(q+1)) to the power q - 1
+                # rtol^(2/(q+1) - 1), computed as rtol^(-1/(q+1)) to the power q - 1
                 root = inverse_root(f.reals[Scalar.RTOL], tableau.error_order + 1)
                 power = r.constant(RESOLVED)
                 for _ in range(tableau.error_order - 1):
@@ -121,7 +125,7 @@ class Steps:
                     short.value = select(less > 0, less, 0)
 
     def _fixed(self) -> None:
-        """One step to the next grid instant, which is ``k STEP`` and never a sum, or to the segment's end."""
+        """Emit one step to the next grid point ``k STEP`` (never accumulated), or to the end of the piece."""
         f, r, course = self.frame, self.frame.r, self.course
         grid = f.count[Count.GRID]
         time, spacing, end = f.time.value, f.scalar[Scalar.STEP].value, f.end.value
@@ -130,7 +134,7 @@ class Steps:
             with r.when(instant <= course.passed(time, spacing)):
                 f.increase(Count.GRID)
                 search.again()
-        # An instant a rounding error before the end is the end: no step of 1e-16 s.
+        # A grid point within rounding before the end is the end. Otherwise a step of 1e-16 s would follow.
         last = fma(spacing, 1e-9, instant) >= end
         new_time = course.bounded(time, select(last, end, instant))
         self.records.checkpoint(new_time * SAME_ABOVE >= f.last_end)

@@ -1,4 +1,4 @@
-"""A traced system with its native code: what a simulation runs."""
+"""A traced system with its native code."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 Vector = NDArray[np.float64]
 
 ENDING = ("stop", "fail")
-"""The actions of guards that end a run where they are positive."""
+"""The actions of guards that end a run when they are positive."""
 _OF_PARAMETERS = ("initial_states", "initial_discrete", "initial_algebraic", "breakpoints")
 _FUNCTIONS = (
     *("derivative", *_OF_PARAMETERS, "signals", "residual", "residual_jacobian"),
@@ -43,7 +43,7 @@ _SIGNALS_LAYOUT = BatchLayout(
 
 
 def compile_system(system: HybridSystem) -> CompiledSystem:
-    """The system, ready to be run. Machine code is compiled, or loaded from the disk cache, at first use.
+    """The system with native code, which is compiled, or loaded from the disk cache, at its first use.
 
     Raises :class:`~armblocks.errors.CompileError` if the equations use an unsupported operation.
     """
@@ -71,7 +71,7 @@ def recall_system(key: str, trace: Callable[[], HybridSystem]) -> CompiledSystem
 
             return CompiledSystem(description, tape, trace)
         except (ValueError, KeyError, TypeError):
-            pass  # a record of another version is recomputed
+            pass  # a cache entry of another version: compute it again
     system = trace()
     tapes = {name: tape_of(function) for name, function in _functions(system).items()}
     description = _describe(system, tapes)
@@ -86,7 +86,7 @@ class CompiledSystem:
 
     Flat vectors are laid out by the system's signatures: states ``x (nx,)``, discrete variables ``z (nz,)``,
     unknowns of implicit equations ``w (nw,)``, parameters ``p (np,)``, signals ``y (ny,)``; time in seconds.
-    Arrays that are given are float64 and C-contiguous, and nothing is checked.
+    Array arguments must be float64 and C-contiguous; this is not checked.
     """
 
     def __init__(
@@ -104,7 +104,7 @@ class CompiledSystem:
         self.guard_names: tuple[str, ...] = tuple(description["guard_names"])
         self.guard_actions: tuple[str, ...] = tuple(description["guard_actions"])
         self.called: tuple[str, ...] = tuple(description["called"])
-        """Blocks whose outputs Python computes at their ticks."""
+        """Blocks whose outputs are computed in Python at their ticks."""
         self.loops: tuple[tuple[str, ...], ...] = tuple(tuple(names) for names in description["loops"])
         """The signals of each linear loop that is solved in place."""
         self.sizes = LoopSizes(
@@ -140,7 +140,8 @@ class CompiledSystem:
         return self._make_tape(function)
 
     def _functions_of(self, names: Sequence[str], pointers: int) -> Mapping[str, Callable[..., None]]:
-        """Some of the system's functions, for single points: they are called too seldom for much effort."""
+        """Some of the system's functions for single points, compiled with little optimisation: calls are
+        rare."""
 
         def write() -> str:
             module = Module()
@@ -152,7 +153,7 @@ class CompiledSystem:
         return {name: self._entry(code, name, 0, pointers) for name in names}
 
     def _entry(self, code: NativeCode, name: str, integers: int, pointers: int) -> Callable[..., None]:
-        self._loaded.append(code)  # it has to outlive every call
+        self._loaded.append(code)  # the code must stay alive during every call
         kind = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * integers, *[ctypes.c_void_p] * pointers)
         return kind(code.address(name))
 
@@ -172,8 +173,8 @@ class CompiledSystem:
     def _signals(self) -> Callable[..., None]:
         def write() -> str:
             module, tape = Module(), self.tape("signals")
-            # Code for several lanes comes on top of that for one, and a run that is so long to compile is
-            # seldom long enough to win the time back.
+            # Code for several lanes is compiled in addition to the code for one. For large systems the extra
+            # compilation takes longer than it saves in most runs.
             lanes = 1 if is_long(tape) else host_target().lanes
             emit_batch(module, tape, _SIGNALS_LAYOUT, lanes, "signals")
             return module.text
@@ -187,7 +188,8 @@ class CompiledSystem:
         return result
 
     def prepare(self, tableau: Tableau | None) -> None:
-        """Compile, or load from disk, all that a run by this method needs (``None``: no integration)."""
+        """Compile, or load from disk, all code that a run with this method needs (``None``: no
+        integration)."""
         _ = self._signals, self._start_functions
         if tableau is not None:
             self.integrator(tableau)
@@ -205,7 +207,7 @@ class CompiledSystem:
         return self._of_parameters("initial_algebraic", self.algebraic.size, p)
 
     def breakpoints(self, p: Vector) -> Vector:
-        """Known instants at which signals jump, ``(nb,)`` s, in no order."""
+        """Times at which sources jump, ``(nb,)`` s, in any order."""
         return self._of_parameters("breakpoints", self._breakpoint_count, p)
 
     def _at_point(self, name: str, size: int, t: float, vectors: tuple[Vector, ...]) -> Vector:
@@ -217,11 +219,11 @@ class CompiledSystem:
         return result
 
     def derivative(self, t: float, x: Vector, z: Vector, w: Vector, p: Vector) -> Vector:
-        """``x'``, ``(nx,)``, at one instant."""
+        """``x'``, ``(nx,)``, at one time."""
         return self._at_point("derivative", self.states.size, t, (x, z, w, p))
 
     def residual(self, t: float, x: Vector, z: Vector, w: Vector, p: Vector) -> Vector:
-        """``r``, ``(nw,)``, at one instant: zero where ``w`` solves the implicit equations."""
+        """Residual ``(nw,)`` at one time: zero if ``w`` solves the implicit equations."""
         return self._at_point("residual", self.algebraic.size, t, (x, z, w, p))
 
     def updated(self, t: float, x: Vector, z: Vector, w: Vector, p: Vector, m: Vector) -> Vector:
@@ -232,7 +234,7 @@ class CompiledSystem:
         return result
 
     def evaluate_signals(self, t: Vector, x: Vector, z: Vector, w: Vector, p: Vector) -> Vector:
-        """Signals ``(ny, N)`` at many instants, several at a time.
+        """Signals ``(ny, N)`` at N times, several in each vector instruction.
 
         ``t (N,)``, ``x (N, nx)``, ``z (N, nz)``, ``w (N, nw)``, ``p (np,)``.
         """
@@ -243,10 +245,10 @@ class CompiledSystem:
         return y
 
     def loop_matrices(self, t: Vector, x: Vector, z: Vector, w: Vector, p: Vector) -> list[Vector]:
-        """For each of ``loops`` with n signals the matrices ``(N, n, n)`` of its equations, at N instants.
+        """For each of ``loops`` with n signals the matrices ``(N, n, n)`` of its equations, at N times.
 
-        By the tape's interpreter: the few instants at which the condition of a loop is estimated are not
-        worth native code.
+        The tape is interpreted: the condition of a loop is estimated at few times, and compilation would take
+        longer.
         """
         from armblocks.compiler.interpret import interpret
 
@@ -260,10 +262,10 @@ class CompiledSystem:
         return cached_jacobian(self._digests["derivative"], self._digests["residual"], self._trace)
 
     def integrator(self, tableau: Tableau) -> NativeIntegrator:
-        """The native loop that steps this system by a method; made once."""
+        """The native loop that integrates this system with a method; created once for each method."""
         found = self._integrators.get(id(tableau))
         if found is None:
-            # The integrator keeps its tableau alive, so the identity stays its own.
+            # The integrator keeps its tableau alive, so no other tableau can get the same identity.
             if not tableau.needs_jacobian:
                 found = NativeIntegrator(self.sizes, self._digests, self.tape, tableau)
             else:
@@ -294,7 +296,7 @@ def _functions(system: HybridSystem) -> dict[str, TracedFunction]:
 
 
 def _describe(system: HybridSystem, tapes: Mapping[str, Tape]) -> dict[str, Any]:
-    """All of a system but its equations, as plain values that JSON gives back exactly."""
+    """All of a system except its equations, as plain values that JSON reproduces exactly."""
 
     return {
         "name": system.name,

@@ -1,4 +1,5 @@
-"""The functions of a system that its native loop calls, as the compiler gives them (``emit_function``).
+"""Declarations of the system's functions that the native loop calls. ``emit_function`` of the compiler writes
+their code.
 
 Arrays are those of the system: ``t`` the time, ``x`` the states, ``z`` the discrete variables with the
 delayed values, ``w`` the unknowns of the implicit equations, ``p`` the parameters. The last arrays are the
@@ -23,7 +24,7 @@ def flow_jacobian(r: Routine, t: Reals, x: Reals, z: Reals, w: Reals, p: Reals, 
 
 @external
 def residual(r: Routine, t: Reals, x: Reals, z: Reals, w: Reals, p: Reals, g: Reals) -> None:
-    """``g(t, x, z, w, p)``, which is zero for the right ``w``."""
+    """``g(t, x, z, w, p)``, which is zero at the solution ``w``."""
 
 
 @external
@@ -46,7 +47,7 @@ def guards(r: Routine, t: Reals, x: Reals, z: Reals, w: Reals, p: Reals, g: Real
 def _guards_and_modes(
     r: Routine, t: Reals, x: Reals, z: Reals, w: Reals, p: Reals, g: Reals, contradictions: Reals
 ) -> None:
-    """The same, and what is not 0 for the modes that contradict their conditions."""
+    """The values of the guards, and for each mode a value that is nonzero if the mode is inconsistent."""
 
 
 guards_and_modes = external(_guards_and_modes, "guards")
@@ -56,7 +57,7 @@ guards_and_modes = external(_guards_and_modes, "guards")
 def reset(
     r: Routine, t: Reals, x: Reals, z: Reals, w: Reals, p: Reals, fired: Reals, new_x: Reals, new_z: Reals
 ) -> None:
-    """``x`` and ``z`` after the events of the guards that fired, 1 upwards and -1 downwards, else 0."""
+    """``x`` and ``z`` after events; ``fired`` has 1 for guards that fired upwards, -1 downwards, else 0."""
 
 
 @external
@@ -73,4 +74,4 @@ def delay_times(r: Routine, t: Reals, x: Reals, z: Reals, w: Reals, p: Reals, ta
 def delay_inputs(
     r: Routine, t: Reals, x: Reals, z: Reals, w: Reals, p: Reals, values: Reals, derivatives: Reals
 ) -> None:
-    """The signals that are delayed, and their derivatives by the time."""
+    """The signals that are delayed, and their time derivatives."""

@@ -1,4 +1,4 @@
-"""The state of one integration as two flat arrays, shared by the native loop and the Python around it."""
+"""The state of one integration as two flat arrays, shared by the native loop and its Python caller."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class Status(IntEnum):
 
     DONE = 0
     PAUSED = 1
-    """The asked number of steps is taken: call again."""
+    """The maximum number of steps of the call is reached: call again."""
     STEP_TOO_SMALL = 2
     """The error is too large even with the minimum step."""
     NON_FINITE = 3
@@ -27,7 +27,7 @@ class Status(IntEnum):
     STOPPED = 7
     """A guard that ends the run is positive; the present values are recorded."""
     MINIMUM_STEP = 8
-    """Steps so short that what changes in one is within the tolerance, and far more to come."""
+    """The steps are needlessly short, and the run would need far too many of them."""
     INCONSISTENT_MODES = 9
     """No choice of the modes is consistent."""
 
@@ -44,15 +44,15 @@ class Scalar(IntEnum):
     ATOL = 4
     MAX_STEP = 5
     BOUND = 6
-    """The next step is not longer: steps begin short after an event and grow again."""
+    """Maximum length of the next step. It is short after an event and grows with each step."""
     LAST_EVENT = 7
     """Time of the last event of any guard."""
     SPAN = 8
-    """Events are told apart beside ``max(time, 1e-6 SPAN)``: about the length of the run."""
+    """Approximate length of the run. The resolution of events is relative to ``max(time, 1e-6 SPAN)``."""
     SCAN = 9
-    """How far apart the guards are evaluated next, at most; as far as they have proved to be smooth."""
+    """Length of the next window of the event search. It grows while the guards are smooth."""
     PAUSE = 10
-    """The loop returns before the first step that would begin at this time or later."""
+    """The loop returns before the first step that begins at this time or later."""
     HALT = 11
     """The loop returns before the ticks of the first instant at this time or later."""
     END = 12
@@ -61,8 +61,8 @@ class Scalar(IntEnum):
 class Count(IntEnum):
     """Places in the array of integers.
 
-    After them comes the number of the next tick of every clock, then the first and the last row of the
-    history that each delayed signal reads; -1 where the last is the newest.
+    After them come the number of the next tick of every clock, then the first and the last row of the history
+    that each delayed signal reads. A last row of -1 stands for the newest.
     """
 
     SAMPLE = 0
@@ -84,19 +84,19 @@ class Count(IntEnum):
     EVENTS = 11
     """Events so far."""
     CLOSE = 12
-    """Events in a row that follow one another closely and do not come to an end."""
+    """Consecutive close events whose distances do not shrink."""
     SAVED = 13
-    """Whether the checkpoint is written."""
+    """Whether the checkpoint has been written."""
     WATCHED = 14
-    """Steps so far that were checked for stiffness."""
+    """Number of steps so far that count for the interval between stiffness checks."""
     STIFF = 15
-    """Explicit methods: checks that found a step bound by stability. Methods for stiff systems: so many
-    checks in a row at a step that an explicit method could take as well make one take over."""
+    """Explicit methods: number of checks with a stability-limited step. Methods for stiff systems: number of
+    consecutive checks after which an explicit method, which could take the same steps, takes over."""
     CALM = 16
-    """Checks in a row that found no stiffness."""
+    """Number of consecutive checks without stiffness."""
     WATCHING = 17
-    """0: the run keeps its method. Else it wants to be told where another one does better, and pauses
-    there; 1 and the number of changes so far."""
+    """0: the run keeps its method. Else 1 plus the number of changes of the method so far: the run pauses
+    where another method is faster."""
     AT_START = 18
     """Whether the run is at its start, before the first mode iteration."""
     HISTORY_ROWS = 19
@@ -104,9 +104,10 @@ class Count(IntEnum):
     HISTORY_ROOM = 20
     """Capacity in rows."""
     SHORT = 21
-    """Checks that found a step short without need, less some for every check that did not."""
+    """Number of checks that found a needlessly short step, minus ``SHORT_BACK`` for every check that did
+    not."""
     CROWDED = 22
-    """Events in a row of which each comes soon after the one before."""
+    """Consecutive events whose distances are at most ``CROWD`` times the time."""
     END = 23
 
 
@@ -123,7 +124,8 @@ class Stage(IntEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class DelaySlots:
-    """One delayed scalar: where in ``z`` its value and its slope stand, and whether the delay is constant."""
+    """One delayed scalar: the places of its value and derivative in ``z``, and whether the delay is
+    constant."""
 
     value: int
     slope: int
@@ -134,15 +136,20 @@ class DelaySlots:
 class LoopSizes:
     """The properties of a system for which a loop is generated: lengths of vectors, clocks and guards.
 
-    ``clocks`` are pairs of period and offset, s; ``directions`` those of the guards, ``stops`` the numbers of
-    those that end the run where they are positive. ``captures``: whether ``update`` is also called just
-    before every instant. ``modes``: the places of the modes in ``z``; ``followers``, for each, whether it
-    is a function of the signals alone; ``remembered``, the places in ``z`` of those that also read what they
-    were before, each with the place of that; ``recaptured``, the places of the captured values that go with
-    these; ``momentary``, the places of what is 0 again at the end of an instant; ``silenced``, the guards
-    that do not fire where such a place is not 0, each with that place; ``locating``, the guards that only
-    tell when modes change that are a function of the signals.
-    ``tangents``: from which entries of ``x``, ``z`` and the guards on they belong to derivatives, if any.
+    - ``clocks``: pairs of period and offset, s.
+    - ``directions``: the direction of each guard. ``stops``: the guards that end the run when they are
+      positive.
+    - ``captures``: whether ``update`` is also called just before every instant.
+    - ``modes``: the places of the modes in ``z``. ``followers``: for each mode, whether it is a function of
+      the signals.
+    - ``remembered``: the places in ``z`` of the modes with memory, each with the place of its previous value.
+    - ``recaptured``: the places in ``z`` of the captured values that belong to modes with memory.
+    - ``momentary``: the places in ``z`` that are set to 0 at the end of every instant.
+    - ``silenced``: guards, each with a place in ``momentary``; the guard does not fire while that value is
+      nonzero.
+    - ``locating``: the guards that only locate mode changes.
+    - ``tangents``: the first entries of ``x``, ``z`` and the guards that belong to derivatives, if there are
+      any.
     """
 
     states: int
@@ -171,20 +178,32 @@ class LoopSizes:
 class Workspace:
     """The position of each vector in the array of doubles.
 
-    ``x`` the state of the last accepted step, ``y`` that at the end of the step being tried (and, before it,
-    at each stage), ``slope(row)`` the stage derivatives; then what only hybrid systems have: ``z`` and ``w``
-    as accepted, ``new_x`` and ``new_z`` what a reset or update makes of them, ``trial_w`` the unknowns of the
-    implicit equations at the point evaluated last, ``guards``, those at the beginning and in the middle of
-    the window that is searched (``guards_before``, ``guards_middle``), how fast they changed at the end of
-    the window before it (``guard_slopes``, NaN: not known), their ``signs`` (0: not known yet), the values
-    and signs at the start of the step (``guards_at_start``, ``signs_at_start``),
-    ``fired``, when each fired last (``last``), how long after the time before (``gap``), how often in a row
-    this became shorter (``shrinking``), and how often it fired among the latest events that follow one
-    another closely (``repeats``); ``contradictions``, not 0 for the modes that contradict their conditions;
-    ``ticking``; and for Newton's method ``residual``, ``jacobian``, ``before``, and ``pivots`` and ``swaps``
-    (integers) of its elimination. For delayed signals: how long each is delayed (``taus``), between which
-    bounds (``bounds``: all shortest, all longest), the ``longest`` of all; the ``history`` comes behind
-    everything.
+    All systems:
+
+    - ``x``: the state of the last accepted step.
+    - ``y``: the state of each stage of the trial step, then the state at its end.
+    - ``slope(row)``: the stage derivatives.
+
+    Only hybrid systems:
+
+    - ``z``, ``w``: discrete variables and implicit unknowns of the last accepted step.
+    - ``new_x``, ``new_z``: the result of a reset or update.
+    - ``trial_w``: the implicit unknowns at the point evaluated last.
+    - ``guards``: their present values; ``guards_before``, ``guards_middle``: at the beginning and in the
+      middle of the searched window.
+    - ``guard_slopes``: their derivatives at the end of the previous window (NaN: unknown).
+    - ``signs``: their stored signs (0: none yet); ``guards_at_start``, ``signs_at_start``: values and signs
+      at the start of the step.
+    - ``fired``: the marks of the guards that fired; ``last``: the time of the last event of each guard.
+    - ``gap``: the time between its last two events; ``shrinking``: how many times in a row this time became
+      shorter.
+    - ``repeats``: the number of its events among the latest consecutive close events.
+    - ``contradictions``: nonzero for inconsistent modes.
+    - ``ticking``: the marks of the clocks.
+    - ``residual``, ``jacobian``, ``before``, ``pivots``, ``swaps`` (integers): memory of Newton's method.
+    - ``taus``: the present delays; ``bounds``: all shortest, then all longest delays; ``longest``: the
+      longest of all.
+    - ``history``: the history of the delayed signals, after everything else.
     """
 
     def __init__(self, tableau: Tableau, sizes: LoopSizes) -> None:
