@@ -85,7 +85,7 @@ def read_input(name: str, slot: Slot, value: ArrayLike) -> Array:
 
 
 def count_samples(name: str, signature: Signature, arrays: Sequence[Array]) -> int | None:
-    """N of the arrays that hold samples, None if none does. Raises :class:`InputError` if they disagree."""
+    """The number of samples N, None if no array has samples. Raises :class:`InputError` if they disagree."""
     counts = {
         slot.name: array.shape[0] for slot, array in zip(signature, arrays) if array.ndim > len(slot.shape)
     }

@@ -1,4 +1,4 @@
-"""Tapes over many samples: a native loop that evaluates as many samples at a time as a register has lanes."""
+"""Tapes over many samples: a native loop that evaluates one sample in each lane of a register."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ def emit_batch(module: Module, tape: Tape, layout: BatchLayout, lanes: int, name
 
     It evaluates the samples ``start`` to ``stop - 1``. ``columns`` is N, the length of a line of the arrays
     in column layout. Outputs must not overlap inputs. Values that depend on shared inputs only are computed
-    once. Samples that do not fill a register, and blocks with a sample that a vector function does not
-    support (the sine of a huge angle), are evaluated with one lane; results are identical.
+    once. Samples that do not fill a register are evaluated with one lane. So are blocks with a sample that a
+    vector function does not support, such as the sine of a huge angle. The results are identical.
     """
     _add_block(module, tape, layout, 1, f"{name}.sample")
     if lanes > 1:
@@ -82,11 +82,11 @@ def emit_shares(module: Module, tape: Tape, name: str) -> None:
 
 
 def _sample(r: Routine, sample: Integer, columns: Integer, *arrays: Reals) -> None:
-    """Evaluate one sample: what :func:`_add_block` adds for one lane."""
+    """Evaluate one sample; :func:`_add_block` with one lane writes the body."""
 
 
 def _lanes(r: Routine, first: Integer, columns: Integer, *arrays: Reals) -> Boolean:
-    """Evaluate one sample per lane; returns whether they must be evaluated one by one."""
+    """Evaluate one sample per lane; return whether they must be evaluated one by one."""
     raise NotImplementedError
 
 
@@ -131,8 +131,9 @@ def _add_block(module: Module, tape: Tape, layout: BatchLayout, lanes: int, name
         result, inlined = "void", "noinline"
         body.do("ret void")
     else:
-        # In the loop, what depends on shared inputs alone is worked out before the first turn. The loop's own
-        # parameters say already that arrays do not overlap; LLVM would note it at each load and store.
+        # Inlined into the loop, so that LLVM computes values of shared inputs before the first iteration. The
+        # parameters of the loop already state that arrays do not overlap; here LLVM would note it at every
+        # access.
         result, inlined = "i1", "alwaysinline"
         declared = [(kind.split()[0], argument) for kind, argument in declared]
         body.do(f"ret i1 {'false' if doubtful is None else body.let(f'icmp ne i{lanes} {doubtful}, 0')}")

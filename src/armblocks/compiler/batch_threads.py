@@ -1,8 +1,8 @@
 """Batches on several threads.
 
 The threads take shares of the samples in native code, without the interpreter lock. A thread that starts late
-finds fewer shares, or none, and the caller does not wait for it: waking a sleeping thread takes 0.05 ms, on a
-busy machine much longer, while the batch of a robot model may take 0.5 ms.
+finds fewer shares, or none, and the caller does not wait for it. Waking a sleeping thread takes 0.05 ms, on a
+busy machine much longer, and the whole batch of a robot model may take 0.5 ms.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _SMALLEST_PART = 2048
 _SMALLEST_SHARE = 512
 _SHARES_PER_THREAD = 16
 _RUNNING = 1
-# Turns of a loop of 1 to 4 ns.
+# Iterations of a loop, 1 to 4 ns each.
 _HOLD = 2_000
 """Time for which a finished helper leaves the interpreter lock to the calling thread."""
 _PATIENCE = 50_000

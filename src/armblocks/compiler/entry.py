@@ -1,11 +1,11 @@
 """Calling a kernel from Python: a CPython builtin whose code is part of the kernel's LLVM module.
 
-A call through ``ctypes`` costs several times the work of a whole robot model. The builtin made here has the
-signature of ``METH_FASTCALL | METH_KEYWORDS``. It checks its arguments. When each is a plain C-contiguous
-float64 array of the slot's shape (a float for a scalar slot), with or without the samples' axis, it allocates
-the result, or takes the array of ``out=``, and calls the evaluation: no Python code runs. Other calls (lists,
-subclasses, a wrong shape, ``out=`` that shares memory with an input, two threads) go to a Python callable,
-which handles them or raises the error. No C compiler is involved, so the wheel is pure Python.
+A call through ``ctypes`` takes several times as long as a whole robot model. The builtin has the signature of
+``METH_FASTCALL | METH_KEYWORDS``. It checks its arguments. When each is a plain C-contiguous float64 array of
+the slot's shape (a float for a scalar slot), with or without the samples' axis, it allocates the result, or
+takes the array of ``out=``, and calls the evaluation: no Python code runs. Other calls (lists, subclasses, a
+wrong shape, ``out=`` that shares memory with an input, two threads) go to a Python callable, which handles
+them or raises the error. No C compiler is involved, so the wheel is pure Python.
 
 Batches have separate machine code, which is compiled at the first batch. The first batch therefore goes to
 the Python callable; the kernel then stores the address in :data:`BATCHES`.
@@ -36,7 +36,7 @@ TABLE = "armblocks_entry_table"
 """Symbol of the table of addresses that each process fills in, because cached code must not contain
 addresses."""
 BATCHES = "armblocks_entry_batches"
-"""Symbol of the addresses of the functions for batches, null until made: see :func:`offer_batch`."""
+"""Symbol of the addresses of the batch functions, null until :func:`offer_batch` sets them."""
 MOST_BATCH_INPUTS = 8
 """Batches of kernels with more inputs go to the Python callable: the table has an entry for each subset."""
 
@@ -87,8 +87,8 @@ class _MethodDefinition(ctypes.Structure):
     )
 
 
-# A builtin reads its definition when it is deallocated, and the garbage collector may clear its ``self`` #
-# before that: definitions (some hundred bytes each) are therefore kept for the lifetime of the process.
+# A builtin reads its definition when it is deallocated, and the garbage collector may clear its ``self``
+# before that. Definitions (some hundred bytes each) are therefore kept for the lifetime of the process.
 _DEFINITIONS: list[_MethodDefinition] = []
 
 

@@ -40,7 +40,7 @@ R = TypeVar("R")
 _OPTIONS = "entry.options"
 _NO_SAMPLES = -1
 _LONG_BATCH = 512
-"""Number of samples from which on the interpreter lock is released during the evaluation."""
+"""Minimum number of samples for which the interpreter lock is released during the evaluation."""
 
 
 def emit_entry(module: Module, inputs: Signature, outputs: Signature, evaluate: str) -> None:
@@ -201,7 +201,7 @@ class _Call:
         return common
 
     def batch_function(self, arguments: Sequence[_Argument], batched: Boolean) -> Address:
-        """The address that evaluates a batch with these inputs batched; null for one sample."""
+        """The address of the batch function for these batched inputs; null for one sample."""
         r = self.r
         if len(arguments) > MOST_BATCH_INPUTS:
             self.require(~batched)
@@ -270,7 +270,7 @@ class _Call:
         out: Address,
         arguments: Sequence[_Argument],
     ) -> _Result:
-        """The array of ``out=`` if there is one, which must be as the call would give it, else a new array.
+        """The array of ``out=``, which must have the form of the result, or a new array without ``out=``.
 
         An array that may share memory with an input goes to the Python callable.
         """
@@ -315,7 +315,7 @@ class _Call:
     def evaluate(
         self, batch: Address, samples: Integer, inputs: Sequence[Reals], results: Sequence[_Result]
     ) -> None:
-        """Evaluate one sample, or many by the function ``batch``, which then is not null."""
+        """Evaluate one sample, or many with the function ``batch`` if it is not null."""
         r, objects = self.r, self.objects
         arrays = [*inputs, *(result.target.value.reals for result in results)]
         many = external(_evaluate_batch).at(batch)
@@ -331,7 +331,8 @@ class _Call:
                 objects.call(python.restore_thread, state)
 
     def succeed(self, made: Address) -> None:
-        """If ``made`` is null, release what is owned and hand the error on."""
+        """If ``made`` is null, release all owned references and return null, so that Python raises the
+        error."""
         with self.r.when(made.is_null, rarely=True):
             for owned in self.owned:
                 self.objects.call(python.release, owned.value)
@@ -363,11 +364,11 @@ class _Call:
 
 
 def _evaluate(r: Routine, *arrays: Reals) -> None:
-    """Evaluate one sample: what ``emit_function`` adds."""
+    """Evaluate one sample; ``emit_function`` writes the body."""
 
 
 def _evaluate_batch(r: Routine, start: Integer, stop: Integer, columns: Integer, *arrays: Reals) -> None:
-    """What :func:`~armblocks.compiler.batch.emit_batch` adds to another module."""
+    """Evaluate a batch; :func:`~armblocks.compiler.batch.emit_batch` writes the body in another module."""
 
 
 def _options(r: Routine, values: Addresses, names: Address) -> tuple[Boolean, Address]:

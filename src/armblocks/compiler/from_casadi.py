@@ -16,7 +16,7 @@ from armblocks.equations import TracedFunction
 from armblocks.equations.linear_solution import derivative_rule, solution_size
 from armblocks.errors import CompileError
 
-# Operations that mean the same in both, by CasADi's name.
+# Operations with the same meaning in CasADi and in a tape, by CasADi's name.
 _SAME = {
     "OP_ADD": Opcode.ADD,
     "OP_SUB": Opcode.SUBTRACT,
@@ -90,7 +90,7 @@ def tape_from(traced: TracedFunction) -> Tape:
 def _inlined(
     builder: TapeBuilder, function: Function, inputs: Sequence[Sequence[int]], name: str
 ) -> list[list[int]]:
-    """Handles of all structural entries of a function's outputs, for those of its inputs."""
+    """Handles of all structural entries of a function's outputs, from the handles of its inputs."""
     outputs = [[-1] * function.nnz_out(k) for k in range(function.n_out())]
     work = [-1] * function.sz_w()  # handle of the value that each work slot holds now
     called: SX | None = None
@@ -126,7 +126,7 @@ def _call(builder: TapeBuilder, function: Function, arguments: Sequence[int], na
     """A linear solution (:mod:`armblocks.equations.linear_solution`), or one of its derivatives."""
     size = solution_size(function.name())
     if size is not None:
-        # CasADi has matrices column by column.
+        # CasADi stores matrices by columns.
         by_rows = [arguments[column * size + row] for row in range(size) for column in range(size)]
         solved = builder.add(Opcode.SOLVE, *by_rows, *arguments[size * size :])
         return [builder.add(Opcode.MEMBER, solved, builder.constant(float(k))) for k in range(size)]

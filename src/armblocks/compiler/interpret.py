@@ -27,7 +27,7 @@ def interpret(tape: Tape, inputs: Sequence[ArrayLike], *, fused: bool = True) ->
 
     ``inputs[k]`` has shape ``(..., size of slot k)``; the leading shapes broadcast against each other.
     Returns one array ``(..., size)`` per output slot. With ``fused=False`` a multiply-add is rounded twice.
-    Raises :class:`InputError` when the count of inputs or the size of one is wrong.
+    Raises :class:`InputError` if the number of inputs or the size of an input is wrong.
     """
     arrays = [np.asarray(value, dtype=np.float64) for value in inputs]
     found = tuple(array.shape[-1] if array.ndim else -1 for array in arrays)
@@ -98,7 +98,7 @@ def _solve(values: Sequence[Values], n: int, *, fused: bool) -> Values:
         return multiply_add(-a, *np.broadcast_arrays(b, c)) if fused else c - a * b
 
     weights = 1.0 / np.max(np.where(np.isnan(matrix), 0.0, np.abs(matrix)), axis=-1)
-    # Rows are exchanged as wholes: of the factors, of the matrix, and its weight and right side.
+    # Whole rows are exchanged: of the factors and of the matrix, with the weight and the right side.
     rows = np.concatenate([matrix, matrix, weights[..., None], right[..., None]], axis=-1)
     for k in range(n):
         for i in range(k + 1, n):
@@ -150,9 +150,10 @@ def evaluate(opcode: Opcode, values: Sequence[Values], *, fused: bool = True) ->
 def multiply_add(a: Values, b: Values, c: Values) -> Values:
     """``a b + c`` rounded once.
 
-    Where no partial result can leave the range of normal numbers: the product and the sum without error
-    (Dekker 1971, Knuth), the rest added with rounding to odd (Boldo and Melquiond, "Emulation of FMA and
-    correctly rounded sums", IEEE Trans. Computers 57, 2008, section 3). Elsewhere by exact fractions.
+    Where no intermediate result can leave the range of normal numbers, the product and the sum are computed
+    without error (Dekker 1971, Knuth), and the low part is added with rounding to odd (Boldo and Melquiond,
+    "Emulation of FMA and correctly rounded sums", IEEE Trans. Computers 57, 2008, section 3). Elsewhere exact
+    fractions are used.
     """
     product, product_error = _two_product(a, b)
     high, low = _two_sum(product, c)
@@ -164,7 +165,7 @@ def multiply_add(a: Values, b: Values, c: Values) -> Values:
     result = np.asarray(high + odd)
     size = [np.abs(value) for value in (a, b, c, product)]
     tame = np.all([(value < 1e250) & ((value > 1e-250) | (value == 0.0)) for value in size], axis=0)
-    # An exactly cancelled sum, and a product of zero, have signs that the splitting may lose.
+    # The splitting may lose the sign of a product of zero and of a sum that cancels exactly.
     tame &= (product != 0.0) & (result != 0.0)
     for place in zip(*np.nonzero(np.atleast_1d(~tame))):
         at = place if result.ndim else ()

@@ -56,7 +56,7 @@ class Body:
         self.bit = self.type("i1")
         self.lines: list[str] = []
         self.undecided: str | None = None
-        """Condition on lanes in which a vector function could not give its result; None: always decided."""
+        """Condition that holds in lanes whose result must be computed with one lane; None: in no lane."""
         self._count = 0
 
     def type(self, scalar: str) -> str:
@@ -68,7 +68,7 @@ class Body:
         self.lines.append(f"  {instruction}")
 
     def let(self, instruction: str) -> str:
-        """An instruction with a result; gives its name."""
+        """An instruction with a result; returns its name."""
         self._count += 1
         name = f"%v{self._count}"
         self.lines.append(f"  {name} = {instruction}")
@@ -119,8 +119,8 @@ class Body:
     def fma(self, a: str, b: str, c: str) -> str:
         """``a b + c``, rounded once."""
         result = self.intrinsic("fma", a, b, c)
-        # For -(a b + c) LLVM selects ARM64's FNMADD, which computes (-a) b + (-c): where the sum is exactly
-        # zero that gives +0 instead of -0. A negation may also arise from a select or a product with -1, so #
+        # For -(a b + c) LLVM selects ARM64's FNMADD, which computes (-a) b + (-c). If the sum is exactly zero
+        # that gives +0 instead of -0. LLVM may also create a negation from a select or a product with -1, so
         # the barrier is here. Vectors have no such instruction.
         return self.intrinsic("arithmetic.fence", result) if self.lanes == 1 else result
 
@@ -200,7 +200,7 @@ class Body:
         return total, self.add(rest, self.subtract(b, part))
 
     def fast_two_sum(self, a: str, b: str) -> tuple[str, str]:
-        """``a + b`` and its rounding error, where ``|a| >= |b|`` or ``a`` is zero."""
+        """``a + b`` and its rounding error; requires ``|a| >= |b|`` or ``a = 0``."""
         total = self.add(a, b)
         return total, self.add(self.subtract(a, total), b)
 

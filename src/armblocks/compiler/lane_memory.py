@@ -1,7 +1,7 @@
-"""Samples between memory and lanes: sample ``k + lane`` of a block goes to lane ``lane``.
+"""Loads and stores of samples: sample ``k + lane`` of a block is in lane ``lane``.
 
-Arrays in row layout (one sample after the other) are read and written as rows of full registers, which are
-transposed in registers by log2(lanes) rounds of shuffles: much less work than one element at a time.
+Arrays in row layout (one sample after the other) are read and written in full registers, which are transposed
+by log2(lanes) rounds of shuffles. This is much faster than one element at a time.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from armblocks.routines.values import Integer
 
 @dataclass(frozen=True, kw_only=True)
 class Line:
-    """Where an input register and those behind it in its slot lie in memory.
+    """The memory positions of an input register and the following registers of its slot.
 
-    The first is at ``address``, the following each ``step`` doubles further; ``apart`` lie between those of
-    neighbouring lanes. Both are texts of i64.
+    The first is at ``address``. ``step`` is the distance to the next register, ``apart`` the distance between
+    neighbouring lanes, both in doubles and as LLVM values of type i64.
     """
 
     address: str
@@ -29,11 +29,12 @@ class Line:
     apart: str = "0"
 
     def is_plain_array(self, lanes: int) -> bool:
-        """Whether the numbers follow one another, and are the same for all of so many lanes."""
+        """Whether the numbers are contiguous, and the same in all ``lanes``."""
         return self.step == "1" and (lanes == 1 or self.apart == "0")
 
     def read(self, body: Body, behind: str) -> str:
-        """The number so many registers behind the first, an integer in each lane."""
+        """The number at the distance ``behind`` from the first, in registers; ``behind`` has one value per
+        lane."""
 
         def address(entry: str, lane: int) -> str:
             place = body.let(f"mul nsw i64 {entry}, {self.step}")
@@ -45,7 +46,7 @@ class Line:
         return body.gather(address, behind)
 
     def copy(self, body: Body, target: str, length: int) -> None:
-        """So many numbers from the first on to ``target``, a row of all lanes after the other."""
+        """Copy ``length`` numbers to ``target``: for each number a row with its value in every lane."""
         if body.lanes == 1 and self.step == "1":
             body.module.declare("void", "llvm.memcpy.p0.p0.i64", "ptr", "ptr", "i64", "i1")
             ends = f"ptr align 8 {target}, ptr align 8 {self.address}"
@@ -81,7 +82,7 @@ def load_rows(body: Body, pointer: str, size: int, first: int) -> list[str]:
         begin = row * size + first
         excess = max(0, begin + lanes - lanes * size)
         value = _load(body, pointer, begin - excess)
-        if excess:  # read back to back with the end of the block, then move into place
+        if excess:  # read the last full register of the block, then shift
             places = [lane + excess if lane + excess < lanes else None for lane in range(lanes)]
             value = shuffle(body, value, "poison", places)
         rows.append(value)
@@ -102,7 +103,7 @@ def store_rows(body: Body, pointer: str, size: int, first: int, columns: Sequenc
     for row, value in enumerate(rows):
         begin = row * size + first
         if width == lanes or begin + lanes <= lanes * size:
-            # Lanes beyond the row spill into the next one, which is written after this one.
+            # Lanes beyond the end of the row overwrite the next row, which is written afterwards.
             _store(body, pointer, begin, value)
             continue
         done = 0
@@ -113,7 +114,7 @@ def store_rows(body: Body, pointer: str, size: int, first: int, columns: Sequenc
 
 
 def transpose(body: Body, rows: Sequence[str]) -> list[str]:
-    """Rows to columns, as many of either as lanes (a power of two)."""
+    """Transpose a square block with as many rows as lanes (a power of two)."""
     lanes = body.lanes
     values = list(rows)
     half = 1
@@ -132,7 +133,7 @@ def transpose(body: Body, rows: Sequence[str]) -> list[str]:
 
 
 def shuffle(body: Body, a: str, b: str, places: Sequence[int | None]) -> str:
-    """A vector picked from two: ``places`` count through ``a`` and then ``b``; None leaves a lane open."""
+    """A vector of selected lanes: ``places`` are indices into ``a`` followed by ``b``; None: any value."""
     if a == "poison" and b == "poison":
         return "poison"
     mask = ", ".join("i32 poison" if place is None else f"i32 {place}" for place in places)

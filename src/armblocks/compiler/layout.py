@@ -1,4 +1,4 @@
-"""How the samples of a batch lie in memory."""
+"""The memory layout of the samples of a batch."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from enum import Enum
 
 
 class Layout(Enum):
-    """How the samples of one slot lie in memory."""
+    """The memory layout of the samples of one slot."""
 
     ROWS = "R"
-    """``(N, size)``: one sample after the other, as users have them."""
+    """``(N, size)``: one sample after the other, as users pass them."""
     COLUMNS = "C"
     """``(size, N)``: one quantity after the other."""
     SHARED = "S"

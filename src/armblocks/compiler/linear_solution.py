@@ -1,10 +1,10 @@
 """The tape's ``SOLVE``: dense linear equations over one or more lanes.
 
-Gaussian elimination with row pivoting. Rows are compared beside their largest entries, so that no scaling of
-an equation changes the choice (Golub, Van Loan, *Matrix Computations*, 4th ed., 3.5.2). One correction by the
-residual in working precision then makes every equation hold to rounding beside its own terms (Skeel, *Math.
-Comp.* 35 (1980) 817-832). Each lane exchanges its own rows, by selects: all lanes take the same steps, and
-the bits are those of one lane.
+Gaussian elimination with row pivoting. Pivots are chosen relative to the largest entry of their row, so that
+scaling an equation does not change the choice (Golub, Van Loan, *Matrix Computations*, 4th ed., 3.5.2). One
+step of iterative refinement in working precision makes the residual of every equation as small as the
+rounding error of its terms (Skeel, *Math. Comp.* 35 (1980) 817-832). Each lane exchanges its own rows with
+selects. All lanes run the same instructions, and the results are bitwise those of one lane.
 """
 
 from __future__ import annotations
@@ -25,9 +25,10 @@ from armblocks.routines.routine import Program, Routine
 from armblocks.routines.values import Integer
 
 SHORTEST_BLOCK, SHORTEST_BLOCK_OF_LANES, FEWEST_OF_LARGE = 8, 256, 24
-"""From so many neighbours on, inputs are copied in one go: LLVM compares loads and stores pair by pair. Over
-several lanes, fewer are read faster as whole registers; but from so many unknowns on, the elimination takes
-so much longer that only the time of compilation counts."""
+"""Minimum number of neighbouring inputs that are copied as a block, with one lane and with several lanes.
+LLVM compares loads and stores pair by pair, so blocks compile faster. With several lanes, fewer inputs are
+read faster as whole registers. The last number is the number of unknowns from which on the elimination takes
+so long that the reading does not matter, and the limit for one lane applies."""
 
 
 def emit_linear_solution(
@@ -39,7 +40,8 @@ def emit_linear_solution(
 ) -> list[str]:
     """The values of the members of a ``SOLVE``.
 
-    ``number(register)`` gives a register's value, ``line`` where an input and those behind it lie.
+    ``number(register)`` returns the value of a register, ``line`` the memory positions of an input and the
+    inputs that follow it.
     """
     n, module = solution_length(len(operands)), body.module
     symbol = f"linear_solution.{n}.{body.lanes}"
@@ -71,7 +73,7 @@ def _define(module: Module, symbol: str, n: int, lanes: int) -> None:
 
 
 def _blocks(tape: Tape, operands: Sequence[int]) -> Iterator[tuple[int, int]]:
-    """First place and length of each run of neighbouring inputs of one slot, and of each other operand."""
+    """Index and length of each run of contiguous inputs of one slot, and of each other operand."""
     start = 0
     for k in range(1, len(operands) + 1):
         follows = k < len(operands) and operands[k] == operands[k - 1] + 1 < tape.first_constant
@@ -82,7 +84,7 @@ def _blocks(tape: Tape, operands: Sequence[int]) -> Iterator[tuple[int, int]]:
 
 
 class _Solver:
-    """What the function does in its memory ``m``: matrix, right side, solution, then work space."""
+    """Emits the function; its memory ``m`` has the matrix, right side, solution, then work space."""
 
     def __init__(self, n: int, m: LaneArray) -> None:
         self.n = n
@@ -116,7 +118,7 @@ class _Solver:
             self.solution[i] = self.solution[i] + self.work[i]
 
     def prepare(self, r: Routine) -> None:
-        """The factors begin as the matrix; the weight of a row is its largest entry's reciprocal."""
+        """Copy the matrix, and set the weight of each row to the reciprocal of its largest entry."""
         for i in r.range(0, self.n):
             largest = r.variable(Lanes.constant(r, 0.0))
             for j in r.range(0, self.n):
@@ -128,7 +130,8 @@ class _Solver:
             self.weights[i] = 1.0 / largest.value
 
     def pivot(self, r: Routine, k: Integer) -> None:
-        """The row of the largest weighted entry of column ``k`` to place ``k``, in each lane."""
+        """In each lane, exchange row ``k`` with the row that has the largest weighted entry in column
+        ``k``."""
         for i in r.range(k + 1, self.n):
             larger = self.weighted(i, k) > self.weighted(k, k)
             with r.when(larger.any):
@@ -139,11 +142,11 @@ class _Solver:
                     exchange(larger, column, i, k)
 
     def weighted(self, row: Integer, column: Integer) -> Lanes:
-        """Size of an entry beside the largest of its row."""
+        """Magnitude of an entry relative to the largest entry of its row."""
         return abs(self.factors.numbers[self.factors.place(row, column)]) * self.weights[row]
 
     def eliminate(self, r: Routine, k: Integer) -> None:
-        """Column ``k`` out of the rows below."""
+        """Eliminate column ``k`` from the rows below row ``k``."""
         factors, place = self.factors.numbers, self.factors.place
         for i in r.range(k + 1, self.n):
             factor = factors[place(i, k)] / factors[place(k, k)]
@@ -151,7 +154,7 @@ class _Solver:
             self.factors.subtract_from_row(r, i, factor, k)
 
     def substitute(self, r: Routine) -> None:
-        """``work`` becomes the solution for the right side that stands there."""
+        """Replace the right side in ``work`` by the solution."""
         factors = self.factors
         factors.substitute(r, self.work, lambda value, i: value / factors.numbers[factors.place(i, i)])
 

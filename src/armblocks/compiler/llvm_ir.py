@@ -1,6 +1,6 @@
 """Tapes as LLVM IR.
 
-For those who write native code around compiled equations (an integrator's loop)::
+To write native code around compiled equations, such as the loop of an integrator::
 
     def write() -> str:
         module = Module()
@@ -13,8 +13,7 @@ For those who write native code around compiled equations (an integrator's loop)
     code = load_code(("loop", tape.digest), write)       # armblocks.compiler.native, with the disk cache
     address = code.address("loop")
 
-Each pointer is to the flat ``double`` vector of one slot, as :class:`~armblocks.equations.Signature` lays
-it out.
+Each pointer points to the flat ``double`` vector of one slot of a :class:`~armblocks.equations.Signature`.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ from armblocks.compiler.tape_operations import Inputs, Registers, emit_operation
 from armblocks.routines.llvm import number_text
 
 MANY_CONSTANTS = 32
-"""From here on an output's constants are copied from a table."""
+"""Minimum number of constants of an output that are copied from a table."""
 
 
 def emit_function(module: Module, tape: Tape, name: str, *, linkage: str = "internal") -> None:
@@ -37,9 +36,9 @@ def emit_function(module: Module, tape: Tape, name: str, *, linkage: str = "inte
 
     One pointer to flat doubles for each input slot, then one for each output slot, 8-byte aligned, in the
     order of the signatures (``derivative``: ``t, x, p, xd``). Outputs must not overlap inputs or each other.
-    Slots of size 0 still have their pointer, which is not followed. Every output is written on each call.
-    ``linkage`` is ``internal`` for functions called within the module, or ``""`` (external) for functions
-    whose address is asked for.
+    Slots of size 0 also have a pointer, which is not read. Every output is written on each call. ``linkage``
+    is ``internal`` for functions called within the module, or ``""`` (external) for functions whose address
+    is needed.
     """
 
     pointers = [("ptr noalias readonly", f"%i{k}") for k in range(len(tape.input_sizes))]
@@ -76,8 +75,8 @@ def emit_function(module: Module, tape: Tape, name: str, *, linkage: str = "inte
             groups = {register: (register,) for register in outputs}
             emit_pieces(body, tape, name, pointers, groups, inputs_of, store)
         else:
-            # Each result is stored as soon as it is known: thousands that wait for the end would be spilled
-            # and loaded again, and the compiler takes time in proportion to the square of their count.
+            # Each result is stored as soon as it is computed. Thousands of results stored at the end would be
+            # spilled and reloaded, and the compile time would grow with the square of their number.
             known: set[int] = set()
 
             def written(register: int, registers: Registers) -> None:
@@ -98,9 +97,9 @@ def emit_function(module: Module, tape: Tape, name: str, *, linkage: str = "inte
 
 
 def _copy_constants(body: Body, tape: Tape, members: Sequence[int], slot: int, symbol: str) -> bool:
-    """Write an output of which many numbers are constants (a Jacobian's) in one go; whether it was worth it.
+    """Copy an output with many constants, such as a Jacobian, from a table; return whether this was done.
 
-    LLVM would look for neighbours of each constant store, which takes long.
+    LLVM would search for the neighbours of each store of a constant, which takes long.
     """
     span = range(tape.first_constant, tape.first_operation)
     values = [tape.constants[k - span.start] if k in span else 0.0 for k in members]

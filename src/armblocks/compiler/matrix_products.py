@@ -1,9 +1,9 @@
-"""Products of a matrix and a vector: found in a tape, and written as LLVM IR.
+"""Products of a matrix and a vector: recognised in a tape, and written as LLVM IR.
 
-A matrix that is an input, such as the parameter of a matrix gain, times a vector becomes a chain of
-multiply-adds for each row. The text of 500 by 500 entries is half a million instructions, for which LLVM
-takes many minutes. :func:`with_matrix_products` finds the chains and puts one ``PRODUCT`` in their place. It
-multiplies and adds in the same order, so the bits are the same.
+In a tape, an input matrix (such as the parameter of a matrix gain) times a vector is a chain of multiply-adds
+for each row. 500 by 500 entries are half a million instructions, for which LLVM takes many minutes.
+:func:`with_matrix_products` finds the chains and replaces them by one ``PRODUCT``, which multiplies and adds
+in the same order. The results are therefore bitwise identical.
 """
 
 from __future__ import annotations
@@ -25,13 +25,15 @@ from armblocks.routines.routine import Program, Routine
 from armblocks.routines.values import Integer, NumberT
 
 SHORTEST_ROW = 8
-"""Fewer products of a row stay as they are."""
+"""Minimum number of products in a row; shorter chains are unchanged."""
 FEWEST_ENTRIES = 256
-"""Smaller matrices stay as they are: LLVM keeps their vectors in registers."""
+"""Minimum number of entries; smaller matrices are unchanged, because LLVM keeps their vectors in
+registers."""
 MOST_ROWS = 256
-"""Rows of one ``PRODUCT``: its results are read and stored by one function, which should not be long."""
+"""Maximum number of rows of a ``PRODUCT``. One function reads and stores its results; it should not be
+long."""
 ROWS_AT_ONCE = 8
-"""Sums that are under way at the same time: a multiply-add takes 4 cycles, and two can begin in each."""
+"""Number of sums computed in parallel: a multiply-add takes 4 cycles, and two can start in each cycle."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,14 +50,14 @@ class _Row:
 
     @property
     def last(self) -> int:
-        """The operation that gives the result."""
+        """The operation that computes the result."""
         return self.members[-1]
 
 
 def with_matrix_products(tape: Tape) -> Tape:
     """The tape with each large product of an input matrix, row by row, and a vector as one operation."""
     choices = [rows for chain in _chains(tape) for rows in _rows(tape, chain)]
-    # Where both factors follow one another in memory, the vector is the one that several rows have.
+    # If the factors of both sides are contiguous in memory, the side that several rows share is the vector.
     shared = Counter(row.vector for rows in choices for row in rows)
     chosen = [max(rows, key=lambda row: shared[row.vector]) for rows in choices]
     products = [group for group in _matrices(tape, chosen) if _entries(group) >= FEWEST_ENTRIES]
@@ -93,9 +95,9 @@ def _chains(tape: Tape) -> Iterator[list[int]]:
 
 
 def _rows(tape: Tape, chain: Sequence[int]) -> Iterator[list[_Row]]:
-    """The parts of a chain whose factors on one side are inputs that follow one another.
+    """The parts of a chain whose factors on one side are contiguous inputs.
 
-    Each as one row, or as two where the factors of both sides do.
+    Each part is given as one row, or as two alternatives if the factors of both sides are contiguous.
     """
     place = 0
     while place < len(chain):
@@ -117,7 +119,8 @@ def _rows(tape: Tape, chain: Sequence[int]) -> Iterator[list[_Row]]:
 
 
 def _run(tape: Tape, chain: Sequence[int], place: int, side: int) -> list[tuple[int, int]]:
-    """Pairs of a matrix entry and its factor, from the entry at one side of the operation at ``place`` on."""
+    """Pairs of a matrix entry and its factor, starting with the entry on one side of the operation at
+    ``place``."""
     entry = tape.operations[chain[place]].operands[side]
     if entry >= tape.first_constant:
         return []
@@ -134,7 +137,7 @@ def _run(tape: Tape, chain: Sequence[int], place: int, side: int) -> list[tuple[
 
 
 def _matrices(tape: Tape, rows: Sequence[_Row]) -> Iterator[list[_Row]]:
-    """Rows of one vector that follow one another in memory, and whose results do not depend on each other."""
+    """Groups of rows with the same vector that are contiguous in memory and do not depend on each other."""
     by_vector: dict[tuple[int, ...], list[_Row]] = {}
     for row in rows:
         by_vector.setdefault(row.vector, []).append(row)
@@ -156,7 +159,7 @@ def _matrices(tape: Tape, rows: Sequence[_Row]) -> Iterator[list[_Row]]:
 
 
 def _rewritten(tape: Tape, products: Sequence[Sequence[_Row]]) -> Tape:
-    """The tape with a ``PRODUCT`` for each group of rows, where the first of them is ready."""
+    """The tape with a ``PRODUCT`` for each group of rows, at the position of the first of its results."""
     constants = list(tape.constants)
     known: dict[str, int] = {}
 
@@ -204,7 +207,8 @@ def emit_matrix_product(
 ) -> list[str]:
     """The values of the members of a ``PRODUCT``.
 
-    ``number(register)`` gives a register's value, ``line`` where an input and those behind it lie.
+    ``number(register)`` returns the value of a register, ``line`` the memory positions of an input and the
+    inputs that follow it.
     """
     first = operands[0]
     m, n = product_shape(tape, operands)
@@ -220,7 +224,7 @@ def emit_matrix_product(
     add_program(body.module, program)
     space = WorkSpace(body, m + n if plain else m + n + m * n)
     address = matrix.address if plain else space.row(m + n)
-    if not plain:  # every sample of a batch has its own
+    if not plain:  # every sample of a batch has its own matrix
         matrix.copy(body, address, m * n)
     for k, register in enumerate([*starts, *vector]):
         space.write(k, number(register))
@@ -238,7 +242,8 @@ def product_shape(tape: Tape, operands: Sequence[int]) -> tuple[int, int]:
 
 
 def matrix_product(r: Routine, A: Reals, x: LaneArray, y: LaneArray, m: Integer, n: Integer) -> None:
-    """``y += A x`` in every lane, for ``A`` (m, n), row by row in memory; each sum from the left."""
+    """``y += A x`` in every lane, for ``A`` (m, n), stored by rows; each sum is evaluated from left to
+    right."""
     _add_product(r, A, in_all_lanes, x, y, m, n)
 
 

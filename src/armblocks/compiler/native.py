@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     from llvmlite import binding as llvm
 
 LONG, VERY_LONG = 8_000, 100_000
-"""Number of IR lines from which on optimisation does not pay, because such long code is limited by memory
-access."""
+"""Number of IR lines above which optimisation is not worth its time, because such long code is limited by
+memory access."""
 
-_LOCK = threading.Lock()  # LLVM's global context is not for two threads at once
+_LOCK = threading.Lock()  # LLVM's global context is not thread-safe
 
 
 class NativeCode:
@@ -52,7 +52,7 @@ class Effort(Enum):
 
 
 def allowed_effort() -> Effort:
-    """The most effort that ``$ARMBLOCKS_EFFORT`` allows: ``little`` or ``full`` (where it says nothing).
+    """The maximum effort by ``$ARMBLOCKS_EFFORT``: ``little`` or ``full`` (the default).
 
     Raises ``InputError`` for another word.
     """
@@ -69,11 +69,12 @@ def allowed_effort() -> Effort:
 
 
 def load_code(key: Sequence[str], write: Callable[[], str], effort: Effort = Effort.FULL) -> NativeCode:
-    """Machine code of the module whose IR text ``write()`` gives.
+    """Machine code of the module whose IR text ``write()`` returns.
 
-    ``key`` identifies the module (a variant's name, tape digests, options: everything that the text depends
-    on); target and versions are added here. If the disk cache knows the key, ``write`` is not called. With
-    ``ARMBLOCKS_EFFORT=little`` no code gets more effort. Raises ``InputError`` for another word there.
+    ``key`` identifies the module: the name of the variant, tape digests, options, everything that the text
+    depends on. Target and versions are added here. If the disk cache contains the key, ``write`` is not
+    called. ``ARMBLOCKS_EFFORT=little`` limits the effort. Raises ``InputError`` for another value of this
+    variable.
     """
     target, effort = host_target(), Effort(min(effort.value, allowed_effort().value))
     name = cache.object_name((*key, effort.name, target.key))
@@ -82,7 +83,7 @@ def load_code(key: Sequence[str], write: Callable[[], str], effort: Effort = Eff
         try:
             return _link(code, target)
         except RuntimeError:
-            pass  # an object that LLVM cannot read is compiled again
+            pass  # LLVM cannot read the cached object: compile it again
     code = compile_object(write(), target, effort=effort)
     cache.store(name, code)
     return _link(code, target)
@@ -121,7 +122,8 @@ def _optimise(module: llvm.ModuleRef, machine: llvm.TargetMachine) -> None:
 
 
 def _tidy(module: llvm.ModuleRef, machine: llvm.TargetMachine) -> None:
-    """The two passes that matter most for the loops around long code: variables in registers, fewer jumps."""
+    """The two passes with the largest effect on loops around long code: mem2reg and simplification of
+    jumps."""
     from llvmlite import binding as llvm
 
     builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=1))
@@ -146,7 +148,7 @@ def _link(code: bytes, target: Target) -> NativeCode:
 
 @once
 def _provide_runtime() -> None:
-    """Name the few C functions that LLVM may call where it does not find them by itself.
+    """Define the addresses of the few C functions that LLVM may call but cannot find by itself.
 
     Processors without fused multiply-add or rounding instructions (x86-64 before 2013) need ``fma`` and
     ``floor``, both exact in any C library; long work spaces come from ``malloc``; Windows checks large stack
@@ -159,7 +161,7 @@ def _provide_runtime() -> None:
     if sys.platform == "win32":
         libraries, names = ("ucrtbase", "vcruntime140", "ntdll"), ("__chkstk",)
     else:
-        libraries, names = (None,), ()  # what the process has loaded holds the C library
+        libraries, names = (None,), ()  # the libraries of the process include the C library
     for name in ("fma", "floor", "ceil", "memcpy", "memmove", "memset", "malloc", "free", *names):
         for library in libraries if llvm.address_of_symbol(name) is None else ():
             with contextlib.suppress(OSError, AttributeError):

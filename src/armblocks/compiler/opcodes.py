@@ -1,14 +1,15 @@
 """The operations of a tape: their names, how many operands they take, and what kind of work they are.
 
-Every operation works on IEEE 754 doubles and rounds to nearest. Where the sources differ, this is meant:
+Every operation works on IEEE 754 doubles and rounds to nearest. Where languages differ, the definitions are:
 
 * ``FMA a b c`` is ``a b + c`` rounded once, ``FMS`` is ``a b - c``, ``FNMA`` is ``c - a b``.
-* ``MINIMUM`` and ``MAXIMUM`` hand on a NaN of either operand (as ``numpy.minimum``; C's ``fmin`` and CasADi
-  would drop it, and a limiter would hide the first bad signal). Of two equal operands the second is given.
-* ``SIGN`` is -1, 1, or the operand itself where that is a zero or a NaN.
-* A comparison is 1.0 or 0.0; with a NaN all are 0.0 but ``NE``. A condition holds when it is not equal to
-  zero, so a NaN holds.
-* ``SELECT c a b`` is ``a`` where ``c`` holds, else ``b``; the value not chosen has no influence, be it NaN.
+* ``MINIMUM`` and ``MAXIMUM`` return NaN if either operand is NaN (as ``numpy.minimum``; C's ``fmin`` and
+  CasADi drop it, so a limiter would hide the first invalid signal). Of two equal operands the second is
+  returned.
+* ``SIGN`` is -1, 1, or the operand itself if it is a zero or a NaN.
+* A comparison is 1.0 or 0.0. With a NaN all comparisons are 0.0, except ``NE``. A condition is true if it is
+  not equal to zero, so a NaN is true. * ``SELECT c a b`` is ``a`` if ``c`` is true, else ``b``. The other
+  value has no influence, even if it is NaN.
 * ``MODULO`` is C's ``fmod`` (sign of the dividend, exact); ``REMAINDER`` is IEEE's (nearest quotient, ties to
   even, exact).
 * ``READ x n i`` is entry ``i``, cut to an integer and held in 0 … n - 1 (0 for a NaN), of the ``n`` scalars
@@ -89,12 +90,12 @@ class Opcode(IntEnum):
 
 
 VECTORS = frozenset({Opcode.SOLVE, Opcode.PRODUCT})
-"""Operations of any count of operands whose value is several numbers."""
+"""Operations with any number of operands and several results."""
 
 COMMUTATIVE = frozenset(
     {Opcode.ADD, Opcode.MULTIPLY, Opcode.EQUAL, Opcode.NOT_EQUAL, Opcode.AND, Opcode.OR, Opcode.HYPOT}
 )
-"""Operations whose two operands may change places without changing a bit of a result that is a number."""
+"""Operations whose operands may be exchanged: results that are not NaN stay bitwise the same."""
 
 COMPARISONS = frozenset(
     {Opcode.LESS, Opcode.LESS_EQUAL, Opcode.EQUAL, Opcode.NOT_EQUAL, Opcode.NOT, Opcode.AND, Opcode.OR}
@@ -105,7 +106,7 @@ ELEMENTARY = frozenset(opcode for opcode in Opcode if Opcode.SIN <= opcode <= Op
     Opcode.MODULO,
     Opcode.REMAINDER,
 }
-"""Operations that are worked out by a function of :mod:`armblocks.compiler.elementary`."""
+"""Operations that a function of :mod:`armblocks.compiler.elementary` computes."""
 
 
 def solution_length(operands: int) -> int:

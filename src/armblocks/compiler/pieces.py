@@ -1,9 +1,9 @@
 """Long tapes cut into pieces, each a function of its own.
 
-The work of LLVM grows faster than linearly with the length of a function, mainly because of loads and stores,
-which LLVM compares pairwise: ten thousand operations in one function take minutes, in pieces they take
-seconds. Values that cross pieces are passed through memory, which costs time if many are reused, as in an
-arm's dynamics, and little in a chain of blocks. Reads and writes therefore have a higher weight than
+LLVM's compile time grows faster than linearly with the length of a function, mainly because it compares loads
+and stores pairwise. Ten thousand operations take minutes in one function and seconds in pieces. Values that
+cross pieces are passed through memory. This is slow if many values are reused, as in the dynamics of an arm,
+and fast in a chain of blocks. In the length of a piece, reads and writes therefore have a higher weight than
 arithmetic. The operations and their order are unchanged, and so are the results.
 """
 
@@ -19,16 +19,16 @@ from armblocks.compiler.tape_operations import Inputs, Registers, emit_operation
 from armblocks.compiler.work_space import WorkSpace
 
 LONGEST = 2600
-"""Weight of a function that is left in one piece."""
+"""Maximum weight of a function that is not divided."""
 LENGTH = 600
-"""Weight of a piece, about."""
+"""Approximate weight of a piece."""
 ACCESS_WEIGHT, FUNCTION_WEIGHT = 4, 8
 """Weights of a read or write, and of an elementary function, in operations."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Piece:
-    """Operations ``first`` to ``last - 1``, and the names of the stores that can be done after them."""
+    """Operations ``first`` to ``last - 1``, and the numbers of the store groups that follow them."""
 
     first: int
     last: int
@@ -45,7 +45,7 @@ class Cut:
 
 
 def is_long(tape: Tape) -> bool:
-    """Whether a tape should be cut."""
+    """Whether a tape should be divided into pieces."""
     # A vector's operands are copied in blocks, not read one by one.
     read = {r for opcode, operands in tape.operations if opcode not in VECTORS for r in operands}
     accesses = sum(register < tape.first_constant for register in read) + sum(tape.output_sizes)
@@ -53,11 +53,11 @@ def is_long(tape: Tape) -> bool:
 
 
 Stores = Mapping[int, Sequence[int]]
-"""The registers of each group of outputs that is stored together, under some number."""
+"""Groups of outputs that are stored together: the registers of each group, by its number."""
 
 
 def cut(tape: Tape, stores: Stores) -> Cut:
-    """Cut a tape."""
+    """Divide a tape into pieces."""
     first = tape.first_operation
     ready: dict[int, list[int]] = {}
     for number, registers in stores.items():
@@ -80,7 +80,7 @@ def cut(tape: Tape, stores: Stores) -> Cut:
             pieces.append(Piece(first=begin, last=k + 1, stores=tuple(waiting)))
             begin, weight, waiting = k + 1, 0, []
             read.clear()
-    waiting += [number for numbers in ready.values() for number in numbers]  # of inputs and constants alone
+    waiting += [number for numbers in ready.values() for number in numbers]  # only inputs and constants
     end, most = len(tape.operations), LENGTH // ACCESS_WEIGHT
     for start in range(0, max(1, len(waiting)), most):
         pieces.append(Piece(first=begin, last=end, stores=tuple(waiting[start : start + most])))
@@ -131,9 +131,10 @@ def emit_pieces(
 ) -> str | None:
     """Add the functions of a tape's pieces, and to ``caller`` the calls of all of them.
 
-    ``arguments`` are the types and names of what ``caller`` gets and passes on; ``inputs_of(body)`` gives how
-    a body reads the inputs, ``storing(body, registers, k)`` writes group ``k`` of ``stores``. The result says
-    in which lanes a function was undecided, as bits; ``None``: always decided.
+    ``arguments`` are the types and names of the arguments that ``caller`` passes on. ``inputs_of(body)``
+    returns the way in which a body reads the inputs, ``storing(body, registers, k)`` stores group ``k`` of
+    ``stores``. The result has a bit for each lane that must be evaluated with one lane; ``None``: there is
+    none.
     """
     module, lanes = caller.module, caller.lanes
     done = cut(tape, stores)

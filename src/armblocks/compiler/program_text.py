@@ -8,6 +8,6 @@ from armblocks.routines.routine import Program
 
 
 def add_program(module: Module, program: Program) -> None:
-    """Add all functions and tables of a program. The functions that it only names are the module's own."""
+    """Add all functions and tables of a program. External functions must be defined in the module."""
     for symbol, text in definitions(program).items():
         module.add(symbol, text)

@@ -1,6 +1,6 @@
 """Functions of CPython and NumPy that the builtin of a kernel calls.
 
-The process gives the address of each under its name in :data:`~armblocks.compiler.entry.PLACES`. Objects are
+Each process sets their addresses by the names in :data:`~armblocks.compiler.entry.PLACES`. Python objects are
 addresses.
 """
 
@@ -33,19 +33,19 @@ def new_array(
     flags: Int32,
     base: Address,
 ) -> Address:
-    """``PyArray_NewFromDescr``; it takes over a reference to ``descr``. Null with an error set."""
+    """``PyArray_NewFromDescr``; it takes over a reference to ``descr``. Null if a Python error is set."""
     raise NotImplementedError
 
 
 @external
 def new_scalar(r: Routine, data: Address, descr: Address, base: Address) -> Address:
-    """``PyArray_Scalar``: the NumPy number at an address. Null with an error set."""
+    """``PyArray_Scalar``: the NumPy number at an address. Null if a Python error is set."""
     raise NotImplementedError
 
 
 @external
 def new_tuple(r: Routine, length: Integer) -> Address:
-    """``PyTuple_New``. Null with an error set."""
+    """``PyTuple_New``. Null if a Python error is set."""
     raise NotImplementedError
 
 
@@ -63,22 +63,22 @@ def tuple_size(r: Routine, items: Address) -> Integer:
 
 @external
 def tuple_item(r: Routine, items: Address, index: Integer) -> Address:
-    """``PyTuple_GetItem``, without a reference of its own."""
+    """``PyTuple_GetItem``: a borrowed reference."""
     raise NotImplementedError
 
 
 @external
 def vectorcall(r: Routine, function: Address, values: Addresses, count: Integer, names: Address) -> Address:
-    """``PyObject_Vectorcall``. Null with an error set."""
+    """``PyObject_Vectorcall``. Null if a Python error is set."""
     raise NotImplementedError
 
 
 @external
 def save_thread(r: Routine) -> Address:
-    """``PyEval_SaveThread``: let other threads of Python run."""
+    """``PyEval_SaveThread``: release the interpreter lock."""
     raise NotImplementedError
 
 
 @external
 def restore_thread(r: Routine, state: Address) -> None:
-    """``PyEval_RestoreThread``: go on in the interpreter."""
+    """``PyEval_RestoreThread``: acquire the interpreter lock again."""

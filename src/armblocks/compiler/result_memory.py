@@ -1,9 +1,9 @@
 """Reuse of the memory of large results that no array refers to any more.
 
-The C library takes memory for a large array from the system and gives it back with the array. The system
-clears each page when it is first written, which costs more than most kernels: 58 MB take 4.7 ms beside 3.9 ms
-of evaluation (puma560 ``jacob0``, 200 000 samples, AMD EPYC, pages of 2 MB). The C library keeps memory up to
-32 MB for itself at times, never more. Reused pages need no clearing.
+The C library takes the memory of a large array from the system and returns it with the array. The system
+clears each page at its first write, which takes longer than most kernels: 58 MB take 4.7 ms, the evaluation
+3.9 ms (puma560 ``jacob0``, 200 000 samples, AMD EPYC, pages of 2 MB). The C library itself reuses at most 32
+MB. Reused pages need no clearing.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from armblocks.equations import Shape
 Array = NDArray[np.float64]
 
 LARGE = 1 << 19
-"""Number of doubles (4 MiB) from which on memory is reused. The C library itself keeps smaller blocks."""
+"""Minimum number of doubles (4 MiB) of memory that is reused. The C library reuses smaller blocks itself."""
 MOST_IDLE = 128 * 1024 * 1024
 """Maximum number of bytes that a process keeps for later results."""
 
@@ -67,16 +67,16 @@ class ResultMemory:
         return np.asarray(_Lease(self, self._take(math.prod(shape)), shape))
 
     def give_back(self, memory: Array) -> None:
-        """Keep memory that no array refers to any more, and free the oldest where that is too much."""
+        """Keep memory that no array refers to any more; free the oldest blocks above the limit."""
         self._idle.append(memory)
         while self.idle > self._limit:
             try:
                 self._idle.popleft()
-            except IndexError:  # another thread was faster
+            except IndexError:  # another thread has taken the block
                 break
 
     def clear(self) -> None:
-        """Free all that no array refers to."""
+        """Free all memory that no array refers to."""
         self._idle.clear()
 
     def _take(self, count: int) -> Array:
@@ -87,8 +87,8 @@ class ResultMemory:
                 break
             if count <= memory.size <= 2 * count:
                 return memory
-            self._idle.appendleft(memory)  # too small: freed first
-        return np.empty(count + count // 8)  # more, for a result that is a little longer the next time
+            self._idle.appendleft(memory)  # too small: this block is freed first
+        return np.empty(count + count // 8)  # some extra, for a slightly larger next result
 
 
 class _Lease:

@@ -1,9 +1,9 @@
 """A function as a flat scalar program: inputs, constants, operations, outputs. Independent of CasADi and
 LLVM.
 
-Every value has a register, and a register is written once. Registers are numbered through: first the inputs
-(slot after slot), then the constants, then one for each operation in order, so that operation ``k`` writes
-register ``size of inputs + count of constants + k``.
+Every value has a register, and a register is written once. Registers are numbered consecutively: first the
+inputs (slot after slot), then the constants, then one for each operation. Operation ``k`` therefore writes
+register ``size of inputs + number of constants + k``.
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ class Tape:
     @cached_property
     def digest(self) -> str:
         """SHA-256 of the program, hexadecimal: the same on every machine."""
-        import hashlib  # loads OpenSSL, which is slow; importing armblocks does without
+        import hashlib  # loads OpenSSL, which would slow down importing armblocks
 
         return hashlib.sha256(self.to_bytes()).hexdigest()
 

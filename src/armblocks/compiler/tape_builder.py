@@ -1,8 +1,8 @@
 """Builds tapes: folds constants, finds common subexpressions, fuses multiply-adds, drops dead code.
 
 Only rewritings with identical results for every input (except the sign of a NaN) are applied, with one
-exception that is decided here for all machines: ``a b + c`` becomes one fused multiply-add where the product
-has no other use and is not one that the traced function rounds.
+exception: ``a b + c`` becomes a fused multiply-add if the product has no other use and the traced function
+does not require it to be rounded. This rule is the same on all machines.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class TapeBuilder:
         return handle
 
     def add(self, opcode: Opcode, *operands: int) -> int:
-        """``opcode`` of the operands, simplified where that changes no bit."""
+        """``opcode`` of the operands, simplified if the result stays bitwise the same."""
         nodes = self._nodes
         values = [node for operand in operands if isinstance(node := nodes[operand], float)]
         if len(values) == len(operands) and opcode not in _NOT_FOLDED:
@@ -72,7 +72,7 @@ class TapeBuilder:
         return self._number((opcode, operands), (opcode, operands))
 
     def operands_of(self, handle: int, opcode: Opcode) -> tuple[int, ...] | None:
-        """The operands of a value, if ``opcode`` gives it."""
+        """The operands of a value, if ``opcode`` computes it."""
         node = self._nodes[handle]
         return node[1] if isinstance(node, tuple) and node[0] is opcode else None
 
@@ -164,7 +164,7 @@ class TapeBuilder:
         return None
 
     def build(self, outputs: Sequence[Sequence[int]], rounded: Sequence[int] = ()) -> Tape:
-        """The tape that gives these handles, one sequence per output slot.
+        """The tape with these handles as outputs, one sequence per output slot.
 
         ``rounded``: products that are not fused with a sum.
         """
@@ -189,7 +189,8 @@ class TapeBuilder:
         )
 
     def _fuse(self, outputs: Sequence[Sequence[int]], rounded: frozenset[int]) -> list[_Node | float | None]:
-        """Join each product of a single use with the sum that uses it, but for those that are rounded."""
+        """Fuse each product that is used once with the sum that uses it, except products that must be
+        rounded."""
         nodes = list(self._nodes)
         wanted = [handle for slot in outputs for handle in slot]
         uses = [0] * len(nodes)
@@ -210,7 +211,7 @@ class TapeBuilder:
             if not isinstance(node, tuple) or node[0] not in (Opcode.ADD, Opcode.SUBTRACT):
                 continue
             a, b = node[1]
-            # Of two products the later one is fused: the earlier is ready sooner.
+            # Of two products the later one is fused, because the earlier one is available sooner.
             left, right = product(a), product(b)
             if left and right:
                 left, right = (left, None) if a > b else (None, right)
@@ -224,7 +225,7 @@ class TapeBuilder:
 
 
 def _reachable(nodes: Sequence[_Node | float | None], wanted: Sequence[int]) -> list[int]:
-    """Handles that the wanted ones need, in order, without the inputs."""
+    """Handles on which ``wanted`` depends, in order, without the inputs."""
     used = bytearray(len(nodes))
     for handle in wanted:
         used[handle] = 1

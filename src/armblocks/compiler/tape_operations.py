@@ -1,4 +1,4 @@
-"""The operations of a tape as LLVM IR: what stands in every body, of one lane or many, whole or in pieces."""
+"""The operations of a tape as LLVM IR, for function bodies with one lane or many, whole or in pieces."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from armblocks.compiler.opcodes import COMPARISONS, Opcode
 from armblocks.compiler.tape import Tape
 
 LoadInput = Callable[[int], str]
-"""Gives the value of a register that is not written here, in all lanes."""
+"""Returns the value, in all lanes, of a register that the body does not write."""
 InputLine = Callable[[int], Line]
-"""Gives where an input register and those behind it lie."""
+"""Returns the memory positions of an input register and the registers that follow it."""
 
 
 @dataclass(frozen=True)
 class Inputs:
-    """How a body reads what it does not work out itself."""
+    """Access of a body to the registers that it does not compute."""
 
     load: LoadInput
     line: InputLine
 
 
 class Registers:
-    """The values of a tape's registers, as numbers or as conditions, whichever is asked for."""
+    """The values of a tape's registers, as numbers or as conditions."""
 
     def __init__(self, body: Body, tape: Tape, load: LoadInput) -> None:
         self._body = body
@@ -36,7 +36,7 @@ class Registers:
         self._numbers: dict[int, str] = {}
         self._conditions: dict[int, str] = {}
         self.vectors: dict[int, list[str]] = {}
-        """The numbers of the registers that hold several."""
+        """The numbers of the registers with several numbers."""
 
     def set_number(self, register: int, value: str) -> None:
         """Write a register with a number."""
@@ -47,7 +47,7 @@ class Registers:
         self._conditions[register] = value
 
     def has_number(self, register: int) -> bool:
-        """Whether the register is written already."""
+        """Whether the register has been written."""
         return register in self._numbers
 
     def number(self, register: int) -> str:
@@ -66,7 +66,7 @@ class Registers:
         return body.number(tape.constants[register - tape.first_constant])
 
     def condition(self, register: int) -> str:
-        """Whether the register is not equal to zero (a NaN is not)."""
+        """Whether the register is not equal to zero; true for a NaN."""
         value = self._conditions.get(register)
         if value is None:
             body = self._body
@@ -82,12 +82,12 @@ def emit_operations(
     written: Callable[[int, Registers], None] | None = None,
     some: range | None = None,
 ) -> Registers:
-    """Emit all operations of the tape into ``body``; gives the registers, from which outputs are read.
+    """Emit all operations of the tape into ``body``; return the registers, from which outputs are read.
 
-    ``written(register, registers)`` is called after each operation. With ``some`` of the operations alone,
-    ``inputs.load`` also gives the registers that others have written.
+    ``written(register, registers)`` is called after each operation. If only ``some`` of the operations are
+    emitted, ``inputs.load`` also returns registers that other pieces have written.
     """
-    from armblocks.compiler import elementary  # not needed where code comes from the disk cache
+    from armblocks.compiler import elementary  # not needed if the code comes from the disk cache
 
     registers = Registers(body, tape, inputs.load)
     partners = tape.sine_cosine_pairs

@@ -1,4 +1,4 @@
-"""The processor that code is made for: its name, its features, how many lanes its registers hold."""
+"""The processor that code is compiled for: its name, its features, the number of lanes of its registers."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ class Target:
 
     @property
     def key(self) -> str:
-        """Identifies the target: code made for one key runs wherever the key is the same."""
+        """Identifies the target: code compiled for one key runs on all machines with the same key."""
         return "|".join((self.triple, self.cpu, self.features, str(self.lanes), self.llvm_version))
 
     def machine(self, *, jit: bool = True, opt: int = 2) -> llvm.TargetMachine:
-        """A new LLVM target machine; ``opt``: how much work goes into the code, 0 to 2."""
+        """A new LLVM target machine; ``opt`` is LLVM's optimisation level, 0 to 2."""
         from llvmlite import binding as llvm
 
         return llvm.Target.from_triple(self.triple).create_target_machine(

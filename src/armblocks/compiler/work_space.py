@@ -13,7 +13,7 @@ MOST_ON_STACK = 128 * 1024
 
 
 class WorkSpace:
-    """Rows of one double for each lane of a body, aligned to the size of a row; they hold nothing yet.
+    """Rows of one double for each lane of a body, aligned to the size of a row; not initialised.
 
     It must be freed in the same body. ``address`` is that of the first row.
     """
@@ -23,7 +23,7 @@ class WorkSpace:
         self._align = 8 * body.lanes
         size = self._align * max(1, rows)
         self._on_stack = size <= MOST_ON_STACK
-        # What gives the memory back: the top of the stack, or the address from the C library.
+        # The value that releases the memory: the top of the stack, or the address from the C library.
         self._mark, self.address = self._from_stack(size) if self._on_stack else self._from_heap(size)
 
     def row(self, index: int) -> str:
@@ -56,6 +56,6 @@ class WorkSpace:
         body.module.declare("ptr", "malloc", "i64")
         body.module.declare("ptr", "llvm.ptrmask.p0.i64", "ptr", "i64")
         memory = body.let(f"call ptr @malloc(i64 {size + self._align - 8})")
-        # The C library aligns to 8 bytes at least.
+        # The C library aligns to at least 8 bytes.
         behind = body.let(f"getelementptr inbounds i8, ptr {memory}, i64 {self._align - 8}")
         return memory, body.let(f"call ptr @llvm.ptrmask.p0.i64(ptr {behind}, i64 {-self._align})")

@@ -52,12 +52,12 @@ def select(
 
 
 def minimum(a: Real, b: Real | float) -> Real:
-    """The smaller one; ``b`` where either is NaN."""
+    """The smaller value; ``b`` if either is NaN."""
     return select(a < b, a, b)
 
 
 def maximum(a: Real, b: Real | float) -> Real:
-    """The larger one; ``b`` where either is NaN."""
+    """The larger value; ``b`` if either is NaN."""
     return select(a > b, a, b)
 
 
@@ -67,7 +67,7 @@ def sign(a: Real) -> Real:
 
 
 def polynomial(x: Real, coefficients: Sequence[float]) -> Real | float:
-    """Horner's rule; coefficients from the constant term upwards. One alone is the result itself."""
+    """Horner's rule; coefficients from the constant term upwards. A single coefficient is the result."""
     result: Real | float = coefficients[-1]
     for coefficient in reversed(coefficients[:-1]):
         result = fma(result, x, coefficient)
@@ -75,11 +75,11 @@ def polynomial(x: Real, coefficients: Sequence[float]) -> Real | float:
 
 
 def inverse_root(a: Real, k: int) -> Real:
-    """``a^(-1/k)`` for ``a`` in 1e-300 … 1e300, to the last place or so.
+    """``a^(-1/k)`` for ``a`` in 1e-300 … 1e300, with an error of about one unit in the last place.
 
-    A first guess from the divided bits, its excess centred by 0.064, then twice ``y (1 - r)^(-1/k)`` with
-    ``r = 1 - a y^k`` (below 0.25, then 1e-3), as its Taylor polynomial of degree 4. All operations are
-    exactly rounded: no library's ``pow`` decides a step.
+    The first guess divides the bits of ``a`` by k; the offset 0.064 balances its error. Two corrections ``y
+    (1 - r)^(-1/k)`` follow, as Taylor polynomials of degree 4 in ``r = 1 - a y^k`` (below 0.25, then 1e-3).
+    All operations are exactly rounded, so step lengths do not depend on the ``pow`` of a C library.
     """
     one = 1023 << 52
     offset = one + one // k - int(0.064 * (1 << 52))

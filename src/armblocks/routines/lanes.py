@@ -1,7 +1,7 @@
 """Values in lanes: the same operation on several doubles at a time, in one vector register.
 
-The number of lanes is that of the program; with one lane they are single doubles. Integers, conditions and so
-the control flow are common to all lanes. A :class:`Mask` selects values per lane.
+The number of lanes is that of the program; with one lane they are single doubles. Integers, conditions and
+therefore the control flow are common to all lanes. A :class:`Mask` selects values per lane.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 A temporary is a name that is assigned once; a local variable is a stack slot, which LLVM turns into a
 register. Parts of the tree become basic blocks in the order in which they were written. No fast-math flag is
-ever set and ``fma`` stands only where it was asked for, so the same operations give the same bits everywhere.
+set, and ``fma`` is emitted only on request, so the same operations give the same bits on every processor.
 """
 
 from __future__ import annotations
@@ -150,7 +150,7 @@ class _FunctionText:
         self._results: tuple[Kind, ...] = ()
         self._count = 0
         self._ended = False
-        """Whether nothing follows the last line: a branch or a return."""
+        """Whether the last line ends a basic block: a branch or a return."""
 
     def text(self, function: Function) -> str:
         """The whole definition."""
@@ -199,7 +199,7 @@ class _FunctionText:
         if isinstance(operand, Table):
             return f"@{operand.symbol}"
         name = self._names.get(operand)
-        if name is None:  # the first use of a variable; a temporary is named where it is computed
+        if name is None:  # the first use of a variable; a temporary gets its name where it is computed
             assert isinstance(operand, Local), "a value is used where it is not valid"
             name = self._names[operand] = f"%x{len(self._slots) + 1}"
             kind = self._type(operand.kind)
@@ -208,12 +208,12 @@ class _FunctionText:
         return name
 
     def _new(self, temporary: Temporary, text: str) -> str:
-        """Append the line that computes a temporary; gives its name."""
+        """Append the line that computes a temporary; return its name."""
         name = self._names[temporary] = self._name(text)
         return name
 
     def _name(self, text: str) -> str:
-        """Append a line that computes something; gives its name."""
+        """Append a line that computes a value; return its name."""
         self._count += 1
         self._lines.append(f"  %v{self._count} = {text}")
         return f"%v{self._count}"
@@ -231,7 +231,7 @@ class _FunctionText:
     # Blocks.
 
     def _place(self, label: str) -> None:
-        """Begin a basic block; the block before goes on into it, unless it has ended."""
+        """Begin a basic block; the previous block branches to it, unless that block has ended."""
         if not self._ended:
             self._lines.append(f"  br label %{label}")
         self._lines.append(f"{label}:")
@@ -243,7 +243,7 @@ class _FunctionText:
 
     def _part(self, statements: Sequence[Statement]) -> None:
         for statement, following in zip(statements, [*statements[1:], None]):
-            if not self._ended or isinstance(statement, Stage):  # what nothing leads to is left out
+            if not self._ended or isinstance(statement, Stage):  # unreachable statements are omitted
                 self._statement(statement, following)
 
     def _statement(self, statement: Statement, following: Statement | None) -> None:
@@ -280,7 +280,8 @@ class _FunctionText:
             self._place(self._label(region.end))
 
     def _when(self, when: When, following: Statement | None) -> None:
-        """Where a part, or what follows, only jumps, the branch goes there at once."""
+        """A conditional branch. If a part, or the statement after it, is only a jump, the branch goes to its
+        target."""
         condition = self._operand(when.condition)
         if when.rarely:
             self._declare("i1", "llvm.expect.i1", "i1", "i1")
@@ -394,8 +395,8 @@ class _FunctionText:
         call = self._intrinsic("fma", kind, *operands)
         if self._type(kind) != "double":
             return call
-        # For -(a b + c) LLVM selects FNMADD of ARM64, which is (-a) b + (-c): where the sum is exactly
-        # zero that gives +0 instead of -0. The fence keeps the two operations apart; vectors have no such
+        # For -(a b + c) LLVM selects ARM64's FNMADD, which computes (-a) b + (-c). If the sum is exactly zero
+        # that gives +0 instead of -0. The barrier keeps the two operations apart. Vectors have no such
         # instruction.
         return self._intrinsic("arithmetic.fence", kind, self._name(call))
 

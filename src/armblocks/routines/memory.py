@@ -181,7 +181,8 @@ class Addresses(Array):
 
 
 class Variable:
-    """A variable of a routine, read and written as ``value``. A back end keeps it in a register if it can."""
+    """A variable of a routine, read and written as ``value``. The back end keeps it in a register if
+    possible."""
 
     __slots__ = ("local", "writer")
 

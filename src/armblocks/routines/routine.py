@@ -14,7 +14,7 @@ into; the annotations of the others are its signature::
 
 Python runs the function once, and its operations on values are recorded: a Python ``if`` selects the recorded
 code, ``with r.when(condition):`` is a branch of the routine. A value is valid where the statement that
-computes it has been run on every path; one that differs between paths is kept in a variable.
+computes it has run on every path. A value that differs between paths must be kept in a variable.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def external(write: Callable[Concatenate[Routine, P], R], symbol: str = "") -> F
 
 
 class Program:
-    """Functions and tables in the order in which they were first named. ``lanes`` is a power of two."""
+    """Functions and tables in the order of their first use. ``lanes`` is a power of two."""
 
     def __init__(self, lanes: int = 1) -> None:
         self.lanes = lanes
@@ -106,10 +106,10 @@ class Program:
     ) -> Function[P, R]:
         """The function that ``write`` records, with its name unless a ``symbol`` is given.
 
-        ``public``: it is called from outside the program. ``inlined``: whether it is written into its
-        callers; ``None`` leaves that to the back end. ``distinct``: arrays that are passed to it do not
-        overlap. ``rest`` names the parameters that Python's ``*`` stands for, all of one type. Where the
-        symbol is defined already, that definition stays.
+        ``public``: the function is called from outside the program. ``inlined``: whether it is inlined into
+        its callers; ``None`` leaves that to the back end. ``distinct``: arrays that are passed to it do not
+        overlap. ``rest`` names the parameters that Python's ``*`` stands for, all of one type. If the symbol
+        is already defined, the existing definition stays.
         """
         symbol = symbol or write.__name__
         if symbol not in self.parts:
@@ -143,7 +143,7 @@ class Program:
         return self._table(Table(symbol, tuple(numbers), Kind.REAL))
 
     def filled_in(self, symbol: str, count: int) -> Table:
-        """A table of addresses, null until whoever loads the program writes them there."""
+        """A table of addresses. They are null until the code that loads the program sets them."""
         return self._table(Table(symbol, (None,) * count, Kind.ADDRESS, filled_in=True))
 
     def _table(self, table: Table) -> Table:
@@ -199,27 +199,27 @@ class Routine(Writer):
     # Variables and constants.
 
     def real(self, initial: Real | float) -> RealVariable:
-        """A variable double. It gets its initial value here, at every passage."""
+        """A double variable. Its initial value is assigned each time this position is reached."""
         return RealVariable(Real(self, real_operand(initial)))
 
     def variable(self, initial: NumberT) -> NumberVariable[NumberT]:
-        """A variable double, or one in each lane, as its initial value is, which it gets at every passage."""
+        """A variable of the type of ``initial``, which is assigned each time this position is reached."""
         return NumberVariable(initial)
 
     def integer(self, initial: Integer | int) -> IntegerVariable:
-        """A variable integer. It gets its initial value here, at every passage."""
+        """An integer variable. Its initial value is assigned each time this position is reached."""
         variable = IntegerVariable(self, Local(Kind.INTEGER))
         variable.value = initial
         return variable
 
     def boolean(self, initial: Boolean | bool) -> BooleanVariable:
-        """A variable condition. It gets its initial value here, at every passage."""
+        """A Boolean variable. Its initial value is assigned each time this position is reached."""
         variable = BooleanVariable(self, Local(Kind.BOOLEAN))
         variable.value = initial
         return variable
 
     def address(self, initial: Address) -> AddressVariable:
-        """A variable address. It gets its initial value here, at every passage."""
+        """An address variable. Its initial value is assigned each time this position is reached."""
         variable = AddressVariable(self, Local(Kind.ADDRESS))
         variable.value = initial
         return variable
@@ -229,15 +229,15 @@ class Routine(Writer):
         return Integers(self, Local(Kind.INTEGER, count))
 
     def constant(self, value: float) -> Real:
-        """A constant double, for where a Python number does not do."""
+        """A constant double, for places that do not accept a Python number."""
         return Real(self, real_operand(value))
 
     def constant_integer(self, value: int) -> Integer:
-        """A constant integer, for where a Python number does not do."""
+        """A constant integer, for places that do not accept a Python number."""
         return Integer(self, integer_operand(value))
 
     def constant_boolean(self, value: bool) -> Boolean:
-        """A condition that always holds, or never."""
+        """A constant condition."""
         return Boolean(self, boolean_operand(value))
 
     def reals(self, symbol: str, numbers: Sequence[float]) -> Reals:
@@ -254,7 +254,7 @@ class Routine(Writer):
 
     @property
     def null(self) -> Address:
-        """The address that points nowhere."""
+        """The null address."""
         return Address(self, Constant(Kind.ADDRESS, None))
 
     @property
@@ -282,7 +282,7 @@ class Routine(Writer):
 
     @contextmanager
     def otherwise(self) -> Generator[None]:
-        """The other part of the :meth:`when` that ends right before."""
+        """The block that runs if the condition of the :meth:`when` directly before it fails."""
         statement = self.statements[-1] if self.statements else None
         if not isinstance(statement, tree.When) or statement.no:
             raise SyntaxError("'otherwise' has no 'when' directly before it. Fix: put it after one.")
@@ -325,7 +325,7 @@ class Routine(Writer):
     def range(self, start: Integer | int, stop: Integer | int, step: int = 1) -> Generator[Integer]:
         """``for i in r.range(a, b)``: run the block for ``i = a … b-1``, as a loop.
 
-        With a ``step`` above 1 for ``i = a, a + step …`` below ``b``.
+        With a ``step`` above 1, ``i = a, a + step …`` below ``b``.
         """
         index = self.integer(start)
         with self.loop() as turn:
@@ -339,13 +339,13 @@ class Routine(Writer):
         return Stages(self, names)
 
     def return_(self, *values: Value) -> None:
-        """Leave the function with its results; at its end Python's ``return`` does."""
+        """Return results before the end of the function. At the end, use Python's ``return``."""
         self.statements.append(tree.Return(tuple(value.operand for value in values)))
 
     # Calls.
 
     def call(self, function: Function[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
-        """Call a function; gives its result, or a tuple of them."""
+        """Call a function; return its result, or a tuple of its results."""
         values = args
         if kwargs:
             bound = inspect.signature(function.write).bind(self, *args, **kwargs)
@@ -421,7 +421,7 @@ class Stages:
 
 
 def _parameters(write: Callable[..., object]) -> dict[str, type[Value]]:
-    # The routine comes first and the result last.
+    # The first annotation is the routine, the last one the result.
     hints = list(write.__annotations__.items())[1:-1]
     return {name: _value_type(hint) for name, hint in hints}
 
@@ -438,5 +438,5 @@ def _results(write: Callable[..., object]) -> tuple[type[Value], ...]:
 
 
 def _value_type(annotation: type[Value] | str) -> type[Value]:
-    """The type that an annotation names; ``typing.get_type_hints`` takes longer than the routine itself."""
+    """The type that an annotation names. ``typing.get_type_hints`` would take longer than recording."""
     return _BY_NAME[annotation] if isinstance(annotation, str) else annotation

@@ -2,7 +2,7 @@
 
 A function is a tree of statements: operations in their order, conditional parts, and regions that may be left
 or repeated. :class:`~armblocks.routines.Routine` builds the tree; a back end such as
-:mod:`armblocks.routines.llvm` turns it into text. A value that differs between two paths lives in a
+:mod:`armblocks.routines.llvm` turns it into text. A value that differs between two paths is stored in a
 :class:`Local`, so the tree needs no phi nodes.
 """
 
@@ -44,7 +44,7 @@ class Operation(Enum):
     SHIFT_LEFT = "shift left"
     """Of integers, by 0 to 63 places."""
     SHIFT_RIGHT = "shift right"
-    """Likewise, with the sign."""
+    """Shift to the right of integers, by 0 to 63 places, keeping the sign."""
     NEGATE = "negate"
     ABSOLUTE = "absolute"
     SQUARE_ROOT = "square root"
@@ -54,7 +54,7 @@ class Operation(Enum):
     LESS_EQUAL = "less or equal"
     EQUAL = "equal"
     NOT_EQUAL = "not equal"
-    """Reals: true also where either is NaN, unlike every other comparison."""
+    """For reals: also true if either is NaN, unlike every other comparison."""
     GREATER = "greater"
     GREATER_EQUAL = "greater or equal"
     ORDERED = "ordered"

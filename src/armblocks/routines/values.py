@@ -32,7 +32,7 @@ class Writer:
         self.statements: list[Statement] = []
 
     def compute(self, kind: Kind, operation: Operation, *operands: Operand) -> Temporary:
-        """Append an operation; gives its result."""
+        """Append an operation; return its result."""
         result = Temporary(kind)
         self.statements.append(Compute(result, operation, operands))
         return result
@@ -213,7 +213,7 @@ class Real(Number[Boolean]):
         return Integer(self.writer, self.writer.compute(Kind.INTEGER, Operation.TO_INTEGER, self.operand))
 
     def bits(self) -> Integer:
-        """The bits as an integer: one more is the next double, away from zero."""
+        """The bits as an integer. Adding 1 gives the bits of the next double, away from zero."""
         return Integer(self.writer, self.writer.compute(Kind.INTEGER, Operation.BITS, self.operand))
 
 
@@ -307,7 +307,7 @@ class Integer(Value):
 
 
 class Int32(Value):
-    """A 32-bit signed integer, as functions written in C take and give it."""
+    """A 32-bit signed integer, the ``int`` of C functions."""
 
     __slots__ = ()
     kind = Kind.INT32

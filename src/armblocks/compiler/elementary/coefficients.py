@@ -1,9 +1,9 @@
 """Constants of the elementary functions.
 
-The polynomials interpolate at Chebyshev nodes in 60-digit arithmetic and are rounded to doubles; over its
-interval each is off by less than a fifth of a unit in the last place of the function's result, measured
-where that matters. Constants in several parts are unevaluated sums: the first is the double nearest to the
-number, the next the double nearest to what is left.
+The polynomials interpolate at Chebyshev nodes in 60-digit arithmetic, and their coefficients are rounded to
+doubles. The error of each over its interval is below a fifth of a unit in the last place of the function's
+result. Constants in several parts are unevaluated sums: the first part is the double nearest to the number,
+the next part the double nearest to the remainder.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ THIRD = (0.3333333333333333, 1.850371707708594e-17)
 TAN_PI_8 = 0.41421356237309503
 
 ROUNDER = 6755399441055744.0
-"""1.5 * 2**52: adding it rounds a number below 2**51 to an integer, whose bits then stand lowest."""
+"""1.5 * 2**52: adding it rounds a number below 2**51 to an integer, which the lowest bits then contain."""
 
 SINE = (
     -0.16666666666666666,

@@ -1,8 +1,8 @@
 """Exponentials and hyperbolic functions.
 
-``x = k ln 2 + r`` with ``|r| <= ln(2)/2`` in two parts; ``exp r - 1`` comes as an unevaluated pair, so that
-what is small stays exact to its own last place; the power of two is applied in two halves, which meets
-overflow and subnormal results without a case of its own.
+``x = k ln 2 + r`` with ``|r| <= ln(2)/2`` in two parts. ``exp r - 1`` is computed as an unevaluated pair, so
+that small results are exact to their last place. The power of two is applied in two halves, so overflow and
+subnormal results need no separate case.
 """
 
 from __future__ import annotations
@@ -42,15 +42,15 @@ def exponential_minus_one(body: Body, x: str) -> str:
     near = body.add(high, low)
     one, rest = body.fast_two_sum(body.number(1.0), power.high)
     far = _scaled(body, power, body.add(one, body.add(rest, power.low)))
-    # From 2**60 on the 1 does not show, and the pair may overflow early.
+    # From 2**60 on subtracting 1 changes nothing, and the pair may overflow early.
     result = body.select(body.compare("ogt", x, body.number(42.0)), far, near)
-    # Arguments that are their own result keep the sign of zero and every subnormal bit.
+    # Tiny arguments are their own result, with the sign of zero and every subnormal bit.
     tiny = body.compare("olt", body.absolute(x), body.number(2.0**-54))
     return body.select(tiny, x, result)
 
 
 def hyperbolic_sine(body: Body, x: str) -> str:
-    """``sinh x = (m + m / (m + 1)) / 2`` with ``m = exp |x| - 1``; by halves of exp where that overflows."""
+    """``sinh x = (m + m / (m + 1)) / 2`` with ``m = exp |x| - 1``; from ``exp(x) / 2`` where m overflows."""
     magnitude = body.absolute(x)
     high, low, _ = _minus_one(body, _limited(body, magnitude))
     over, over_rest = body.two_sum(high, body.number(1.0))
@@ -88,7 +88,7 @@ def hyperbolic_cosine(body: Body, x: str) -> str:
 def hyperbolic_tangent(body: Body, x: str) -> str:
     """``tanh x = m / (m + 2)`` with ``m = exp 2|x| - 1``."""
     magnitude = body.absolute(x)
-    ceiling = body.number(40.0)  # tanh is 1 to the last place from 19.1 on
+    ceiling = body.number(40.0)  # for x above 19.1, tanh x rounds to 1
     limited = body.select(body.compare("ogt", magnitude, ceiling), ceiling, magnitude)
     high, low, _ = _minus_one(body, body.add(limited, limited))
     under, under_rest = body.two_sum(high, body.number(2.0))
@@ -102,7 +102,7 @@ def hyperbolic_tangent(body: Body, x: str) -> str:
 
 
 def _limited(body: Body, x: str) -> str:
-    """``x`` brought into the range of the reduction; NaN stays."""
+    """``x`` limited to the range of the reduction; NaN stays NaN."""
     beyond, below = body.number(_BEYOND), body.number(-_BEYOND)
     x = body.select(body.compare("ogt", x, beyond), beyond, x)
     return body.select(body.compare("olt", x, below), below, x)
@@ -129,7 +129,7 @@ def _reduce(body: Body, high: str, low: str) -> _Power:
 
 
 def _power_of_two(body: Body, rounded: str) -> str:
-    """``2**k`` where ``rounded`` is k plus the rounder: k stands in its lowest bits."""
+    """``2**k``, where ``rounded`` is k plus the rounding constant and has k in its lowest bits."""
     biased = body.word_op("add", body.bits(rounded), body.integer(1023))
     return body.from_bits(body.word_op("shl", biased, body.integer(52)))
 
@@ -139,7 +139,7 @@ def _scaled(body: Body, power: _Power, value: str) -> str:
 
 
 def _minus_one(body: Body, x: str) -> tuple[str, str, _Power]:
-    """``exp x - 1`` as an unevaluated pair, right up to 2**60, and the power it comes from."""
+    """``exp x - 1`` as an unevaluated pair, valid up to 2**60, and the power that it is computed from."""
     power = _reduce(body, x, body.number(0.0))
     high, low = _scaled(body, power, power.high), _scaled(body, power, power.low)
     whole = body.multiply(power.scale[0], power.scale[1])
@@ -149,7 +149,7 @@ def _minus_one(body: Body, x: str) -> tuple[str, str, _Power]:
 
 
 def _half_exponential(body: Body, x: str) -> str:
-    """``exp(x) / 2`` without overflow before its time."""
+    """``exp(x) / 2``, which overflows only where the result does."""
     power = _reduce(body, _limited(body, x), body.number(0.0))
     one, rest = body.fast_two_sum(body.number(1.0), power.high)
     value = body.add(one, body.add(rest, power.low))

@@ -24,7 +24,8 @@ def arc_sine(body: Body, x: str) -> str:
 
 
 def arc_cosine(body: Body, x: str) -> str:
-    """``acos x``: ``pi/2 - asin x``, and ``2 asin sqrt((1 - |x|) / 2)`` or pi less that at the ends."""
+    """``acos x``: ``pi/2 - asin x``; beyond one half ``2 asin sqrt((1 - |x|) / 2)``, or pi minus that for x <
+    0."""
     _, small, s, curve = _arc_sine_parts(body, x)
     negative = body.compare("olt", x, body.number(0.0))
 
@@ -42,7 +43,8 @@ def arc_cosine(body: Body, x: str) -> str:
 
 
 def _arc_sine_parts(body: Body, x: str) -> tuple[str, str, str, str]:
-    """``|x|``; whether it is below one half; s and c, ``asin = s + c`` of it or of sqrt((1 - |x|) / 2)."""
+    """``|x|``; whether it is below one half; s and c with ``s + c = asin`` of |x|, or of sqrt((1 - |x|) /
+    2)."""
     magnitude = body.absolute(x)
     small = body.compare("ole", magnitude, body.number(0.5))
     outer = body.multiply(body.subtract(body.number(1.0), magnitude), body.number(0.5))
@@ -70,7 +72,7 @@ def arc_tangent_of_quotient(body: Body, y: str, x: str) -> str:
     over, under = body.select(steep, along, across), body.select(steep, across, along)
     over, under = _tame(body, over, under)
 
-    # In the upper half of the octant, turn by pi/4: t = (over - under) / (over + under).
+    # In the upper half of the octant, rotate by pi/4: t = (over - under) / (over + under).
     upper = body.compare("ogt", over, body.multiply(body.number(TAN_PI_8), under))
     difference, difference_rest = body.two_sum(over, body.negate(under))
     total, total_rest = body.two_sum(over, under)
@@ -102,7 +104,8 @@ def arc_tangent_of_quotient(body: Body, y: str, x: str) -> str:
 
 
 def _tame(body: Body, over: str, under: str) -> tuple[str, str]:
-    """The same quotient (0 <= over <= under) without zero by zero, infinities, overflow or lost digits."""
+    """Scale a quotient (0 <= over <= under) so that 0/0, infinities, overflow and loss of digits cannot
+    occur."""
     infinity = body.number(float("inf"))
     one, zero = body.number(1.0), body.number(0.0)
     endless = body.compare("oeq", under, infinity)

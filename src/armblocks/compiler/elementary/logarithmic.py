@@ -1,8 +1,8 @@
 """Logarithms and inverse hyperbolic functions, all from the logarithm of an unevaluated pair.
 
 ``ln(2**k m) = k ln 2 + ln m`` with ``m`` between sqrt(1/2) and sqrt(2), and ``ln m = 2 atanh s``,
-``s = (m - 1) / (m + 1)``. Every leading term is carried with its rounding error, so that the result is right
-to about 2**-65 of itself, near 1 as well; the argument may itself be such a pair.
+``s = (m - 1) / (m + 1)``. Every leading term is kept with its rounding error, so the relative error of the
+result is about 2**-65, also near 1. The argument may be such a pair as well.
 """
 
 from __future__ import annotations
@@ -163,7 +163,7 @@ def _finite_or_zero(body: Body, x: str) -> str:
 
 
 def _ends(body: Body, argument: str, result: str) -> str:
-    """The logarithm's values at zero, infinity, NaN and below zero."""
+    """Replace the result by the logarithm's values at zero, infinity, NaN and below zero."""
     zero = body.compare("oeq", argument, body.number(0.0))
     result = body.select(zero, body.number(-_INFINITY), result)
     endless = body.compare("oeq", argument, body.number(_INFINITY))

@@ -1,7 +1,7 @@
 """Remainders of division, exact.
 
-For a quotient below 2**53 one fused multiply-add gives the remainder exactly, once more or less the divisor.
-Larger quotients are divided by integers, in one lane.
+For a quotient below 2**53, one fused multiply-add gives the exact remainder, possibly plus or minus the
+divisor. Larger quotients need long division with integers, in one lane.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def modulo(body: Body, x: str, y: str) -> str:
 def remainder(body: Body, x: str, y: str) -> str:
     """IEEE 754 remainder: of division to the nearest integer, ties to even. NaN for y = 0 or infinite x."""
     a, b = body.absolute(x), body.absolute(y)
-    rest = _modulo(body, a, body.add(b, b))  # a divisor that overflows leaves a as it is
+    rest = _modulo(body, a, body.add(b, b))  # a divisor that overflows leaves a unchanged
     once = body.select(_exceeds_half(body, rest, b, "ogt"), body.subtract(rest, b), rest)
     twice = body.select(_exceeds_half(body, once, b, "oge"), body.subtract(once, b), once)
     # If the first step was not taken, the second must not be: a tie goes to the even quotient 0.
@@ -62,7 +62,7 @@ def _modulo(body: Body, a: str, b: str) -> str:
 
 
 def _define_large(module: Module) -> None:
-    """Add the choice between the usual remainder and long division."""
+    """Add a function that selects the usual remainder or long division."""
 
     def modulo_of_large(r: Routine, rest: Real, large: Boolean, a: Real, b: Real) -> Real:
         with r.when(large, rarely=True):
@@ -76,7 +76,7 @@ def _define_large(module: Module) -> None:
 
 
 def long_division(r: Routine, a: Real, b: Real) -> Real:
-    """``a mod b`` for finite ``a >= b > 0``: integer mantissas, 11 bits of quotient a turn."""
+    """``a mod b`` for finite ``a >= b > 0``: integer mantissas, 11 bits of the quotient per iteration."""
     dividend, exponent = _mantissa_and_exponent(a)
     divisor, unit = _mantissa_and_exponent(b)
     rest = r.integer(dividend.unsigned_remainder(divisor))
@@ -87,14 +87,14 @@ def long_division(r: Routine, a: Real, b: Real) -> Real:
         step = select(places < 11, places, 11)
         rest.value = (rest.value << step).unsigned_remainder(divisor)
         left.value = places - step
-    # rest 2**unit, exact: units of the smallest number, times a power of two in two halves
+    # rest 2**unit, exact: a multiple of the smallest number, times a power of two in two halves
     power = unit - 1
     half = power >> 1
     return rest.value.to_real() * _SMALLEST * _power_of_two(half) * _power_of_two(power - half)
 
 
 def _mantissa_and_exponent(x: Real) -> tuple[Integer, Integer]:
-    """``x = mantissa 2**exponent``, but for a factor that all positive finite numbers share."""
+    """``x = mantissa 2**exponent``, up to a factor that is the same for all positive finite numbers."""
     bits = x.bits()
     fraction, biased = bits & ((1 << 52) - 1), bits >> 52
     subnormal = biased == 0

@@ -11,7 +11,8 @@ _INFINITY = float("inf")
 
 
 def power(body: Body, x: str, y: str) -> str:
-    """``x**y = exp(y ln |x|)``, the logarithm and the product carried to about 2**-65; signs as in C99."""
+    """``x**y = exp(y ln |x|)``; the logarithm and the product have an error of about 2**-65; signs as in
+    C99."""
     zero, one, infinity = body.number(0.0), body.number(1.0), body.number(_INFINITY)
     magnitude = body.absolute(x)
     high, low = logarithm_of_pair(body, magnitude, None)
@@ -19,7 +20,7 @@ def power(body: Body, x: str, y: str) -> str:
     high = body.select(body.compare("oeq", magnitude, infinity), infinity, high)
     product, error = body.two_product(y, high)
     error = body.fma(y, low, error)
-    # Beyond 800 the result is zero or infinite, whatever the rest.
+    # Beyond 800 the result is zero or infinite, whatever the low part is.
     far = body.compare("ogt", body.absolute(product), body.number(800.0))
     capped = body.intrinsic("copysign", body.number(800.0), product)
     product = body.select(far, capped, product)
@@ -30,7 +31,7 @@ def power(body: Body, x: str, y: str) -> str:
     uneven = body.compare("une", body.intrinsic("floor", half), half)
     odd = body.both(whole, uneven)
     signed = body.select(odd, body.intrinsic("copysign", result, x), result)
-    # A finite negative base has no power that is not whole.
+    # A non-integer power of a finite negative base is NaN.
     inside = body.both(body.compare("olt", x, zero), body.compare("ogt", x, body.number(-_INFINITY)))
     fraction = body.compare("une", body.intrinsic("floor", y), y)
     signed = body.select(body.both(inside, fraction), body.number(float("nan")), signed)
@@ -42,7 +43,7 @@ def power(body: Body, x: str, y: str) -> str:
 
 
 def hypotenuse(body: Body, x: str, y: str) -> str:
-    """``sqrt(x x + y y)``, corrected by what the root leaves over (Borges 2019, "fused" form)."""
+    """``sqrt(x x + y y)``, corrected by the residual of the square root (Borges 2019, "fused" form)."""
     one, infinity = body.number(1.0), body.number(_INFINITY)
     a, b = body.absolute(x), body.absolute(y)
     larger = body.compare("ogt", a, b)

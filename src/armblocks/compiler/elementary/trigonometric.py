@@ -1,9 +1,9 @@
 """Sine, cosine, tangent.
 
-The argument is brought to ``|r| <= pi/4`` by subtracting ``k pi/2`` in three parts with fused multiply-adds
-(Cody and Waite): the first difference is exact, and what the second rounds off is kept beside ``r``. That
-holds up to ``|x| = 2**31``. Beyond, ``2/pi`` is multiplied bit by bit around the binary point (Payne and
-Hanek 1983), in one lane; a block of samples with such an angle is evaluated again with one lane.
+The argument is reduced to ``|r| <= pi/4`` by subtracting ``k pi/2`` in three parts with fused multiply-adds
+(Cody and Waite). The first difference is exact, and the rounding error of the second is kept beside ``r``.
+This is valid up to ``|x| = 2**31``. Larger angles are multiplied by those bits of ``2/pi`` that matter (Payne
+and Hanek 1983), in one lane; a block of samples with such an angle is evaluated again with one lane.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _PARTS = "{ double, double, i64 }"
 
 
 class _Reduced(NamedTuple):
-    """``|x| = quarter pi/2 + angle + rest``; the quarter's two lowest bits count."""
+    """``|x| = quarter pi/2 + angle + rest``; only the two lowest bits of ``quarter`` matter."""
 
     angle: str
     rest: str
@@ -63,7 +63,7 @@ def cosine(body: Body, x: str) -> str:
 
 
 def tangent(body: Body, x: str) -> str:
-    """``tan x``: sine by cosine, both with what their last addition rounds off."""
+    """``tan x``: sine divided by cosine, both with the rounding error of their last addition."""
     reduced = _reduce(body, body.absolute(x))
     squared = body.multiply(reduced.angle, reduced.angle)
     sine, sine_rest = body.fast_two_sum(*_sine_parts(body, reduced, squared))
@@ -100,7 +100,7 @@ def _reduce(body: Body, magnitude: str) -> _Reduced:
 
 
 def _define_reduction(module: Module) -> None:
-    """Add the choice between the usual reduction and that of huge angles."""
+    """Add a function that selects the usual reduction or that of huge angles."""
 
     def reduction(
         r: Routine, magnitude: Real, huge: Boolean, angle: Real, rest: Real, quarter: Integer
@@ -117,7 +117,7 @@ def _define_reduction(module: Module) -> None:
 
 
 def _huge_reduction(r: Routine, magnitude: Real) -> tuple[Real, Real, Integer]:
-    """The parts of a huge angle: :func:`_huge_text` is what it does."""
+    """The parts of a huge angle; :func:`_huge_text` writes the body."""
     raise NotImplementedError
 
 
@@ -161,9 +161,9 @@ def _signed(body: Body, value: str, sign: str) -> str:
 def _huge_text(module: Module) -> str:
     """Text of the reduction of ``|x| >= 2**31``, infinity and NaN included, for one lane.
 
-    With ``|x| = mantissa 2**exponent``, the bits of 2/pi that weigh 4 or more in the product change the
-    quarter by multiples of four, so that a window of 192 bits below them decides; the error is below
-    2**-137, and no double is nearer to a multiple of pi/2 than 2**-61 of a quarter.
+    With ``|x| = mantissa 2**exponent``, those bits of 2/pi that contribute 4 or more to the product change
+    the quarter by multiples of four and are omitted. The next 192 bits suffice: the error is below 2**-137,
+    and no double is closer to a multiple of pi/2 than 2**-61 of a quarter.
     """
     module.add(
         "armblocks_two_over_pi",
@@ -176,7 +176,7 @@ def _huge_text(module: Module) -> str:
     fraction = body.word_op("and", bits, str((1 << 52) - 1))
     mantissa = body.word_op("or", fraction, str(1 << 52))
     biased = body.word_op("lshr", bits, "52")
-    # One word of zeros stands before the table, so that the window may begin above the binary point.
+    # A word of zeros precedes the table, because the window may begin above the binary point.
     begin = body.word_op("sub", biased, str(1075 + 2 - 64))
     place, shift = body.word_op("lshr", begin, "6"), body.word_op("and", begin, "63")
     words = [_table_word(body, place, k) for k in range(4)]
@@ -191,7 +191,7 @@ def _huge_text(module: Module) -> str:
     ]
     high, middle, low = _low_192_bits(body, mantissa, window)
     # Two bits of quarter, then the fraction of a quarter; rounding to the nearest quarter makes it signed.
-    # (Complementing all bits negates but for one unit of 2**-128.)
+    # (Complementing all bits negates, with an error of one unit of 2**-128.)
     upper = body.word_op("or", body.word_op("shl", high, "2"), body.word_op("lshr", middle, "62"))
     lower = body.word_op("or", body.word_op("shl", middle, "2"), body.word_op("lshr", low, "62"))
     negative = body.word_op("ashr", upper, "63")
