@@ -8,17 +8,19 @@ Every operation works on IEEE 754 doubles and rounds to nearest. Where languages
   returned.
 * ``SIGN`` is -1, 1, or the operand itself if it is a zero or a NaN.
 * A comparison is 1.0 or 0.0. With a NaN all comparisons are 0.0, except ``NE``. A condition is true if it is
-  not equal to zero, so a NaN is true. * ``SELECT c a b`` is ``a`` if ``c`` is true, else ``b``. The other
-  value has no influence, even if it is NaN.
+  not equal to zero, so a NaN is true.
+* ``SELECT c a b`` is ``a`` if ``c`` is true, else ``b``. The other value has no influence, even if it is NaN.
 * ``MODULO`` is C's ``fmod`` (sign of the dividend, exact); ``REMAINDER`` is IEEE's (nearest quotient, ties to
   even, exact).
-* ``READ x n i`` is entry ``i``, cut to an integer and held in 0 … n - 1 (0 for a NaN), of the ``n`` scalars
-  from input ``x`` on, all of one slot; ``n`` is a constant.
-* ``SOLVE a11 a12 … ann b1 … bn`` solves n linear equations (:mod:`armblocks.compiler.linear_solution`). Its
-  value is n numbers, of which ``MEMBER s k`` is number k, a constant from 0; nothing else may read it.
-* ``PRODUCT a m n x1 … xn c1 … cm`` adds a matrix times a vector: number i of its value, for ``MEMBER``, is
-  ``((ci + ai1 x1) + ai2 x2) + … + ain xn``, each term by ``FMA``. The matrix is the ``m n`` scalars from
-  input ``a`` on, row by row, all of one slot; ``m`` and ``n`` are constants
+* ``READ x n i`` reads a table of ``n`` scalars, which begins at input ``x`` and lies in one slot. The result is
+  the entry with the index ``i``, truncated to an integer and limited to 0 … n - 1 (0 for a NaN). ``n`` is a
+  constant.
+* ``SOLVE a11 a12 … ann b1 … bn`` solves n linear equations (:mod:`armblocks.compiler.linear_solution`). It has
+  n results. ``MEMBER s k`` is result k of the operation ``s``, where k is a constant, counted from 0. Only
+  ``MEMBER`` may read the results.
+* ``PRODUCT a m n x1 … xn c1 … cm`` adds a matrix times a vector. Its result i, for ``MEMBER``, is
+  ``((ci + ai1 x1) + ai2 x2) + … + ain xn``, each term by ``FMA``. The matrix is the ``m n`` scalars that begin
+  at input ``a`` and lie in one slot, row by row; ``m`` and ``n`` are constants
   (:mod:`armblocks.compiler.matrix_products`).
 * ``POWER`` follows C99: ``x**0`` and ``1**y`` are 1 even with NaN.
 """

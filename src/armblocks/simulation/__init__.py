@@ -1,4 +1,4 @@
-"""Runs compiled systems: integrators as tables, one call to simulate, results with names and units."""
+"""Simulation of compiled systems: integrators as tables, runs, and results with names and units."""
 
 from typing import TYPE_CHECKING
 

@@ -41,7 +41,7 @@ class Calls:
 
     The native loop returns just before a tick. The tick is evaluated on a copy to get the inputs of a
     function, the function is called, and the loop continues with its results and processes the tick. All
-    blocks that tick at that time therefore read the new values, as with an equation.
+    blocks that tick at that time therefore read the new values, as if equations computed them.
     """
 
     def __init__(self, compiled: CompiledSystem, functions: Sequence[CalledFunction]) -> None:
@@ -51,15 +51,15 @@ class Calls:
         self._done: dict[int, float] = {}
         self.count = 0
         self.seconds = 0.0
-        """The computing time of the functions alone, s."""
+        """The computing time of the functions, s."""
 
     def advance(self, stretch: Stretch, steps: int, pause: float, consume: Consumer | None) -> None:
         """Take steps like :meth:`Stretch.advance`; call the functions that are due.
 
-        Raises ``SimulationError`` where a function fails.
+        Raises ``SimulationError`` if a function fails.
         """
         integration = stretch.integration
-        assert integration is not None  # what ticks is integrated
+        assert integration is not None  # a system with ticks has an integration
         end = stretch.taken + steps
         while True:
             if integration.waiting:
@@ -115,7 +115,7 @@ class Calls:
     def _called(
         self, function: CalledFunction, time: float, inputs: Mapping[str, Any]
     ) -> Mapping[str, Array]:
-        """The flat results of one function; raises ``SimulationError`` where it fails."""
+        """The flat results of one function. Raises ``SimulationError`` if it fails."""
         where = f"block '{function.block}' at t = {time:.9g} s"
         began = perf_counter()
         try:
@@ -140,5 +140,5 @@ class Calls:
 
 
 def _given(values: Array, shape: Shape) -> Any:
-    """An input for the function: a number, or a copied array."""
+    """An input of the function: a number, or a copy of an array."""
     return values.reshape(shape).copy() if shape else float(values[0])

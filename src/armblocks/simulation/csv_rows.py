@@ -1,4 +1,4 @@
-"""Rows of a CSV file in plain Python, with the text that pyarrow writes, for installations without pyarrow.
+"""Rows of a CSV file in plain Python, for installations without pyarrow. The text is the same as pyarrow's.
 
 pyarrow writes the shortest digits that read back to the same double: as ``0.000012`` from 1e-6 up to 1e10,
 and as ``1.2e-7`` or ``1.2e+10`` elsewhere.
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 FIXED_FROM, FIXED_TO = 1e-6, 1e10
 """Magnitudes between which a number is written without an exponent."""
 _REPR_FIXED_FROM = 1e-4
-"""Below it ``repr`` writes an exponent."""
+"""Magnitude below which ``repr`` writes an exponent."""
 
 
 def csv_rows(columns: Sequence[NDArray[np.float64]]) -> str:

@@ -1,4 +1,4 @@
-"""Error messages of failed runs in terms of the diagram: signal, state, time and remedy."""
+"""Error messages of failed runs in terms of the diagram: signal, state, time and possible correction."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ def first_bad_signal(
 ) -> tuple[SimulationError, int] | None:
     """The error for the first signal that is NaN or infinite, and the number of valid samples before it.
 
-    ``signals`` ``(ny, N)``, ``algebraic`` ``(N, nw)``. First in time, then in evaluation order. For finite
-    signals one pass over memory suffices, because their sum is finite. (Not a dot product: BLAS would start
-    threads for it, which wait for each other for milliseconds where the processors are busy.)
+    ``signals`` ``(ny, N)``, ``algebraic`` ``(N, nw)``. "First" is the earliest time, then evaluation order.
+    If all signals are finite, their sum is finite, and one pass over memory suffices. (A dot product would
+    start threads of BLAS, which wait for each other for milliseconds on busy processors.)
     """
     if algebraic.size and not np.isfinite(algebraic).all():
         unsolved = int(np.argmin(np.isfinite(algebraic).all(axis=1)))
@@ -45,7 +45,7 @@ def first_bad_signal(
         if math.isfinite(np.add.reduce(signals.reshape(-1))):
             return None
     finite = np.isfinite(signals)
-    if finite.all():  # only their sum overflows
+    if finite.all():  # the signals are finite and only their sum overflows
         return None
     instant = int(np.argmin(finite.all(axis=0)))
     place = int(np.argmin(finite[:, instant]))
@@ -65,7 +65,7 @@ def _signal_error(system: CompiledSystem, place: int, value: float, time: float)
 
 
 def ended_by_block(system: CompiledSystem, run: Integration) -> str | SimulationError:
-    """The block that ended a run: a sentence, or the error of an Assertion whose input has become 0."""
+    """A message with the block that ended a run, or the error of an Assertion whose input has become 0."""
     guard = run.positive(system.sizes.stops)[0]
     block = system.guard_names[guard]
     if system.guard_actions[guard] != "fail":
@@ -163,14 +163,14 @@ def _contradicting(system: CompiledSystem, run: Integration) -> list[str]:
 
 
 def _listed(blocks: list[str]) -> str:
-    """Two or three of the blocks by name, for a sentence."""
+    """The first three block names as text, with the number of the others."""
     shown = ", ".join(f"'{block}'" for block in blocks[:3])
     more = f" and {len(blocks) - 3} more" if len(blocks) > 3 else ""
     return f"{'block' if len(blocks) == 1 else 'the blocks'} {shown}{more}"
 
 
 def _unique(names: Iterable[str]) -> list[str]:
-    """Each name once, in their order."""
+    """Each name once, in the order of first occurrence."""
     return list(dict.fromkeys(names))
 
 
@@ -207,10 +207,11 @@ def _crawling(system: CompiledSystem, run: Integration) -> SimulationError:
 
 
 def stiffness_hint(system: CompiledSystem, run: Integration, p: Array) -> str:
-    """A hint where stability, not accuracy, limited the steps; else empty.
+    """A hint if stability, not accuracy, limited the steps; else an empty text.
 
-    The spectral radius of the Jacobian where the run ended, by power iteration on differences of the
-    derivative, times the mean step, against the method's stability interval.
+    The mean step times the spectral radius of the Jacobian at the end of the run is compared with the
+    stability interval of the method. The spectral radius comes from power iteration on differences of the
+    derivative.
     """
     tried, tableau = run.accepted + run.rejected, run.integrator.tableau
     if tried < MANY_STEPS or run.time <= 0.0 or tableau.needs_jacobian:

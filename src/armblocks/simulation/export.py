@@ -1,12 +1,12 @@
 """Export of results to tables and files; the only module that uses pandas, pyarrow and SciPy's MAT files.
 
 ======== ================================================================ =========================
-suffix   holds                                                            how the run went
+suffix   content                                                          description of the run
 ======== ================================================================ =========================
-.csv     one line an instant, ``time`` then one column a scalar           cannot be said
-.parquet the same columns, doubles                                        key ``armblocks`` (JSON)
-.npz     ``time`` and one ``(N, *shape)`` array a signal, by its path     array ``run`` (JSON)
-.mat     ``time`` and a structure a block with a field a port             structure ``run``
+.csv     a line for each sample: ``time``, then a column for each scalar  none
+.parquet the same columns, as doubles                                     key ``armblocks`` (JSON)
+.npz     ``time`` and an ``(N, *shape)`` array for each signal path       array ``run`` (JSON)
+.mat     ``time`` and a structure for each block, a field for each port   structure ``run``
 ======== ================================================================ =========================
 
 Parquet needs pyarrow, MAT needs SciPy: the extra ``data``. CSV files have the same bytes with and without
@@ -46,7 +46,7 @@ Array = NDArray[np.float64]
 
 
 def to_dataframe(result: RunData) -> pd.DataFrame:
-    """Index ``time`` in s, one column for each scalar; ``attrs`` holds how the run went."""
+    """Index ``time`` in s, one column for each scalar; ``attrs`` has the description of the run."""
     with from_extra("data", "data frames"):
         import pandas as pd
 
@@ -57,7 +57,7 @@ def to_dataframe(result: RunData) -> pd.DataFrame:
 
 
 def save(result: RunData, path: str | PathLike[str]) -> None:
-    """Write ``path`` in the format of its suffix, all or nothing. See the module for the formats."""
+    """Write ``path`` in the format of its suffix, atomically. The module's docstring lists the formats."""
     place = Path(path)
     write = _WRITERS.get(place.suffix.lower())
     if write is None:
@@ -67,14 +67,14 @@ def save(result: RunData, path: str | PathLike[str]) -> None:
 
 
 def check_format(path: Path) -> None:
-    """Raise ``MissingLibraryError`` where the format of this suffix needs a library that is not installed."""
+    """Raise ``MissingLibraryError`` if the format of this suffix needs a library that is not installed."""
     library, use = _NEEDS.get(path.suffix.lower(), ("", ""))
     if library and not installed(library):
         raise MissingLibraryError(library, "data", use, where=str(path))
 
 
 def description_of(result: RunData) -> dict[str, Any]:
-    """How the run went, in plain values."""
+    """The description of the run (solver, steps, times, messages) as plain values."""
     parameters = {name: value.tolist() for name, value in result.parameters.items()}
     return {
         "name": result.name,
@@ -97,7 +97,7 @@ def _csv_head(names: Sequence[str]) -> bytes:
 
 
 def _write_csv_rows(stream: BinaryIO, columns: Sequence[Array]) -> None:
-    """By pyarrow where it is installed, five times as fast: both write the same bytes."""
+    """Write rows with pyarrow if it is installed, which is five times as fast and gives the same bytes."""
     if not installed("pyarrow"):
         stream.write(csv_rows(columns).encode())
         return
@@ -118,7 +118,7 @@ def _parquet(result: RunData) -> bytes:
 
 
 def _table(result: RunData) -> pa.Table:
-    """Column ``time`` and one column a scalar; how the run went is in the metadata."""
+    """A column ``time`` and one for each scalar; the metadata have the description of the run."""
     import pyarrow as pa
 
     names = ["time", *result.columns()]
@@ -128,7 +128,8 @@ def _table(result: RunData) -> pa.Table:
 
 
 def _column(values: Array) -> pa.Array:
-    """A column that reads the numbers in place. (``pyarrow.array`` imports pandas to look for its types.)"""
+    """A column that reads the numbers in place. (``pyarrow.array`` would import pandas to check for its
+    types.)"""
     import pyarrow as pa
 
     buffer = pa.py_buffer(np.ascontiguousarray(values))
@@ -172,7 +173,7 @@ def _mat(result: RunData) -> bytes:
 
 
 def _identifier(name: str, taken: set[str]) -> str:
-    """A MATLAB name (letters, digits, underscores, at most 63) near ``name`` that is not taken."""
+    """An unused MATLAB name (letters, digits, underscores, at most 63) similar to ``name``."""
     plain = re.sub(r"[^A-Za-z0-9_]", "_", name)[:56]
     if not plain or not plain[0].isalpha():
         plain = f"x{plain}"
@@ -189,24 +190,24 @@ _WRITERS: dict[str, Callable[[RunData], bytes]] = {
     ".mat": _mat,
 }
 _NEEDS = {".parquet": ("pyarrow", "Parquet files"), ".mat": ("scipy", "MAT files")}
-"""The library that a format cannot do without, and what the message calls the format."""
+"""The library that each format requires, and the name of the format in messages."""
 
-# Files that grow while a run goes on.
+# Files that are written during a run.
 
 
 class LogFile(ABC):
-    """A table that is written piece by piece; it is there under its name when it is complete."""
+    """A table that is written in pieces. It appears under its name when it is complete."""
 
     def __init__(self, path: Path, columns: Sequence[str]) -> None:
         self.columns = ("time", *columns)
         self._file = GrowingFile(path)
 
     def append(self, time: Array, signals: Array) -> None:
-        """Add instants, ``(N,)`` s, with their values ``(count of columns, N)``."""
+        """Add samples: times ``(N,)`` s and values ``(number of columns, N)``."""
         self._append([time, *signals])
 
     def finish(self, description: Mapping[str, Any]) -> None:
-        """Complete the file; ``description`` says how the run went, where the format has a place for it."""
+        """Complete the file, with the ``description`` of the run if the format can store it."""
         self._close(description)
         self._file.finish()
 

@@ -1,4 +1,4 @@
-"""Start values of Newton's method: another guess for implicit equations whose given guess is singular."""
+"""Start values of Newton's method: another guess where the Jacobian at the given guess is singular."""
 
 from __future__ import annotations
 
@@ -11,19 +11,20 @@ from armblocks.integration.system import CompiledSystem
 Array = NDArray[np.float64]
 
 SHIFTS = (0.1, -0.1, 1.0, -1.0, 10.0, -10.0, 100.0, -100.0)
-"""What is added to the guess, one after the other."""
+"""Numbers that are added to the guess, one after the other, until a solution is found."""
 TURNS = 50
 SINGULAR, FARTHEST = 1e12, 1e6
-"""Condition of the Jacobian, and length of a step over ``1 + |w|``, from which it counts as singular."""
+"""The Jacobian counts as singular above this condition number, and above this Newton step over ``1 +
+|w|``."""
 MOST_UNKNOWNS = 50
-"""Differences of more would cost more than a run."""
+"""Maximum number of unknowns; difference quotients for more of them would take longer than a run."""
 
 
 def first_guess(compiled: CompiledSystem, start: RunPoint, p: Array) -> Array:
-    """The guess ``start.w`` itself where the Jacobian there is regular; else a solution near it, if found.
+    """The guess ``start.w`` if its Jacobian is regular, else a solution near it, if one is found.
 
-    ``w^2 = 1`` from 0: the slope is 0 there, and 1 is found from 0.1. Where nothing is found the guess stays,
-    and the run says what is wrong.
+    Example: for ``w^2 = 1`` the derivative at the guess 0 is 0; from 0.1 the solution 1 is found. If no
+    solution is found, the guess is unchanged and the run reports the singular loop.
     """
     guess = start.w
     if not 0 < guess.size <= MOST_UNKNOWNS or _step(compiled, start, guess, p) is not None:
@@ -47,7 +48,7 @@ def _solution(compiled: CompiledSystem, start: RunPoint, w: Array, p: Array) -> 
 
 
 def _step(compiled: CompiledSystem, start: RunPoint, w: Array, p: Array) -> Array | None:
-    """Newton's step with differences for slopes; None where the Jacobian is singular."""
+    """Newton's step with difference quotients as derivatives; None if the Jacobian is singular."""
 
     def residual(at: Array) -> Array:
         return compiled.residual(start.time, start.x, start.z, at, p)
@@ -67,7 +68,7 @@ def _step(compiled: CompiledSystem, start: RunPoint, w: Array, p: Array) -> Arra
 def _solved(matrix: Array, right: Array) -> Array:
     """The solution of linear equations by elimination with row pivoting.
 
-    LAPACK's last bits differ from processor to processor, and those of a guess show in the run.
+    LAPACK's last bits depend on the processor, and the last bits of a guess change those of the run.
     """
     rows = np.column_stack([matrix, right])
     n = len(right)

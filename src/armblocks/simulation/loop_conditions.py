@@ -1,4 +1,4 @@
-"""The loss of accuracy in linear loops: their condition numbers at times spread over the run."""
+"""The loss of accuracy in linear loops, from their condition numbers at several times of the run."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from armblocks.simulation.stretch import Rows
 Array = NDArray[np.float64]
 
 INSTANTS = 32
-"""Of each part of a run; the first and the last are among them."""
+"""Number of samples of each part of a run at which conditions are computed, with the first and the last."""
 HALF_OF_THE_DIGITS = 1e8
-"""Condition above which fewer than half of a double's 16 digits are left."""
+"""Condition above which fewer than half of a double's 16 digits are correct."""
 ROUNDS = 12
-"""Of the power method: its bounds then lie within a few per cent of each other for most matrices."""
+"""Iterations of the power method; its two bounds then differ by a few per cent for most matrices."""
 NAMED = 3
 
 
 def warnings_of_loops(system: CompiledSystem, parts: Sequence[Rows]) -> list[str]:
-    """A sentence for each linear loop that has lost more than half of the digits, with its worst instant."""
+    """A warning for each linear loop with fewer than half of the digits correct, with its worst time."""
     worst = [(0.0, 0.0)] * len(system.loops)
     for rows in parts if system.loops else ():
         chosen = np.unique(np.linspace(0, rows.time.size - 1, INSTANTS).astype(np.intp))
@@ -42,9 +42,9 @@ def warnings_of_loops(system: CompiledSystem, parts: Sequence[Rows]) -> list[str
 def loop_conditions(matrices: Array) -> Array:
     """Conditions (k,) of loops ``x = M x + c``, whose ``matrices (k, n, n)`` are ``M - 1``; 0 where singular.
 
-    The spectral radius of ``|(1 - M)^-1| (1 + |M|)``: how much larger than a rounding error of every term the
-    error of a signal can be, in those units of the signals that suit best (Bauer, *Numer. Math.* 5 (1963)
-    73-87).
+    The condition is the spectral radius of ``|(1 - M)^-1| (1 + |M|)``. It bounds the error of a signal, as a
+    multiple of the rounding errors of all terms, for the best choice of the signals' units (Bauer, *Numer.
+    Math.* 5 (1963) 73-87).
     """
     n = matrices.shape[-1]
     found = np.zeros(len(matrices))

@@ -43,7 +43,7 @@ STYLE = """
 
 
 def result_html(result: RunData) -> str:
-    """Title, how the run went, and a panel for each signal, as one self-contained piece of HTML."""
+    """Title, statistics of the run, and a panel for each signal, as self-contained HTML."""
     report = result.run
     end = float(result.time[-1]) if result.time.size else 0.0
     solver = "no solver needed" if report.solver == "none" else f"{report.solver}, {report.steps} steps"
@@ -100,7 +100,7 @@ def _legend(slot: Slot, chosen: list[int]) -> str:
 
 
 def _most_telling(columns: Array) -> list[int]:
-    """The components to draw: all of them, or those that move, the first ``MOST_TRACES`` at most."""
+    """The components to draw: all of them, or only those that change, at most the first ``MOST_TRACES``."""
     count = columns.shape[1]
     if count <= MOST_TRACES or columns.shape[0] == 0:
         return list(range(min(count, MOST_TRACES)))
@@ -109,7 +109,7 @@ def _most_telling(columns: Array) -> list[int]:
 
 
 def _svg(time: Array, columns: Array, low: float, high: float, spoken: str) -> str:
-    # A constant sits in the middle of its panel: half of itself, or 1, on either side.
+    # A constant is in the middle of its panel, with a range of half its value, or 1, on either side.
     margin = 0.06 * (high - low) if high > low else (0.5 * abs(high) or 1.0)
     bottom, top = low - margin, high + margin
     start, end = (float(time[0]), float(time[-1])) if time.size else (0.0, 0.0)
@@ -147,7 +147,8 @@ def _svg(time: Array, columns: Array, low: float, high: float, spoken: str) -> s
 
 
 def _outline(time: Array, values: Array, pieces: int = 110) -> tuple[Array, Array]:
-    """At most two points a piece, its lowest and highest, in order: the picture stays, the text shrinks."""
+    """The lowest and highest point of each piece, in order of time. The figure looks the same with less
+    text."""
     if time.size <= 2 * pieces:
         return time, values
     edges = [time.size * k // pieces for k in range(pieces + 1)]
@@ -159,7 +160,7 @@ def _outline(time: Array, values: Array, pieces: int = 110) -> tuple[Array, Arra
 
 
 def _tick(value: float) -> str:
-    """Three significant digits, written out from 0.001 to 100 000, with a real minus sign."""
+    """Three significant digits, without exponent from 0.001 to 100 000, with a typographic minus sign."""
     rounded = float(f"{0.0 if abs(value) < 1e-300 else value:.3g}")
     if rounded == 0.0 or 1e-3 <= abs(rounded) < 1e5:
         text = np.format_float_positional(rounded, trim="-")
@@ -170,7 +171,7 @@ def _tick(value: float) -> str:
 
 
 def _seconds(value: float) -> str:
-    """A wall time with the prefix that fits."""
+    """A wall time with a suitable unit prefix."""
     for limit, factor, unit in ((1e-3, 1e6, "µs"), (1.0, 1e3, "ms")):
         if value < limit:
             return f"{value * factor:.3g} {unit}"

@@ -21,18 +21,18 @@ from armblocks.simulation.tableaux import DEFAULT, STIFF, TABLEAUX, find_tableau
 Array = NDArray[np.float64]
 
 DEFAULT_INSTANTS = 1000
-"""Intervals that are recorded where nobody says a sample time: 10 s in steps of 10 ms."""
+"""Number of recorded intervals without a sample time: for example 10 s in intervals of 10 ms."""
 MOST_STEPS = 1e11
-"""Fixed steps, or ticks of a clock, in a run."""
+"""Maximum number of fixed steps, or of ticks of a clock, in a run."""
 MOST_NUMBERS = 500_000_000
-"""Recorded doubles of one run, 4 GB: beyond it the computer would suffer before the run does."""
+"""Maximum number of recorded doubles of one run in memory, 4 GB."""
 SMALLEST_RTOL = 1e-13
-"""Below it the rounding of doubles decides, not the method."""
+"""Smallest relative tolerance. Below it rounding errors dominate those of the method."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class LogRequest:
-    """Write a run to ``path`` (``.parquet`` or ``.csv``) while it goes on: these ``signals``, or all."""
+    """Request to write a run to ``path`` (``.parquet`` or ``.csv``) during the run: ``signals``, or all."""
 
     path: Path
     signals: tuple[str, ...] = ()
@@ -40,22 +40,22 @@ class LogRequest:
 
 @dataclass(frozen=True, kw_only=True)
 class Instants:
-    """The instants that a run records: ``start``, ``k sample_time`` for whole ``k`` between, and ``stop``.
+    """The sample times of a run: ``start``, ``k sample_time`` for all integers ``k`` between, and ``stop``.
 
-    Each is one product, never a sum, so no error grows. An instant within a billionth of a sample time of the
-    stop time is the stop time, and likewise at a start other than 0. Only the part that is asked for exists.
+    Each time is computed as a product, so no error accumulates. A time within a billionth of a sample time of
+    the stop time, or of a start other than 0, is replaced by it. The times are computed in parts on request.
     """
 
     start: float
     stop: float
     sample_time: float
     first: int
-    """``k`` of the first one after the start."""
+    """``k`` of the first sample time after the start."""
     count: int
 
     @staticmethod
     def between(start: float, stop: float, sample_time: float) -> Instants:
-        """The instants of a run."""
+        """The sample times of a run."""
         last, first = math.ceil(stop / sample_time - 1e-9), 1
         if start > 0.0:
             first = max(0, math.floor(start / sample_time) - 1)
@@ -65,7 +65,7 @@ class Instants:
         return Instants(start=start, stop=stop, sample_time=sample_time, first=first, count=count)
 
     def part(self, begin: int, end: int) -> Array:
-        """Instants number ``begin`` to ``end - 1``, s."""
+        """Sample times number ``begin`` to ``end - 1``, s."""
         numbers = np.arange(begin, end, dtype=np.float64) + (self.first - 1.0)
         instants: Array = numbers * self.sample_time
         if begin == 0 < end:
@@ -75,7 +75,7 @@ class Instants:
         return instants
 
     def up_to(self, time: float) -> int:
-        """How many there are until a time (s), itself included."""
+        """Number of sample times up to and including a time (s)."""
         if time >= self.stop:
             return self.count
         number = max(0, math.floor(time / self.sample_time) - self.first)
@@ -86,8 +86,8 @@ class Instants:
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """One run, settled. ``tableau`` is ``None`` where there is nothing but signals of time; ``stiff`` is what
-    goes on in its place where the system turns out to be stiff, if anything."""
+    """The settings of one run, without open choices. ``tableau`` is the method, ``None`` for a system without
+    states. ``stiff`` is the method that replaces it if the system proves stiff, or ``None``."""
 
     tableau: Tableau | None
     stiff: Tableau | None
@@ -101,10 +101,10 @@ class Plan:
 def make_plan(
     system: CompiledSystem, options: SimulationOptions, start: float = 0.0, *, logged: bool = False
 ) -> Plan:
-    """Settle every open choice of ``options`` for a run that begins at ``start``.
+    """The plan of a run that begins at ``start``, with every open choice of ``options`` made.
 
-    A run that is ``logged`` to a file may record as much as it likes. Raises ``InputError`` for values that
-    cannot be run.
+    The number of samples of a run that is ``logged`` to a file is not limited. Raises ``InputError`` for
+    invalid values.
     """
     check_options(options, system.name)
     stop, step = float(options.stop_time), options.step
@@ -134,9 +134,9 @@ def make_plan(
 
 
 def check_options(options: SimulationOptions, where: str) -> None:
-    """Refuse options with which nothing can be run, whatever the system. Raises ``InputError``.
+    """Raise ``InputError`` for options that are invalid for every system.
 
-    Of a named ``solver`` only the name is looked at: whether it fits is known with the system.
+    Of a ``solver`` only the name is checked. Whether it suits the system is checked by :func:`make_plan`.
     """
     stop = _number("stop_time", options.stop_time, where, "a finite time in s, 0 or more", least=0.0)
     step = options.step
@@ -176,7 +176,7 @@ def _check_solver(name: object, where: str) -> None:
 
 
 def _resolvable(name: str, step: float, stop: float, where: str) -> None:
-    """Raise ``InputError`` for a step that the rounding of the times near the end would swallow."""
+    """Raise ``InputError`` for a step that is too small for the resolution of times near the end."""
     least = 4.0 * math.ulp(stop)
     if step < least:
         raise InputError(
@@ -188,7 +188,7 @@ def _resolvable(name: str, step: float, stop: float, where: str) -> None:
 
 
 def _countable(name: str, step: float, stop: float, where: str) -> None:
-    """Raise ``InputError`` for a step or period of which there are more in a run than anybody awaits."""
+    """Raise ``InputError`` for a step or period that occurs more than ``MOST_STEPS`` times in a run."""
     if stop > MOST_STEPS * step:
         raise InputError(
             f"{name} is {step:g} s, and the stop time {stop:g} s: {stop / step:.0e} steps",
@@ -199,7 +199,7 @@ def _countable(name: str, step: float, stop: float, where: str) -> None:
 
 
 def _finite(value: object) -> float | None:
-    """The number that was given; of anything else, truth values and texts among it, none."""
+    """The value as a number; ``None`` for anything else, also for Booleans, texts and non-finite numbers."""
     if isinstance(value, bool) or not isinstance(value, Real):
         return None
     number = float(value)
@@ -219,7 +219,7 @@ def _choose(system: CompiledSystem, options: SimulationOptions) -> tuple[Tableau
     automatic = options.solver.casefold() == "auto"
     named = None if automatic else find_tableau(options.solver)
     if system.states.size == 0 and system.sizes.hybrid:
-        # Steps of no states: what they do is to go from instant to instant, and to look at guards.
+        # A step without states goes from instant to instant and evaluates the guards.
         return EULER, "none needed: the system has no continuous states, only instants are worked out"
     if system.states.size == 0:
         return None, "none needed: the system has no states, every instant is evaluated directly"
@@ -240,7 +240,7 @@ def _choose(system: CompiledSystem, options: SimulationOptions) -> tuple[Tableau
 def _sample_time(
     system: CompiledSystem, options: SimulationOptions, stop: float, fixed_step: float | None, *, logged: bool
 ) -> float:
-    """As asked; else the fixed step or its multiple that gives at most 10 000 rows; else stop / 1000."""
+    """The given sample time; else a multiple of the fixed step with at most 10 000 rows; else stop / 1000."""
     if options.sample_time is not None:
         sample_time = float(options.sample_time)
     elif fixed_step is not None and stop > 0.0:
@@ -261,10 +261,10 @@ def _sample_time(
 
 
 def parameter_vector(system: CompiledSystem, given: Mapping[str, ArrayLike] | ArrayLike | None) -> Array:
-    """The flat parameters ``(np,)``: the system's own values, changed where ``given`` names others.
+    """The flat parameters ``(np,)``: the system's values, replaced by those in ``given``.
 
-    ``given`` is a mapping from ``block.parameter`` to a value of its shape (a number fills it), or the
-    whole flat vector. Raises ``UnknownNameError`` and ``InputError``.
+    ``given`` is a mapping from ``block.parameter`` to a value of its shape (a scalar sets all entries), or
+    the whole flat vector. Raises ``UnknownNameError`` and ``InputError``.
     """
     if given is None:
         return system.parameter_values
@@ -279,14 +279,14 @@ def parameter_vector(system: CompiledSystem, given: Mapping[str, ArrayLike] | Ar
             allowed=f"({layout.size},): one number for each of {', '.join(layout.names) or 'none'}",
             fix="give a mapping by name instead",
         )
-    # An infinite limit is a value that the diagram itself may have.
+    # Infinite values are allowed if the diagram itself has them, such as infinite limits.
     return _refuse(system, p, ~np.isfinite(p) & np.isfinite(system.parameter_values))
 
 
 def changed_parameters(system: CompiledSystem, p: Array, given: Mapping[str, ArrayLike]) -> Array:
-    """A copy of the flat parameters ``(np,)`` with the values of some by ``block.parameter``.
+    """A copy of the flat parameters ``(np,)`` with new values for some, by ``block.parameter``.
 
-    Infinite ones pass, because limits may be infinite: a block knows which.
+    Infinite values are accepted, because limits may be infinite; each block checks its own parameters.
 
     Raises ``UnknownNameError`` and ``InputError``.
     """
@@ -308,7 +308,7 @@ def changed_parameters(system: CompiledSystem, p: Array, given: Mapping[str, Arr
 
 
 def _refuse(system: CompiledSystem, p: Array, bad: NDArray[np.bool_]) -> Array:
-    """``p`` itself. Raises ``InputError`` naming the first parameter with a bad number."""
+    """Return ``p``. Raises ``InputError`` that names the first parameter with an invalid number."""
     if bad.any():
         layout = system.parameters
         name = next(slot.name for slot in layout if bad[layout.ranges[slot.name]].any())

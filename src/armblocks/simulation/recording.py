@@ -27,10 +27,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class Samples:
-    """Recorded instants of a run that goes on: ``time (N,)`` s and ``signals (ny, N)``.
+    """Recorded samples of a run in progress: ``time (N,)`` s and ``signals (ny, N)``.
 
-    ``begin`` is the number of the first, ``end`` that of the one which comes next. ``samples["block/port"]``
-    is ``(N, *shape)``.
+    ``begin`` is the number of the first sample, ``end`` that of the next sample after them.
+    ``samples["block/port"]`` is ``(N, *shape)``.
     """
 
     begin: int
@@ -41,7 +41,7 @@ class Samples:
 
     @property
     def end(self) -> int:
-        """Number of the instant after these."""
+        """Number of the next sample after these."""
         return self.begin + self.time.size
 
     def __getitem__(self, name: str) -> Array:
@@ -52,9 +52,9 @@ class Samples:
 
 @dataclass(frozen=True, kw_only=True)
 class Recorded:
-    """Instants that are good: ``time (N,)`` s, ``states (N, nx)`` and ``signals (ny, N)``.
+    """Samples with finite signals: ``time (N,)`` s, ``states (N, nx)`` and ``signals (ny, N)``.
 
-    ``failure`` says which signal is not finite at the instant after the last of them, if one is.
+    ``failure`` is the error for the next sample if one of its signals is not finite.
     """
 
     time: Array
@@ -64,19 +64,19 @@ class Recorded:
 
 
 class Recording:
-    """The stretches of a run, and the file that a logged one is written to while it goes on."""
+    """The parts of a run with constant parameters, and the log file of a logged run."""
 
     def __init__(
         self, compiled: CompiledSystem, instants: Instants, log: LogRequest | None, layout: Signature
     ) -> None:
-        """Raises what opening a log raises."""
+        """Raises the errors of opening a log."""
         self._compiled = compiled
         self.stretches: list[Stretch] = []
         self.window: int | None = None
-        """How many instants are held at once, in a run that is logged."""
+        """Number of samples in memory of a logged run."""
         self._log: RunLog | None = None
         if log is not None:
-            # A run without a log loads no writers.
+            # Imported only for runs with a log, because the file writers load slowly.
             from armblocks.simulation.run_log import RunLog, window_rows
 
             states = compiled.states.size
@@ -85,32 +85,33 @@ class Recording:
 
     @property
     def recorded(self) -> int:
-        """How many instants are recorded so far."""
+        """Number of samples recorded so far."""
         return self.stretches[-1].recorded if self.stretches else 0
 
     @property
     def integrations(self) -> list[Integration]:
-        """The native loops, one for each stretch of a system that has states."""
+        """The native loops, one for each part of a run that is integrated."""
         return [part.integration for part in self.stretches if part.integration is not None]
 
     @property
     def file(self) -> LoggedFile | None:
-        """What is in the log, if there is one."""
+        """The log file with its number of rows, or None."""
         return None if self._log is None else LoggedFile(path=self._log.path, rows=self._log.rows)
 
     @property
     def consumer(self) -> Consumer | None:
-        """Takes full windows of a logged run; raises ``SimulationError`` where a signal is not finite."""
+        """The function that writes full windows of a logged run. It raises ``SimulationError`` if a signal is
+        not finite."""
         return None if self._log is None else self._write
 
     def hand_over(self) -> None:
-        """What the last stretch still holds goes into the log. Raises as the :attr:`consumer`."""
+        """Write the remaining samples of the last part to the log. Raises as the :attr:`consumer`."""
         if self._log is not None and self.stretches:
             self.stretches[-1].settle()
             self._write(self.stretches[-1].rows())
 
     def samples(self, begin: int) -> Samples:
-        """Signals at the instants from number ``begin`` on, as far as they are held."""
+        """Signals of the samples from number ``begin`` on that are in memory."""
         parts, compiled = self._rows(begin), self._compiled
         nothing = np.empty((compiled.signals_layout.size, 0))
         return Samples(
@@ -122,7 +123,7 @@ class Recording:
         )
 
     def good(self) -> Recorded:
-        """All that is recorded up to the first signal that is not finite; of a logged run, the view of it."""
+        """All samples before the first signal that is not finite; of a logged run, the view in memory."""
         compiled = self._compiled
         if self._log is not None:
             time, states, signals = self._log.view(compiled.signals_layout.size)
@@ -142,7 +143,7 @@ class Recording:
         return self._rows(0)
 
     def finish(self, result: SimulationResult) -> None:
-        """Complete the file of a logged run, with how the run went."""
+        """Complete the file of a logged run with the description of the run."""
         if self._log is not None:
             self._log.finish(result)
 
@@ -150,7 +151,7 @@ class Recording:
         return [rows for rows in (part.rows(begin) for part in self.stretches) if rows.time.size]
 
     def _write(self, rows: Rows) -> None:
-        """A window goes into the log; rows that are there already, after an interruption, are left out."""
+        """Write a window to the log, without the rows that were written before an interruption."""
         assert self._log is not None
         rows = rows.after(self._log.rows)
         if not rows.time.size:
@@ -164,5 +165,5 @@ class Recording:
 
 
 def _joined(parts: Sequence[Array], axis: int = 0) -> Array:
-    """One array; without a copy where there is one part."""
+    """The concatenated parts; a single part is not copied."""
     return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=axis)

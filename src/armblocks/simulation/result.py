@@ -31,7 +31,7 @@ class SimulationResult(RunData):
     def save(self, path: str | PathLike[str]) -> None:
         """Write a file by its suffix: ``.csv``, ``.parquet``, ``.npz`` or ``.mat``; atomically.
 
-        Raises ``UnknownNameError`` for another suffix and ``FormatError`` where the file cannot be written.
+        Raises ``UnknownNameError`` for another suffix and ``FormatError`` if the file cannot be written.
         """
         save(self, path)
 

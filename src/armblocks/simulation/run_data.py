@@ -26,7 +26,7 @@ def element_names(slot: Slot) -> tuple[str, ...]:
 
 
 def signal_path(name: str, layout: Signature, aliases: Mapping[str, str], where: str) -> str:
-    """The path of a signal that may be called by another name. Raises ``UnknownNameError``."""
+    """The path of a signal, which ``name`` may denote by an alias. Raises ``UnknownNameError``."""
     if name in layout.ranges:
         return name
     if name in aliases:
@@ -64,7 +64,7 @@ class RunReport:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ParameterChange:
-    """Tunable parameters, ``block.parameter``, that got other ``values`` at a ``time`` (s) of the run."""
+    """A change of tunable parameters, ``block.parameter``, to new ``values`` at a ``time`` (s) of the run."""
 
     time: float
     values: Mapping[str, Array]
@@ -110,16 +110,16 @@ class RunData:
 
     @property
     def units(self) -> Mapping[str, str]:
-        """SI unit of every signal, ``""`` where it has none."""
+        """SI unit of every signal, ``""`` if it has none."""
         return {slot.name: slot.unit for slot in self.signals_layout}
 
     @property
     def parameters(self) -> Mapping[str, Array]:
-        """Every tunable parameter, ``block.parameter``, as the run used it."""
+        """The value of every tunable parameter, ``block.parameter``, in the run."""
         return self.parameters_layout.unpack(self.parameter_values)
 
     def resolve(self, name: str) -> str:
-        """The signal's path: ``name`` itself, a block with one output, or an input port and what drives it.
+        """The path of a signal. ``name`` is a path, a block with one output, or an input port that it drives.
 
         Raises ``UnknownNameError`` with the nearest name.
         """
@@ -134,7 +134,7 @@ class RunData:
         return name in self.signals_layout.ranges or name in self.aliases
 
     def only(self, names: Mapping[str, str], rows: slice = slice(None)) -> Self:
-        """The result with some signals alone, ``{new name: path}``, and some of the instants.
+        """The result with only some signals, ``{new name: path}``, and only some samples.
 
         Raises ``UnknownNameError`` for a path that does not exist.
         """

@@ -24,21 +24,22 @@ from armblocks.simulation.run_data import element_names, signal_path
 Array = NDArray[np.float64]
 
 VIEW_ROWS = 20_000
-"""Rows of the view, roughly: some for each pixel of a figure."""
+"""Approximate number of rows of the view: several for each pixel of a figure."""
 WINDOW_NUMBERS = 2_000_000
-"""Doubles of the window, 16 MB."""
+"""Number of doubles of the window, 16 MB."""
 
 
 def window_rows(width: int) -> int:
-    """How many instants of so many numbers are held at once."""
+    """Number of samples with ``width`` numbers each that are kept in memory."""
     return max(256, min(65_536, WINDOW_NUMBERS // width))
 
 
 class View:
-    """Rows of a growing table that show all of its extremes. A row is one column of ``append``'s argument."""
+    """Selected rows of a growing table that include all extremes. A row is a column of ``append``'s
+    argument."""
 
     def __init__(self, total: int, watched: Sequence[int]) -> None:
-        """``total`` rows are to come; the extremes of the ``watched`` quantities are kept."""
+        """``total`` is the number of rows to expect; the extremes of the ``watched`` quantities are kept."""
         self._watched = list(watched)
         self._length = max(1, math.ceil(total * (1 + 2 * len(self._watched)) / VIEW_ROWS))
         self._kept: list[Array] = []
@@ -57,7 +58,7 @@ class View:
                 self._flush()
 
     def rows(self) -> Array:
-        """What is kept, ``(quantities, rows)``."""
+        """The selected rows, ``(quantities, rows)``."""
         parts = [*self._kept, *self._pending]
         return np.concatenate(parts, axis=1) if parts else np.empty((0, 0))
 
@@ -75,12 +76,13 @@ class View:
 
 
 class RunLog:
-    """The file and the view of one run. Writing goes on beside the run, in a thread of its own."""
+    """The file and the view of one run. A separate thread writes the file during the run."""
 
     def __init__(
         self, request: LogRequest, layout: Signature, aliases: Mapping[str, str], states: int, instants: int
     ) -> None:
-        """Raises ``UnknownNameError`` for signals and file types, ``FormatError`` for places."""
+        """Raises ``UnknownNameError`` for unknown signals and file types, ``FormatError`` for a path that
+        cannot be written."""
         names = [signal_path(name, layout, aliases, "log") for name in request.signals] or list(layout.names)
         self.path = request.path
         self.rows = 0
@@ -94,9 +96,10 @@ class RunLog:
         self._writing: Future[None] | None = None
 
     def append(self, time: Array, states: Array, signals: Array) -> None:
-        """More instants: ``time (N,)``, ``states (N, nx)``, ``signals (ny, N)``, which are not changed later.
+        """Add samples: ``time (N,)``, ``states (N, nx)``, ``signals (ny, N)``. The caller must not change
+        them later.
 
-        Raises ``FormatError`` where what came before could not be written.
+        Raises ``FormatError`` if earlier samples could not be written.
         """
         self._wait()
         self.rows += time.size
@@ -111,7 +114,7 @@ class RunLog:
         return rows[0], np.ascontiguousarray(rows[1:first].T), rows[first:]
 
     def finish(self, result: SimulationResult) -> None:
-        """Complete the file, with how the run went."""
+        """Complete the file with the description of the run."""
         try:
             self._wait()
             self._file.finish(description_of(result))

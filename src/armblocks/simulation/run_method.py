@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 class RunMethod:
-    """Makes the native loops of a run, and says which they are and why."""
+    """Creates the native loops of a run, and reports the methods and the reasons for them."""
 
     def __init__(
         self,
@@ -41,24 +41,26 @@ class RunMethod:
         self.solver = plan.solver
         """The method's name, or the names of all that were used."""
         self.settings = ""
-        """Method and numbers, which tell whether a checkpoint can be gone on with."""
+        """Method and numbers that must be equal for a run to continue from a checkpoint."""
         self.checkpoint: Checkpoint | None = None
-        """One from before the last loop, where it belongs to a stretch that this loop goes on with."""
+        """The checkpoint of the loop before a change of the method, which belongs to the same part of the
+        run."""
         started = perf_counter()
         compiled.prepare(plan.tableau)
         self.preparation_time = perf_counter() - started
-        """What making native loops has taken, s."""
+        """Time for creating native loops, s."""
 
     @property
     def reason(self) -> str:
-        """Why this method, where another took over, and where the run came from."""
+        """The reason for the method, the times at which the method changed, and the start of the run."""
         return self._reason + self._resumption
 
     def begin(self, p: Array, instants: Array, before: Integration | None) -> Integration | None:
-        """A loop for parameters ``p`` that records these instants first; none where nothing is integrated.
+        """A loop for parameters ``p`` that records first at ``instants``; None for a system without
+        integration.
 
-        It starts where the loop ``before`` stands, else from the initial state, else from initial values.
-        Raises ``SimulationError`` for initial values that are not finite.
+        It starts at the present point of the loop ``before``, else from the initial state, else from the
+        initial values. Raises ``SimulationError`` for initial values that are not finite.
         """
         if self._tableau is None:
             return None
@@ -87,12 +89,12 @@ class RunMethod:
             checkpoint=checkpoint,
             watch_stiffness=plan.stiff is not None,
             stop=plan.instants.stop,
-            # Not the stop time: what a shorter run ends with is the same to the bit.
+            # Independent of the stop time, so that a shorter run has bitwise the same samples.
             span=DEFAULT_INSTANTS * plan.instants.sample_time,
         )
 
     def change(self, integration: Integration) -> Integration:
-        """The run goes on by the other method of the two, from where it stands."""
+        """Continue the run with the other of the two methods, from the present point."""
         first, stiff = self._plan.tableau, self._plan.stiff
         assert first is not None and stiff is not None
         following = first if self._tableau is stiff else stiff
@@ -113,7 +115,7 @@ class RunMethod:
         return native.take_over(integration)
 
     def _resumed(self, state: RunState) -> tuple[RunPoint, Checkpoint | None]:
-        """Where another run ended, and its checkpoint where this run's settings are the same."""
+        """The end point of another run, and its checkpoint if the settings of this run are the same."""
         stiff = self._plan.stiff
         checkpoint = state.checkpoint if state.settings == self.settings else None
         if stiff is not None and checkpoint is not None and checkpoint.method == stiff.name:
@@ -132,7 +134,7 @@ class RunMethod:
         return start, checkpoint
 
     def _prepared(self, tableau: Tableau) -> NativeIntegrator:
-        """The native loop of a method; the time to make it counts as preparation."""
+        """The native loop of a method; the time to create it counts as preparation."""
         started = perf_counter()
         native = self._compiled.integrator(tableau)
         self.preparation_time += perf_counter() - started
@@ -140,7 +142,7 @@ class RunMethod:
 
 
 def _starting_point(compiled: CompiledSystem, p: Array) -> RunPoint:
-    """The initial values. Raises ``SimulationError`` naming the first variable that is not finite."""
+    """The initial values. Raises ``SimulationError`` that names the first variable that is not finite."""
     start = RunPoint(
         time=0.0,
         x=compiled.initial_states(p),

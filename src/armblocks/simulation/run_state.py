@@ -1,10 +1,10 @@
 """The state of a run, from which another run continues, in memory or as a file.
 
-A run that ends at a given time has to shorten its last step; a longer run would not. Besides the values at
-the end, a state therefore holds the native loop's arrays from before that last step. A run that continues
-with the same solver, settings and parameters repeats the step with its natural length, so that its samples
-are identical to those of the uninterrupted run. With other settings or parameters, or changed values, a run
-restarts from the values at ``time``.
+A run that ends at a given time must shorten its last step, which a longer run would not do. Besides the
+values at the end, a state therefore contains the arrays of the native loop before that last step. A run that
+continues with the same solver, settings and parameters repeats the step with its natural length, so that its
+samples are identical to those of the uninterrupted run. With other settings or parameters, or changed values,
+a run restarts from the values at ``time``.
 """
 
 from __future__ import annotations
@@ -38,7 +38,8 @@ class RunState:
     """State of a run of system ``name`` at ``time`` (s), after the ticks and events of that instant.
 
     ``states (nx,)``, ``discrete (nz,)`` and ``algebraic (nw,)`` are flat, ``names`` the slots of each.
-    ``settings`` says with which method and numbers ``checkpoint`` can be gone on with; both are the engine's.
+    ``settings`` are the method and the numbers with which a run can continue from ``checkpoint``. Both are
+    internal data of the integrator.
     """
 
     name: str
@@ -50,10 +51,11 @@ class RunState:
     settings: str = ""
     checkpoint: Checkpoint | None = None
     past: Array = field(default_factory=lambda: np.empty(0))
-    """What delayed signals were, as the engine keeps it; empty: what they begin with, all the time before."""
+    """The history of delayed signals in the integrator's form. Empty: they had their initial values
+    before."""
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write a file of NumPy's ``.npz`` format, all of it or nothing. Raises ``FormatError``."""
+        """Write a file of NumPy's ``.npz`` format, atomically. Raises ``FormatError``."""
         description = {
             "format": FORMAT,
             "name": self.name,
@@ -77,7 +79,7 @@ class RunState:
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> RunState:
-        """Inverse of :meth:`save`, to the bit. Raises ``FormatError`` for any other file."""
+        """Inverse of :meth:`save`, bitwise exact. Raises ``FormatError`` for any other file."""
         data = read_bounded(Path(path), LARGEST_FILE)
         try:
             with np.load(io.BytesIO(data), allow_pickle=False) as stored:
@@ -122,7 +124,8 @@ def slot_names(system: CompiledSystem) -> tuple[tuple[str, ...], tuple[str, ...]
 
 
 def check_state(system: CompiledSystem, state: RunState) -> None:
-    """Raise ``InputError`` where a state does not fit a system: other variables, sizes, or not numbers."""
+    """Raise ``InputError`` if a state does not fit a system: other variables or sizes, or values not
+    finite."""
     layouts: tuple[Signature, ...] = (system.states, system.discrete, system.algebraic)
     for layout, names, values in zip(layouts, state.names, (state.states, state.discrete, state.algebraic)):
         other = sorted(set(layout.names) ^ set(names))
@@ -143,7 +146,7 @@ def check_state(system: CompiledSystem, state: RunState) -> None:
 
 
 def settings_text(key: tuple[str, ...], numbers: tuple[float, ...], p: Array) -> str:
-    """What must be the same for two runs to take the same steps, as text."""
+    """The settings that must be equal for two runs to take the same steps, as text."""
     import hashlib
 
     content = repr((key, [float(number).hex() for number in numbers], p.tobytes()))

@@ -138,11 +138,11 @@ class Simulation:
 
         The first of these limits applies; without limits the run continues to its end. Steps are not
         shortened, so the reached time may exceed ``until`` by part of a step; the samples are the same as
-        without the pause. ``exactly`` ends a step at ``until`` and starts anew there, as at a jump of a
-        source.
+        without the pause. ``exactly`` ends a step at ``until`` and restarts the integration there, as at a
+        jump of a source.
 
-        Raises ``SimulationError``, with all that is good so far as its ``partial``, where the run cannot go
-        on. Ctrl-C leaves by ``KeyboardInterrupt``; nothing is lost, and the run can go on.
+        Raises ``SimulationError`` if the run cannot continue; its ``partial`` has the valid samples. Ctrl-C
+        raises ``KeyboardInterrupt``; no samples are lost, and the run can continue.
         """
         if self.finished:
             return
@@ -177,8 +177,8 @@ class Simulation:
             taken = stretch.taken - taken
             left -= taken
             if taken < chunk and not stretch.wants_other:
-                break  # at the pause, or at the end
-            # Twice as many steps at most: a chunk never outgrows what the last one took by much.
+                break  # the pause or the end is reached
+            # At most twice as many steps as before, so that the time of a chunk grows gradually.
             growth = min(2.0, min(CHUNK_SECONDS, budget) / max(now - started, 1e-6))
             self._chunk = max(100, int(taken * growth))
             if now >= deadline:
@@ -197,7 +197,7 @@ class Simulation:
         self._note(ended)
 
     def _chunk_of(self, stretch: Stretch) -> int:
-        """How many steps to take at once: with a window, about as many as fill half of it at most."""
+        """Number of steps of the next chunk; with a window, at most about as many as fill half of it."""
         if stretch.window is None:
             return self._chunk
         recorded = max(1, stretch.recorded - stretch.first)
@@ -206,8 +206,8 @@ class Simulation:
     def set(self, parameters: Mapping[str, ArrayLike]) -> None:
         """Change tunable parameters, ``block.parameter``, from the present time on.
 
-        Nothing is compiled. The run starts anew from its values there, exactly as another run would from
-        its :meth:`state`, with the breakpoints that follow from the new values.
+        Nothing is compiled. The integration restarts from the present values, exactly as another run from
+        :meth:`state` would start, with the breakpoints of the new parameter values.
 
         Raises ``UnknownNameError`` and ``InputError``.
         """
@@ -223,7 +223,7 @@ class Simulation:
             return
         self._p = p
         if self._stretches and self._stretches[-1].recorded == 0:
-            self._stretches.pop()  # not even the start has happened: begin with the new values
+            self._stretches.pop()  # the run has not started: begin with the new values
         if self._stretches:
             self._changed = True
             values = {name: np.asarray(value, dtype=np.float64) for name, value in parameters.items()}
@@ -238,7 +238,7 @@ class Simulation:
     # Results.
 
     def samples(self, begin: int = 0) -> Samples:
-        """Signals at the recorded instants from number ``begin`` on."""
+        """Signals of the recorded samples from number ``begin`` on."""
         return self._recording.samples(begin)
 
     def state(self) -> RunState:
@@ -252,7 +252,7 @@ class Simulation:
             point = integration.point
             checkpoint = self._method.checkpoint or integration.checkpoint
             if checkpoint is None and integration.status is Status.PAUSED:
-                checkpoint = integration.now()  # stopped between two steps: the next one goes on from here
+                checkpoint = integration.now()  # paused between two steps: the next run continues here
         return RunState(
             name=compiled.name,
             time=point.time,
@@ -268,7 +268,7 @@ class Simulation:
     def result(self) -> SimulationResult:
         """The samples recorded so far, with the statistics of the run.
 
-        Raises ``SimulationError``, with the good part as its ``partial``, where a signal is not finite.
+        Raises ``SimulationError`` if a signal is not finite; its ``partial`` has the valid samples.
         """
         if self._failure is not None:
             raise self._failure
@@ -280,14 +280,14 @@ class Simulation:
             raise self._failure
         return result
 
-    # Behind it.
+    # Internal.
 
     @property
     def _stretches(self) -> list[Stretch]:
         return self._recording.stretches
 
     def _current(self) -> Stretch:
-        """The present stretch, created at the start and after a change of parameters."""
+        """The present part of the run, created at the start and after a change of parameters."""
         if self._stretches and not self._changed:
             return self._stretches[-1]
         instants, begin, window = self._plan.instants, self.recorded, self._recording.window

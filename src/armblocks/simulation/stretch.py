@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class Rows:
-    """Recorded instants number ``begin`` and on: ``time (N,)`` s, ``states (N, nx)``, and so on."""
+    """Recorded samples from number ``begin`` on: ``time (N,)`` s, ``states (N, nx)``, and so on."""
 
     begin: int
     time: Array
@@ -29,7 +29,7 @@ class Rows:
     p: Array
 
     def after(self, number: int) -> Rows:
-        """Those from instant ``number`` on."""
+        """The samples from ``number`` on."""
         skip = max(0, number - self.begin)
         parts = (self.time, self.states, self.discrete, self.algebraic)
         time, states, discrete, algebraic = (part[skip:] for part in parts)
@@ -37,7 +37,7 @@ class Rows:
         return Rows(begin=begin, time=time, states=states, discrete=discrete, algebraic=algebraic, p=self.p)
 
     def signals(self, compiled: CompiledSystem) -> Array:
-        """All signals at these instants, ``(ny, N)``."""
+        """All signals of these samples, ``(ny, N)``."""
         return compiled.evaluate_signals(self.time, self.states, self.discrete, self.algebraic, self.p)
 
 
@@ -45,11 +45,11 @@ Consumer = Callable[[Rows], None]
 
 
 class Stretch:
-    """Records the instants of a run from number ``begin`` on, integrated or, without states, just told.
+    """Records the samples of a run from number ``begin`` on; without states there is no integration.
 
-    With a ``window`` only so many are held at once: they are handed to a consumer before the next ones take
-    their place. Which step records an instant depends on nothing but its time, so a chunk of steps that has
-    more instants to record than fit is simply repeated for those that did not.
+    With a ``window`` only that number of samples is in memory. A consumer receives them before the next ones
+    replace them. Which step records a sample depends only on its time. A chunk of steps with more samples
+    than fit into the window is therefore repeated for the remaining ones.
     """
 
     def __init__(
@@ -58,9 +58,9 @@ class Stretch:
         self.p = p
         self.integration = integration
         self.first = begin
-        """Number of its first instant."""
+        """Number of the first sample of this part."""
         self.begin = begin
-        """Number of the first one that is held."""
+        """Number of the first sample in memory."""
         self.window = window
         self._instants = instants
         self._time = first_window(instants, begin, window)
@@ -69,22 +69,22 @@ class Stretch:
 
     @property
     def held(self) -> int:
-        """How many recorded instants are held."""
+        """Number of recorded samples in memory."""
         return self._position if self.integration is None else self.integration.recorded
 
     @property
     def recorded(self) -> int:
-        """Number of the first instant that is not recorded yet."""
+        """Number of the first sample that is not recorded yet."""
         return self.begin + self.held
 
     @property
     def taken(self) -> int:
-        """Steps that are done; the instants of a run that integrates nothing."""
+        """Number of accepted steps; without integration, the number of recorded samples."""
         return self.recorded if self.integration is None else self.integration.accepted
 
     @property
     def time(self) -> float:
-        """Time that is reached, s."""
+        """Present time of the run, s."""
         if self.integration is not None:
             return self.integration.time
         last = max(0, self.recorded - 1)
@@ -92,18 +92,18 @@ class Stretch:
 
     @property
     def status(self) -> Status:
-        """Whether it goes on."""
+        """Whether the run is paused or has ended, and why."""
         if self.integration is not None:
             return self.integration.status
         return Status.DONE if self.recorded == self._instants.count else Status.PAUSED
 
     @property
     def wants_other(self) -> bool:
-        """Whether another method would go on better."""
+        """Whether another method is faster from here on."""
         return self.integration is not None and self.integration.wants_other
 
     def rows(self, begin: int | None = None) -> Rows:
-        """What is held from instant number ``begin`` on: views."""
+        """The samples in memory from number ``begin`` on, as views."""
         start = 0 if begin is None else min(self.held, max(0, begin - self.begin))
         held, run = self.held, self.integration
         nothing = np.empty((held, 0))
@@ -111,7 +111,7 @@ class Stretch:
         states, discrete, algebraic = (part[start:held] for part in parts)
         return Rows(
             begin=self.begin + start,
-            # The loop's own: a block that ends the run puts the instant at which it did there.
+            # The times of the loop, because a block that ends the run adds the time of the end to them.
             time=(self._time if run is None else run.course[1])[start:held],
             states=states,
             discrete=discrete,
@@ -120,7 +120,7 @@ class Stretch:
         )
 
     def advance(self, steps: int, pause: float, consume: Consumer | None) -> None:
-        """Take at most ``steps`` steps, none beginning at ``pause`` (s) or later; hand over full windows."""
+        """Take at most ``steps`` steps that begin before ``pause`` (s); pass full windows to ``consume``."""
         if consume is None:
             self._go(steps, pause)
             return
@@ -140,7 +140,8 @@ class Stretch:
             self._hold(self.recorded)
 
     def settle(self) -> None:
-        """After an interruption amid a chunk: stand where the chunk began, nothing lost and nothing twice."""
+        """After an interruption within a chunk: return to the start of the chunk, so that it can be
+        repeated."""
         if self._repeat is None or self.integration is None:
             return
         begin, before = self._repeat
@@ -150,7 +151,7 @@ class Stretch:
         self._repeat = None
 
     def _hold(self, begin: int) -> None:
-        """Make room for the instants from number ``begin`` on."""
+        """Make room for the samples from number ``begin`` on."""
         self._time = first_window(self._instants, begin, self.window)
         self.begin = begin
         self._position = 0
@@ -161,11 +162,11 @@ class Stretch:
         if self.integration is not None:
             self.integration.advance(steps, pause)
             return
-        # An instant is the step of a system without states; it is at `pause` that the last one is told.
+        # Without states each sample counts as a step, and the last one is at `pause`.
         until = max(0, self._instants.up_to(pause) - self.begin)
         self._position = min(self._time.size, self._position + steps, max(until, self._position))
 
 
 def first_window(instants: Instants, begin: int, window: int | None) -> Array:
-    """The instants that are held first, s."""
+    """The sample times of the first window, s."""
     return instants.part(begin, min(instants.count, begin + (window or sys.maxsize)))

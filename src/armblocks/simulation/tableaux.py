@@ -15,7 +15,7 @@ from armblocks.simulation.methods.runge_kutta import RK45
 
 
 def _place(tableau: Tableau) -> tuple[bool, bool, int]:
-    """Explicit methods first, of these the fixed-step ones, and each kind by rising order."""
+    """Sort key: explicit methods first, fixed-step before adaptive ones, then by ascending order."""
     return isinstance(tableau, RosenbrockTableau), tableau.adaptive, tableau.order
 
 
@@ -25,10 +25,10 @@ TABLEAUX: tuple[Tableau, ...] = tuple(
 """All integrators: the explicit ones, then those for stiff systems."""
 
 DEFAULT = RK45
-"""What ``auto`` begins with where a system has states."""
+"""The method with which ``auto`` begins for a system with states."""
 
 STIFF = RODAS5P
-"""What ``auto`` goes on with where the system turns out to be stiff."""
+"""The method with which ``auto`` continues if the system is stiff."""
 
 _BY_NAME = {name.casefold(): tableau for tableau in TABLEAUX for name in (tableau.name, *tableau.aliases)}
 

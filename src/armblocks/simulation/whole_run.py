@@ -29,34 +29,35 @@ def simulate(
 ) -> SimulationResult:
     """Run ``compiled`` from 0 to ``options.stop_time`` and record its signals.
 
-    With an ``initial_state``, another run's ``final_state``, it goes on from there to ``stop_time``: bit for
-    bit as if that run had not ended, if solver, settings and parameters are the same, else started anew from
-    its values; ``run.reason`` says which.
+    With an ``initial_state`` (the ``final_state`` of another run) the run continues from there to
+    ``stop_time``. If solver, settings and parameters are the same, the result is bitwise that of one
+    uninterrupted run, else the integration restarts from the values of the state; ``run.reason`` tells which.
 
-    ``parameters`` changes tunable ones: a mapping from ``block.parameter``, or the flat vector ``(np,)``.
-    ``progress(time, fraction, real_time_factor)`` is called at most some 16 times a second and at the end.
+    ``parameters`` changes tunable parameters: a mapping from ``block.parameter``, or the flat vector
+    ``(np,)``. ``progress(time, fraction, real_time_factor)`` is called at most about 16 times a second, and
+    at the end.
 
-    With ``solver="auto"`` a system without states is evaluated directly at all instants. Any other is
-    integrated by RK4 where ``step`` is given, else by Dormand-Prince 5(4), until stability and not accuracy
-    has held its steps short some thousand times: then Rodas5P goes on. Without a ``sample_time`` the stop
-    time is cut into 1000 (10 s in steps of 10 ms); with a fixed step, every step is recorded, or as many of
-    them as give at most 10 000 rows.
+    With ``solver="auto"`` a system without states is evaluated directly at all sample times. Other systems
+    are integrated with RK4 if ``step`` is given, else with Dormand-Prince 5(4). When stability, not accuracy,
+    has limited some thousand of its steps, Rodas5P takes over. Without a ``sample_time`` the stop time is
+    divided into 1000 intervals (10 s into intervals of 10 ms). With a fixed step every step is recorded, or
+    every n-th step so that there are at most 10 000 rows.
 
-    With a ``log`` the signals go to a file while the run goes on, memory stays flat however long it is, and
-    the result holds the rows that show all extremes.
+    With a ``log`` the signals are written to a file during the run. The memory does not grow with the length
+    of the run, and the result has those rows that include all extremes.
 
-    Ctrl-C ends the run early: what is there is returned, with ``run.complete`` false.
+    Ctrl-C ends the run early: the result so far is returned, with ``run.complete`` false.
 
-    Raises ``InputError`` and ``UnknownNameError`` for options and parameters that cannot be run, and
-    ``SimulationError`` where a signal or a derivative is not finite or the step becomes too small; its
-    ``partial`` is the result up to the last good instant.
+    Raises ``InputError`` and ``UnknownNameError`` for invalid options and parameters, and ``SimulationError``
+    if a signal or a derivative is not finite or the step becomes too small; its ``partial`` is the result up
+    to the last valid sample.
     """
     run = Simulation(compiled, options, parameters, initial_state, log)
     return run_to_the_end(run, progress)
 
 
 def run_to_the_end(run: Simulation, progress: Progress | None = None) -> SimulationResult:
-    """All that is left of a run, with its progress told; Ctrl-C ends it early."""
+    """Continue a run to its end with calls of ``progress``; Ctrl-C ends it early."""
     try:
         while not run.finished:
             run.advance(wall_time=None if progress is None else PROGRESS_SECONDS)

@@ -1,1 +1,1 @@
-"""The integrators as data, a file for each kind. Every table in a file of this folder is a solver."""
+"""The integrators as data, one file for each family. Every tableau in a file of this folder is a solver."""

@@ -1,4 +1,4 @@
-"""The numbers of DOP853: twelve stages, order 8, with a dense output of order 7.
+"""The coefficients of DOP853: twelve stages, order 8, with a dense output of order 7.
 
 Source: Hairer, Norsett, Wanner, *Solving Ordinary Differential Equations I*, 2nd edition, II.5 and II.6, and
 their program ``dop853.f`` (constants to 30 digits, here as the nearest doubles). ``DENSE`` is that program's

@@ -1,7 +1,7 @@
 """The explicit Runge-Kutta methods as data.
 
-A fixed-step method up to order 4 gets the cubic Hermite polynomial between its steps, which keeps its order;
-``rk5`` keeps its own order there with Dormand and Prince's dense output.
+The dense output of fixed-step methods up to order 4 is the cubic Hermite polynomial, which has their order.
+``rk5`` has the dense output of Dormand and Prince.
 """
 
 from __future__ import annotations
