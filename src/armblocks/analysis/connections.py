@@ -31,14 +31,14 @@ def _refuse_sizes(what: str, found: object, wanted: object) -> InputError:
 
 
 def _states(first: StateSpaceModel, second: StateSpaceModel) -> dict[str, tuple[str, ...]]:
-    """All states' names, if no two are alike."""
+    """The names of all states, if they are unique."""
     names = (*first.states, *second.states)
     units = (*first.state_units, *second.state_units)
     return {"states": names if len(set(names)) == len(names) else (), "state_units": units}
 
 
 def series(second: SystemT, first: StateSpaceModel) -> SystemT:
-    """``second`` after ``first``. Raises ``InputError`` where the widths differ."""
+    """``second`` after ``first``. Raises ``InputError`` if the numbers of signals differ."""
     dt = _together(first, second)
     if second.D.shape[1] != first.D.shape[0]:
         raise _refuse_sizes("a series", f"{first.D.shape[0]} into {second.D.shape[1]}", "equal widths")
@@ -58,7 +58,7 @@ def series(second: SystemT, first: StateSpaceModel) -> SystemT:
 
 
 def parallel(first: SystemT, second: StateSpaceModel) -> SystemT:
-    """The sum of the outputs for the same inputs. Raises ``InputError`` where the widths differ."""
+    """The sum of the outputs for the same inputs. Raises ``InputError`` if the numbers of signals differ."""
     dt = _together(first, second)
     if first.D.shape != second.D.shape:
         raise _refuse_sizes("a sum", f"shapes {first.D.shape} and {second.D.shape}", "equal shapes")
@@ -78,7 +78,7 @@ def parallel(first: SystemT, second: StateSpaceModel) -> SystemT:
 def feedback(forward: SystemT, back: StateSpaceModel | float, sign: int) -> SystemT:
     """``forward`` with ``back`` (a system, or a gain for each output) in the feedback path.
 
-    Raises ``InputError`` where widths differ or the loop has no solution at all (``I - sign D D`` singular).
+    Raises ``InputError`` if the numbers of signals differ or the loop is singular (``I - sign D D``).
     """
     ny, nu = forward.D.shape
     if isinstance(back, int | float):

@@ -26,7 +26,7 @@ Places = NDArray[np.intp]
 Realisation = tuple[Array, Array, Array, float]
 
 HIGHEST_ORDER = 10
-"""Highest order of an approximation: beyond it, rounding errors of the coefficients dominate."""
+"""Highest order of an approximation. Above it, rounding errors of the coefficients dominate."""
 
 
 def pade(order: int, delay: float) -> Realisation:
@@ -53,7 +53,7 @@ def pade(order: int, delay: float) -> Realisation:
 class DeadTime:
     """The delays of a system at a point: indices of ``v`` in ``z``, delays, derivatives of ``d``.
 
-    ``names`` are those of ``v``. Only delays that some equation reads are included.
+    ``names`` are the names of ``v``. Only delays that an equation reads are included.
     """
 
     places: Places
@@ -73,7 +73,8 @@ class DeadTime:
 
 
 def dead_time(evaluated: EvaluatedSystem, point: Point, inputs: Slopes, readers: list[Slopes]) -> DeadTime:
-    """The delays that ``readers``, or a delay that these read, look at; ``inputs``: of what goes in."""
+    """The delays that ``readers`` depend on, directly or through other delays; ``inputs``: derivatives of
+    their inputs."""
     system = evaluated.system
     assert system.delays is not None
     places = np.array([*system.delays.values, *system.delays.slopes], dtype=np.intp)
@@ -105,7 +106,7 @@ class Approximated:
             own = slice(k * order, (k + 1) * order)
             P[own, own], R[own, k : k + 1], S[k : k + 1, own], W[k, k] = pade(order, delay)
         given = dead.inputs
-        # v = S q + W (G x + H u + K v), and so d.
+        # v = S q + W (G x + H u + K v); d follows from v.
         inside = np.linalg.inv(np.eye(dead.count) - W @ dead.through)
         self.by_x = inside @ np.hstack([W @ given.x, S])
         self.by_z = inside @ (W @ self._others(given.z))
@@ -136,7 +137,7 @@ class Approximated:
         )
 
     def flow(self, slopes: Slopes) -> Slopes:
-        """Those of ``[x'; q']``."""
+        """The derivatives of ``[x'; q']``."""
         own, rates = self(slopes), self.rates
         return Slopes(
             t=np.vstack([own.t, rates.t]),

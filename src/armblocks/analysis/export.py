@@ -1,4 +1,4 @@
-"""Linear systems for other programs: files, and python-control."""
+"""Export of linear systems: files, and python-control."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ FORMAT = "armblocks linear system 1"
 def to_control(system: StateSpaceModel) -> Any:
     """A ``control.StateSpace`` with the same matrices and names.
 
-    Raises ``InputError`` where python-control is not installed.
+    Raises ``InputError`` if python-control is not installed.
     """
     import importlib
 
@@ -34,7 +34,7 @@ def to_control(system: StateSpaceModel) -> Any:
         ) from None
 
     def plain(names: tuple[str, ...]) -> list[str]:
-        # python-control gives dots and brackets in names a meaning of their own.
+        # In python-control, dots and brackets in names have a special meaning.
         return [name.replace(".", "_").replace("[", "_").replace("]", "").replace(",", "_") for name in names]
 
     return control.StateSpace(
@@ -51,8 +51,8 @@ def to_control(system: StateSpaceModel) -> Any:
 
 
 def save(system: StateSpaceModel, path: str | PathLike[str]) -> None:
-    """Write a file by its suffix. Raises ``UnknownNameError`` for another suffix, ``FormatError`` where the
-    file cannot be written."""
+    """Write a file by its suffix. Raises ``UnknownNameError`` for another suffix, ``FormatError`` if the file
+    cannot be written."""
     target = Path(path)
     writers = {".json": _json, ".npz": _npz, ".mat": _mat}
     if target.suffix not in writers:
@@ -91,7 +91,7 @@ def _npz(system: StateSpaceModel) -> bytes:
 
 
 def _mat(system: StateSpaceModel) -> bytes:
-    """As MATLAB's ``ss(A, B, C, D, Ts)`` takes them."""
+    """The arguments of MATLAB's ``ss(A, B, C, D, Ts)``."""
     import numpy as np
 
     with from_extra("analysis", "MAT files"):

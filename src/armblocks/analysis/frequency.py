@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 _CHUNK = 4_000_000
-"""Numbers that one batch of linear equations may have."""
+"""Maximum number of entries of one batch of linear equations."""
 
 
 def evaluate(system: StateSpaceModel, places: Complex) -> Complex:
@@ -44,7 +44,7 @@ def evaluate(system: StateSpaceModel, places: Complex) -> Complex:
 
 
 def on_the_edge(system: StateSpaceModel, frequencies: Array) -> Complex:
-    """``j w``, or ``exp(j w dt)``."""
+    """Points on the stability boundary: ``j w``, or ``exp(j w dt)``."""
     along = (1j * frequencies).astype(np.complex128)
     return np.exp(along * system.dt) if system.is_discrete else along
 
@@ -55,11 +55,11 @@ def frequency_response(system: StateSpaceModel, frequencies: Array) -> Complex:
 
 
 def gain_and_phase(system: StateSpaceModel, frequencies: Array) -> tuple[Array, Array]:
-    """Magnitude and continuous phase in degrees, (N, ny, nu) each, at rising frequencies (rad/s).
+    """Magnitude and continuous phase in degrees, (N, ny, nu) each, at ascending frequencies (rad/s).
 
-    The phase starts at the multiple of 360 degrees that puts it next to -90 degrees for every integrator. An
-    undamped pole changes the phase by -180 degrees, an undamped zero by +180, like the limit of small
-    damping.
+    Of the phases that differ by multiples of 360 degrees, the first one is nearest to -90 degrees times the
+    number of integrators. An undamped pole changes the phase by -180 degrees, an undamped zero by +180, as in
+    the limit of small damping.
     """
     response = frequency_response(system, frequencies)
     phase = np.degrees(np.unwrap(np.angle(response), axis=0))
@@ -71,7 +71,7 @@ def gain_and_phase(system: StateSpaceModel, frequencies: Array) -> tuple[Array, 
 
 
 def _mend_phase(part: StateSpaceModel, frequencies: Array, phase: Array) -> None:
-    """Correct the phase in place where unwrapping alone is ambiguous."""
+    """Correct the phase, in place, at points where unwrapping is ambiguous."""
     integrators = 0
     for roots, way in ((poles(part), -1.0), (zeros(part), 1.0)):
         s = as_continuous(part, roots)
@@ -87,7 +87,7 @@ def _mend_phase(part: StateSpaceModel, frequencies: Array, phase: Array) -> None
 
 
 def as_continuous(system: StateSpaceModel, roots: Complex) -> Complex:
-    """The roots in rad/s: of a sampled system ``log(z) / dt``, without those at ``z = 0``."""
+    """The roots in rad/s; for a sampled system ``log(z) / dt``, without roots at ``z = 0``."""
     if not system.is_discrete:
         return roots
     return np.asarray(np.log(roots[roots != 0.0]) / system.dt, dtype=np.complex128)
@@ -99,7 +99,7 @@ def dcgain(system: StateSpaceModel) -> Array:
     result = np.empty(system.D.shape)
     for row in range(system.D.shape[0]):
         for column in range(system.D.shape[1]):
-            # An integrator on another path must not affect this one.
+            # An integrator on another path must not affect this path.
             part = minimal(system.select([system.outputs[row]], [system.inputs[column]]))
             value = float(evaluate(part, place)[0, 0, 0].real)
             if part.order and np.linalg.cond(place[0].real * np.eye(part.order) - part.A) > 1e14:
@@ -109,7 +109,8 @@ def dcgain(system: StateSpaceModel) -> Array:
 
 
 def frequency_range(system: StateSpaceModel) -> tuple[float, float]:
-    """A decade below the slowest and above the fastest corner, rad/s; to the Nyquist frequency if sampled."""
+    """From a decade below the slowest to a decade above the fastest corner frequency, rad/s; at most the
+    Nyquist frequency of a sampled system."""
     roots = np.concatenate([poles(system), zeros(system)])
     if system.is_discrete:
         roots = roots[np.abs(roots) > 1e-8]

@@ -53,8 +53,8 @@ class LinearSystem(StateSpaceModel):
         return poles(self)
 
     def zeros(self) -> Complex:
-        """Invariant zeros: where the system matrix loses rank, uncontrollable and unobservable modes among
-        them."""
+        """Invariant zeros: where the system matrix loses rank. They include uncontrollable and unobservable
+        modes."""
         return zeros(self)
 
     def damp(self) -> tuple[Mode, ...]:
@@ -62,7 +62,8 @@ class LinearSystem(StateSpaceModel):
         return modes(self)
 
     def transfer_function(self) -> TransferFunction:
-        """Zeros, poles and gain of the one output over the one input. Raises ``InputError`` for more."""
+        """Zeros, poles and gain of a system with one input and one output. Raises ``InputError`` for
+        others."""
         return transfer_function(self)
 
     # Frequency domain.
@@ -80,7 +81,7 @@ class LinearSystem(StateSpaceModel):
         return frequency_response(self, np.asarray(frequencies, dtype=np.float64))
 
     def margins(self) -> Margins:
-        """Gain, phase and delay margin of the closed loop ``1 + L`` whose open loop is this system."""
+        """Gain, phase and delay margins of the loop with negative feedback around this system."""
         return margins(self)
 
     def bandwidth(self, drop: float = 3.0) -> float:
@@ -90,7 +91,7 @@ class LinearSystem(StateSpaceModel):
     # Time domain.
 
     def step_response(self, stop_time: float | None = None, points: int = 600) -> TimeResponse[LinearSystem]:
-        """Every output after a unit step of every input, exact at its instants."""
+        """Every output after a unit step of every input, exact at the returned times."""
         return step_response(self, stop_time, points)
 
     def impulse_response(
@@ -121,11 +122,12 @@ class LinearSystem(StateSpaceModel):
         return gramians(self)
 
     def minimal(self) -> LinearSystem:
-        """The same transfer function with as few states as possible, named ``x1`` …"""
+        """A system with the same transfer function and as few states as possible, named ``x1`` …"""
         return minimal(self)
 
     def on_path(self) -> LinearSystem:
-        """Without the states that no input reaches or no output follows from; the others keep their names."""
+        """The system without states that no input affects or that affect no output; the others keep their
+        names."""
         return on_path(self)
 
     # Connections.
@@ -140,7 +142,7 @@ class LinearSystem(StateSpaceModel):
         return self + -other
 
     def __matmul__(self, other: LinearSystem) -> LinearSystem:
-        """``second @ first``: the outputs of the right one are the inputs of the left one."""
+        """``second @ first``: the outputs of the right system are the inputs of the left system."""
         return series(self, other)
 
     def feedback(self, other: LinearSystem | float = 1.0, *, sign: int = -1) -> LinearSystem:
@@ -150,7 +152,7 @@ class LinearSystem(StateSpaceModel):
     # Export.
 
     def to_control(self) -> Any:
-        """A ``StateSpace`` of python-control, which has to be installed."""
+        """A ``StateSpace`` of python-control, which must be installed."""
         return to_control(self)
 
     def save(self, path: str | PathLike[str]) -> None:

@@ -56,11 +56,11 @@ def linearise(
 ) -> LinearSystem:
     """The linear system about a point, whose implicit equations are solved there.
 
-    ``evaluated`` states the parameters that are the inputs and the signals that are the outputs; ``known``
-    is kept with the result; ``delay_order`` is that of the approximation of every dead time
-    (:mod:`armblocks.analysis.dead_time`). Raises ``SimulationError`` where a slope is not finite or the
-    implicit equations are singular, and ``InputError`` for clocks without a usable common period and for
-    dead time without an order.
+    ``evaluated`` selects the parameters that are the inputs and the signals that are the outputs. ``known``
+    is stored with the result. ``delay_order`` is the order of the approximation of every dead time
+    (:mod:`armblocks.analysis.dead_time`). Raises ``SimulationError`` if a derivative is not finite or the
+    implicit equations are singular, and ``InputError`` for clocks without a usable common period and for dead
+    time without an order.
     """
     system = evaluated.system
     unknowns = _unknowns(evaluated, point)
@@ -109,7 +109,7 @@ def linearise(
 def exact_response(evaluated: EvaluatedSystem, point: Point, ends: Ends, frequencies: Array) -> Complex:
     """The response (N, ny, nu) about a point at angular frequencies (N,) in rad/s; dead time is exact.
 
-    Raises as :func:`linearise`, and ``InputError`` for dead time in a diagram with clocks.
+    Raises the errors of :func:`linearise`, and ``InputError`` for dead time in a diagram with clocks.
     """
     system = evaluated.system
     if system.delays is None:
@@ -148,7 +148,7 @@ def exact_response(evaluated: EvaluatedSystem, point: Point, ends: Ends, frequen
 def _slopes(
     evaluated: EvaluatedSystem, point: Point, unknowns: Slopes | None, ends: Ends
 ) -> tuple[Slopes, Slopes]:
-    """Those of the flow and of the outputs, all finite."""
+    """The derivatives of the flow and of the outputs. Raises an error if one is not finite."""
     flow = _without(evaluated.derivative_slopes(point), unknowns)
     seen = _without(evaluated.signal_slopes(point), unknowns)
     _check_finite(evaluated.system, _elements(evaluated.system.states)[0], flow, "the rate of state")
@@ -163,7 +163,7 @@ def _approximated(
     readers: list[Slopes],
     order: int | None,
 ) -> Approximated | None:
-    """What stands in place of dead time, if there is any."""
+    """The approximation of the dead time, or ``None`` without dead time."""
     system = evaluated.system
     if system.delays is None:
         return None
@@ -226,7 +226,7 @@ def _unknowns(evaluated: EvaluatedSystem, point: Point) -> Slopes | None:
 
 
 def _without(slopes: Slopes, unknowns: Slopes | None) -> Slopes:
-    """Total derivatives: with the unknowns following."""
+    """Total derivatives, with the implicit unknowns eliminated."""
     if unknowns is None:
         return slopes
     return Slopes(
@@ -288,10 +288,11 @@ def _over_a_period(
 
 
 def ticks_of_a_period(system: HybridSystem) -> tuple[Fraction, list[tuple[Fraction, tuple[int, ...]]]]:
-    """The least common multiple of all periods (s), and every instant of one period with who ticks then.
+    """The least common multiple of all periods (s), and every tick time of one period with the ticking
+    clocks.
 
-    Sample times have the ratios that a run sees (:mod:`armblocks.equations.clock_ratios`). Raises
-    ``InputError`` where one period has more than ``MOST_TICKS`` ticks.
+    Sample times have the same ratios as in a run (:mod:`armblocks.equations.clock_ratios`). Raises
+    ``InputError`` if one period has more than ``MOST_TICKS`` ticks.
     """
     clocks = exact_clocks(system.clocks)
     periods = [own for own, _ in clocks]
@@ -338,8 +339,8 @@ def input_ends(system: HybridSystem, paths: Mapping[str, str]) -> tuple[list[int
 
 
 def output_ends(system: HybridSystem, wanted: Mapping[str, str]) -> tuple[list[int], Ends]:
-    """Rows of ``y``, names and units of the scalars of some signals, given as name for people to name in the
-    system; the inputs are still empty.
+    """Rows of ``y``, names and units of the scalars of some signals, given as a map from display names to
+    paths. The inputs of the result are empty.
 
     Raises ``UnknownNameError``.
     """

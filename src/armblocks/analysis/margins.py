@@ -31,14 +31,15 @@ _BISECTIONS = 90
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Margins:
-    """How far a loop ``1 + L`` is from the edge of stability.
+    """Stability margins of a loop ``1 + L``.
 
-    ``gain`` the factor (and ``gain_decibels``) by which L may grow, or where below 1 may shrink, nearest to
-    1; ``phase`` degrees; ``delay`` s; each ``inf`` where nothing of the kind makes the loop unstable. They
-    are found at ``gain_frequency``, ``phase_frequency`` and ``delay_frequency`` rad/s (``nan`` where there
-    is none). ``modulus``: the least distance of L from -1, the inverse of the peak of ``1 / (1 + L)``.
-    ``stable``: whether the closed loop is. All crossings stand in ``gain_crossings`` (frequency, factor) and
-    ``phase_crossings`` (frequency, degrees).
+    ``gain``, also as ``gain_decibels``: the factor nearest to 1 by which L may be multiplied before the loop
+    reaches the stability boundary; below 1 it is a decrease. ``phase`` in degrees, ``delay`` in s. A margin
+    is ``inf`` if no such change makes the loop unstable. ``gain_frequency``, ``phase_frequency`` and
+    ``delay_frequency`` (rad/s) are the frequencies of the margins, ``nan`` without one. ``modulus``: the
+    minimum distance of L from -1, the inverse of the peak of ``1 / (1 + L)``. ``stable``: whether the closed
+    loop is stable. ``gain_crossings`` (frequency, factor) and ``phase_crossings`` (frequency, degrees): all
+    crossings.
     """
 
     gain: float
@@ -60,7 +61,7 @@ class Margins:
 
 
 def _located(function: Callable[[float], float], low: float, high: float) -> float:
-    """The zero between two frequencies with values of opposite sign, to the last digits (bisection)."""
+    """The zero between two frequencies with values of opposite sign, by bisection to the last digits."""
     below = function(low)
     for _ in range(_BISECTIONS):
         middle = math.sqrt(low * high)
@@ -81,7 +82,7 @@ def _response_at(system: StateSpaceModel, frequency: float) -> complex:
 def margins(system: StateSpaceModel) -> Margins:
     """Margins of the loop with negative feedback around this system; see :class:`Margins`.
 
-    Crossings are sought on a grid that is closer about lightly damped modes, then located by bisection.
+    Crossings are searched on a grid that is denser around lightly damped modes, then located by bisection.
     Raises ``InputError`` for more than one input or output.
     """
     if not system.is_siso:
@@ -151,7 +152,8 @@ def _gathered(
 
 
 def _nearest_to_minus_one(loop: StateSpaceModel, grid: Array, response: Complex) -> tuple[float, float]:
-    """The least ``|1 + L|`` by golden sections between the neighbours of the nearest point of the grid."""
+    """The minimum of ``|1 + L|``, by golden-section search between the neighbours of the nearest grid
+    point."""
     k = int(np.nanargmin(np.abs(1.0 + response)))
     low, high = float(grid[max(k - 1, 0)]), float(grid[min(k + 1, len(grid) - 1)])
     ratio = (math.sqrt(5.0) - 1.0) / 2.0
@@ -166,7 +168,7 @@ def _nearest_to_minus_one(loop: StateSpaceModel, grid: Array, response: Complex)
 
 
 def bandwidth(system: StateSpaceModel, drop: float) -> float:
-    """See :meth:`LinearSystem.bandwidth`; ``inf`` where the gain never falls so far."""
+    """See :meth:`LinearSystem.bandwidth`; ``inf`` if the gain never decreases by ``drop``."""
     if not system.is_siso:
         raise InputError(
             f"the bandwidth of {system.D.shape[1]} inputs and {system.D.shape[0]} outputs is asked for",
@@ -203,13 +205,13 @@ def shown_margins(system: StateSpaceModel) -> Margins:
     loop = minimal(system)
 
     def accuracy(frequency: float) -> tuple[float, float]:
-        """Error of the response at a frequency that was sought, relative to the response; the response."""
+        """Relative error of the response at a frequency found by bisection, and the response."""
         if math.isinf(frequency):
             return EPSILON, abs(float(loop.D[0, 0]))
         place = complex(on_the_edge(loop, np.array([frequency]))[0])
         value = abs(complex(evaluate(loop, np.array([place]))[0, 0, 0]))
         error, derivative = response_errors(loop, place)
-        # The frequency itself was found to this error of the response and to its own last bits.
+        # The error of the frequency follows from this error of the response and from its own rounding.
         return (2.0 * error + 4.0 * EPSILON * frequency * derivative) / max(value, 1e-300), value
 
     gains = [(f, 1.0 if abs(k - 1.0) <= accuracy(f)[0] else k) for f, k in found.gain_crossings]

@@ -17,9 +17,9 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True, kw_only=True)
 class Mode:
-    """One pole. ``frequency`` rad/s is the natural one, ``|s|``; ``damping`` the ratio ``-Re s / |s|`` (1 for
-    a pole at rest, ``s = 0``, by custom); ``time_constant`` s of its decay, ``-1 / Re s``: infinite on the
-    imaginary axis, negative where it grows. For a discrete system ``s = log(z) / dt``."""
+    """One pole. ``frequency``: the natural frequency ``|s|``, rad/s. ``damping``: the ratio ``-Re s / |s|``,
+    1 by convention for ``s = 0``. ``time_constant``: ``-1 / Re s``, s; infinite on the imaginary axis,
+    negative for an unstable pole. For a discrete system ``s = log(z) / dt``."""
 
     pole: complex
     frequency: float
@@ -28,10 +28,10 @@ class Mode:
 
 
 def poles(system: StateSpaceModel) -> Complex:
-    """Eigenvalues of A, slowest first, conjugates side by side with the positive one first.
+    """Eigenvalues of A, slowest first; of two conjugates the one with positive imaginary part is first.
 
-    They are those of the irreducible diagonal blocks of A: a state in no loop has its eigenvalue without
-    rounding, and a fast part of a system costs a slow one no digits.
+    They are computed for each irreducible diagonal block of A. The eigenvalue of a state that is in no loop
+    is then exact, and a fast part of a system does not reduce the accuracy of a slow part.
     """
     with from_extra("analysis", "poles of a linear system"):
         from scipy.linalg import eigvals
@@ -43,7 +43,7 @@ def poles(system: StateSpaceModel) -> Complex:
 
 
 def irreducible_parts(A: Array) -> list[list[int]]:
-    """The states that act on each other, directly or through others: A is block triangular in these parts."""
+    """Groups of states that act on each other, directly or through others. A is block triangular in them."""
     with from_extra("analysis", "poles of a linear system"):
         from scipy.sparse.csgraph import connected_components
 
@@ -52,10 +52,10 @@ def irreducible_parts(A: Array) -> list[list[int]]:
 
 
 def in_order(roots: Complex, *, discrete: bool = False) -> Complex:
-    """By distance from rest, then conjugates side by side."""
+    """The roots sorted by their distance from 0 (discrete: from 1), conjugates next to each other."""
     origin = 1.0 if discrete else 0.0
     distance = np.abs(roots - origin)
-    # Conjugates have the same distance but for rounding, which must not decide who is first.
+    # Conjugates have the same distance up to rounding, which must not determine their order.
     rounded = [float(f"{value:.9e}") for value in distance.tolist()]
     real = [float(f"{value:.9e}") for value in roots.real.tolist()]
     order = sorted(range(len(roots)), key=lambda k: (rounded[k], real[k], -float(roots[k].imag)))
@@ -63,7 +63,7 @@ def in_order(roots: Complex, *, discrete: bool = False) -> Complex:
 
 
 def modes(system: StateSpaceModel) -> tuple[Mode, ...]:
-    """One for each pole, in the order of ``poles``."""
+    """A mode for each pole, in the order of ``poles``."""
     return tuple(mode_of(complex(pole), system.dt) for pole in poles(system))
 
 

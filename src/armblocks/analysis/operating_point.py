@@ -19,8 +19,8 @@ MOST_ITERATIONS = 60
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class OperatingPoint:
-    """The values of a system at ``time`` (s): states, discrete variables (modes among them), unknowns of
-    implicit equations, tunable parameters and signals, each by its path and in its shape."""
+    """The values of a system at ``time`` (s): states, discrete variables with modes, unknowns of implicit
+    equations, tunable parameters and signals, each by its path and in its shape."""
 
     name: str
     time: float
@@ -39,7 +39,7 @@ class OperatingPoint:
 
 
 def operating_point(evaluated: EvaluatedSystem, point: Point) -> OperatingPoint:
-    """A point with its signals, by name. ``evaluated`` must work out all signals."""
+    """A point with its signals, by name. ``evaluated`` must compute all signals."""
     system = evaluated.system
     return OperatingPoint(
         name=system.name,
@@ -55,7 +55,7 @@ def operating_point(evaluated: EvaluatedSystem, point: Point) -> OperatingPoint:
 def initial_point(evaluated: EvaluatedSystem, p: Array) -> Point:
     """The start of a run: after the first ticks, with consistent modes and solved implicit equations.
 
-    Raises ``SimulationError`` where those have no solution near their first guess.
+    Raises ``SimulationError`` if the implicit equations have no solution near their first guess.
     """
     system = evaluated.system
     x, z, w = evaluated.start(p)
@@ -73,8 +73,8 @@ def initial_point(evaluated: EvaluatedSystem, p: Array) -> Point:
 def placed(evaluated: EvaluatedSystem, known: OperatingPoint, parameters: Mapping[str, Array]) -> Point:
     """The same operating point in a system with more parameters, and possibly other unknowns.
 
-    ``parameters`` gives the values of those that ``known`` does not have. An unknown stands for a signal, so
-    that its value is known too, up to the last Newton step.
+    ``parameters`` are the values of the parameters that ``known`` does not have. Every unknown is the value
+    of a signal, so it is known too, up to the last Newton step.
     """
     system = evaluated.system
     guess = system.initial_algebraic(system.parameter_values)[0].copy()
@@ -97,7 +97,7 @@ def _packed(layout: Signature, values: Mapping[str, Array]) -> Array:
 
 
 def _signal_entry(signals: Mapping[str, Array], unknown: str) -> Array | None:
-    """The value of the signal that an unknown stands for: ``sum/y``, or ``sum/y[2]``."""
+    """The value of the signal that an unknown is named after: ``sum/y``, or ``sum/y[2]``."""
     if unknown in signals:
         return signals[unknown].ravel()
     path, bracket, index = unknown.rpartition("[")
@@ -107,7 +107,8 @@ def _signal_entry(signals: Mapping[str, Array], unknown: str) -> Array | None:
 
 
 def solved(evaluated: EvaluatedSystem, point: Point) -> Point:
-    """The point with ``w`` such that the implicit equations hold (Newton, halved where it does not help).
+    """The point with ``w`` that solves the implicit equations (Newton's method with halved steps where
+    needed).
 
     Raises ``SimulationError``.
     """

@@ -40,13 +40,13 @@ def staircase(A: Array, B: Array) -> tuple[Array, int]:
 
 
 def reachable_dimensions(A: Array, B: Array) -> int:
-    """Dimension of what the inputs reach; with ``A.T`` and ``C.T`` of what the outputs tell apart."""
+    """Dimension of the controllable subspace; with ``A.T`` and ``C.T``, of the observable subspace."""
     a, b, _ = balanced(A, B, np.zeros((0, A.shape[0])))
     return staircase(a, b)[1]
 
 
 def minimal(system: SystemT) -> SystemT:
-    """Without the unreachable, then without the unobservable; unchanged where nothing is to be taken off."""
+    """The system without uncontrollable and unobservable states; the same object if there are none."""
     a, b, c = balanced(system.A, system.B, system.C)
     basis, reached = staircase(a, b)
     basis = basis[:, :reached]
@@ -66,7 +66,7 @@ def minimal(system: SystemT) -> SystemT:
 
 
 def on_path(system: SystemT) -> SystemT:
-    """Keep the states on a way from some input to some output, by which entries are not zero."""
+    """Keep the states on a path from an input to an output in the graph of the nonzero matrix entries."""
     links = system.A != 0.0
 
     def spread(begin: NDArray[np.bool_], matrix: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -19,7 +19,7 @@ Complex = NDArray[np.complex128]
 
 MOST_GAINS = 3000
 FINEST = 1e-7
-"""Neighbouring gains are not brought nearer to each other than by this share."""
+"""Minimum relative distance of neighbouring gains."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -33,10 +33,11 @@ class RootLocus:
 
 
 def root_locus(system: LinearSystem, gains: Array | None = None) -> RootLocus:
-    """The branches of a loop with negative feedback; ``gains`` ``None``: from 0 on, as far as things happen.
+    """The branches of a loop with negative feedback. ``gains=None``: from 0 until the roots are near their
+    limits.
 
-    Gains lie closer where the roots move fast, so that branches are told apart where they meet. Raises
-    ``InputError`` for more than one input or output, and where there is no state.
+    Gains are denser where the roots move fast, so that branches can be distinguished where they meet. Raises
+    ``InputError`` for more than one input or output, and for a system without states.
     """
     if not system.is_siso or not system.order:
         raise InputError(
@@ -68,13 +69,13 @@ def _roots(loop: LinearSystem, gain: float) -> Complex:
         from scipy.linalg import eigvals
 
     direct = 1.0 + gain * float(loop.D[0, 0])
-    if direct == 0.0:  # at this gain alone a root is infinite
+    if direct == 0.0:  # only at this gain a root is infinite
         return _roots(loop, gain * (1.0 + FINEST))
     return eigvals(loop.A - (gain / direct) * (loop.B @ loop.C))
 
 
 def _adapted(loop: LinearSystem, zeros: Complex) -> tuple[Array, list[Complex]]:
-    """Gains up to where every root is next to a zero or out of the picture."""
+    """Gains up to the one at which every root is next to a zero or outside the figure."""
     reach = extent(loop, zeros)
     last = 1e-6 / max(float(np.abs(loop.B).max() * np.abs(loop.C).max()), 1e-12)
     for _ in range(120):
@@ -105,14 +106,14 @@ def _pairs(before: Complex, after: Complex) -> NDArray[np.intp]:
 
 
 def _moved(before: Complex, after: Complex, reach: float) -> float:
-    """The farthest that a root went which is in the picture."""
+    """The largest movement of a root that is inside the figure."""
     partners = after[_pairs(before, after)]
     seen = (np.abs(before) < 1.3 * reach) | (np.abs(partners) < 1.3 * reach)
     return float((np.abs(partners - before) * seen).max(initial=0.0))
 
 
 def _tracked(rows: list[Complex]) -> Complex:
-    """Each root in the column of its nearest predecessor, all columns considered together."""
+    """Assign the roots to columns so that the distances to the previous roots are smallest in total."""
     tracked = [rows[0]]
     for row in rows[1:]:
         tracked.append(row[_pairs(tracked[-1], row)])

@@ -13,10 +13,10 @@ MOST_SWEEPS = 30
 
 
 def balanced(A: Array, B: Array, C: Array) -> tuple[Array, Array, Array]:
-    """The same system with its states scaled by powers of two, which rounds nothing.
+    """The same system with its states scaled by powers of two, which causes no rounding errors.
 
-    For each state the norms of its column in ``[A; C]`` and of its row in ``[A, B]`` are brought together
-    (Osborne, J. ACM 7, 1960, 338-345, with inputs and outputs as in TB01ID of SLICOT).
+    For each state the norms of its column in ``[A; C]`` and of its row in ``[A, B]`` are made as equal as
+    possible (Osborne, J. ACM 7, 1960, 338-345, with inputs and outputs as in TB01ID of SLICOT).
     """
     a, b, c = A.copy(), B.copy(), C.copy()
     for _ in range(MOST_SWEEPS):

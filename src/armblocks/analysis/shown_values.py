@@ -1,14 +1,15 @@
-"""Poles, zeros, gains, margins and matrices as they are shown: rounding errors are shown as 0.
+"""Displayed values of poles, zeros, gains, margins and matrices: rounding errors are displayed as 0.
 
-A computed number near zero may be zero for all that the computation can tell. This module decides which ones
-are. What is computed and stored is not changed; text, tables and figures show what is returned here.
+The exact value of a computed number near zero may be zero. This module decides which numbers cannot be
+distinguished from zero. Computed and stored values are unchanged; text, tables and figures display the values
+of this module.
 
 An eigenvalue computed in floating point is an exact eigenvalue of a matrix ``A + E``, ``|E| <= eta``, with
 ``eta`` a small multiple of the unit roundoff times ``|A|`` (Golub and Van Loan, Matrix Computations, 4th ed.,
-7.5.6). The numbers that are so are the pseudospectrum of A: those ``mu`` with
-``sigma_min(A - mu I) <= eta`` (Trefethen and Embree, Spectra and Pseudospectra, 2005, ch. 2). A root is
-shown as 0, as real or as imaginary where the straight line from it to 0, to the real or to the imaginary axis
-stays inside the pseudospectrum: rounding alone can then move it there. This holds for multiple roots, too,
+7.5.6). The set of all such eigenvalues is the pseudospectrum of A: the numbers ``mu`` with ``sigma_min(A - mu
+I) <= eta`` (Trefethen and Embree, Spectra and Pseudospectra, 2005, ch. 2). A root is displayed as 0, as real
+or as imaginary if the straight line from it to 0, to the real or to the imaginary axis is inside the
+pseudospectrum, because rounding alone can then move the root there. This is also valid for multiple roots,
 whose rounding errors are as large as a root of ``eta``.
 """
 
@@ -33,7 +34,7 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 ROUNDOFFS = 10.0
-"""Rounding errors that every one of n rows may contribute, in units of the roundoff."""
+"""Rounding errors that each of n rows may contribute, in units of the roundoff."""
 EPSILON = float(np.finfo(np.float64).eps)
 SHARES = (1.0, 0.75, 0.5, 0.25)
 """Places on the line from a root to its candidate at which the pseudospectrum is checked."""
@@ -42,7 +43,7 @@ FAR = 100.0
 
 
 class _Pencil:
-    """The roots of ``det(M - s N)`` and how sure they are."""
+    """The roots of ``det(M - s N)`` and their uncertainty."""
 
     def __init__(self, M: Array, N: Array, tolerance: float) -> None:
         with from_extra("analysis", "poles and zeros"):
@@ -56,7 +57,7 @@ class _Pencil:
             self.reaches = FAR * tolerance * lengths / cosines
 
     def shown(self, root: complex, candidates: Sequence[complex]) -> complex:
-        """The first candidate that cannot be told from the root, else the root."""
+        """The first candidate that cannot be distinguished from the root, else the root."""
         reach = float(self.reaches[int(np.argmin(np.abs(self.known - root)))])
         for candidate in candidates:
             if candidate == root or (
@@ -67,7 +68,7 @@ class _Pencil:
         return root
 
     def _holds(self, place: complex) -> bool:
-        """Whether rounding alone makes this number a root."""
+        """Whether this number is in the pseudospectrum, so that rounding alone can make it a root."""
         sizes = np.linalg.svd(self.M - place * self.N, compute_uv=False)
         return bool(sizes[-1] <= self.tolerance)
 
@@ -111,25 +112,25 @@ def shown_zeros(system: StateSpaceModel) -> Complex:
 
 
 def shown_modes(system: StateSpaceModel) -> tuple[Mode, ...]:
-    """:meth:`LinearSystem.damp` of the poles that are shown."""
+    """:meth:`LinearSystem.damp` of the displayed poles."""
     found: list[Mode] = []
     for pole in shown_poles(system).tolist():
         mode = mode_of(complex(pole), system.dt)
         if system.is_discrete and on_edge(pole, discrete=True):
-            # On the unit circle nothing decays; log(|z|) would say so only but for rounding.
+            # On the unit circle the decay rate is exactly 0, but log(|z|) has a rounding error.
             mode = dataclasses.replace(mode, damping=0.0 if mode.frequency else 1.0, time_constant=math.inf)
         found.append(mode)
     return tuple(found)
 
 
 def on_edge(pole: complex, *, discrete: bool) -> bool:
-    """Whether a pole that is shown lies on the imaginary axis, or on the unit circle."""
+    """Whether a displayed pole is on the imaginary axis, or on the unit circle."""
     return abs(abs(pole) - 1.0) <= 2.0 * EPSILON if discrete else pole.real == 0.0
 
 
 def growth(system: StateSpaceModel) -> float:
-    """Of the poles that are shown the largest real part, or ``|z| - 1``: 0 on the edge of stability, ``-inf``
-    without poles."""
+    """The largest real part of the displayed poles, or the largest ``|z| - 1``: 0 on the stability boundary,
+    ``-inf`` without poles."""
     discrete = system.is_discrete
     rates = [
         0.0 if on_edge(pole, discrete=discrete) else (abs(pole) - 1.0 if discrete else pole.real)
@@ -139,12 +140,12 @@ def growth(system: StateSpaceModel) -> float:
 
 
 def is_stable(system: StateSpaceModel) -> bool:
-    """Whether every free motion dies away: see :attr:`LinearSystem.is_stable`."""
+    """Whether every free motion decays: see :attr:`LinearSystem.is_stable`."""
     return growth(system) < 0.0
 
 
 def response_errors(system: StateSpaceModel, place: complex) -> tuple[float, float]:
-    """Of a system with one input and one output: bound of the rounding error of its response at a complex
+    """For a system with one input and one output: a bound of the rounding error of its response at a complex
     number, and the magnitude of the derivative of the response there."""
     n = system.order
     direct = abs(float(system.D[0, 0]))
@@ -173,10 +174,10 @@ def shown_dcgain(system: StateSpaceModel) -> Array:
 
 
 def shown_matrices(system: StateSpaceModel) -> tuple[Array, Array, Array, Array]:
-    """A, B, C and D; an entry is 0 where it is a rounding error beside the others of its row and its column.
+    """A, B, C and D, with entries set to 0 that are rounding errors relative to their row and their column.
 
-    States, inputs and outputs are compared in units in which all numbers are of one size: no choice of units
-    hides an entry.
+    States, inputs and outputs are compared in units in which all numbers have similar sizes. The result does
+    therefore not depend on the units of the system.
     """
     n = system.order
     a, b, c, d = system.A, system.B, system.C, system.D

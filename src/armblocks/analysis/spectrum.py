@@ -33,8 +33,8 @@ QUANTITIES = ("amplitude", "power density")
 class SignalSpectrum:
     """``values`` (m, k) of k signals at ``frequency`` (m,) Hz, from 0 to half of ``sample_rate`` Hz.
 
-    Of ``quantity`` ``"amplitude"`` in the signal's unit, of ``"power density"`` in its square per Hz.
-    ``segments`` of ``length`` samples each were averaged.
+    For the ``quantity`` ``"amplitude"`` the unit is that of the signal, for ``"power density"`` its square
+    per Hz. The values are averages over ``segments`` segments of ``length`` samples.
     """
 
     quantity: str
@@ -56,14 +56,15 @@ def signal_spectrum(
     begin: float = 0.0,
     remove_mean: bool = True,
 ) -> SignalSpectrum:
-    """The spectrum of ``signals`` (N,) or (N, k) at instants ``time`` (N,) s that do not fall.
+    """The spectrum of ``signals`` (N,) or (N, k) at the non-decreasing times ``time`` (N,) s.
 
-    An amplitude is A = 2 |X| / sum(w), that of a sine in the middle of a line; a power density is one-sided,
-    2 |X|^2 / (rate sum(w^2)). ``averages`` segments that overlap by half are averaged (their powers).
-    ``sample_rate`` Hz, 0 for that of the median recorded step; between instants signals are straight, and at
-    a jump (an instant given twice) the later value counts. ``begin`` s: what was before is left out.
+    An amplitude is A = 2 |X| / sum(w), exact for a sine at the frequency of a line. A power density is
+    one-sided: 2 |X|^2 / (rate sum(w^2)). The powers of ``averages`` segments that overlap by half are
+    averaged. ``sample_rate`` in Hz; 0 is the rate of the median recorded step. Between samples signals are
+    interpolated linearly; at a jump, where a time occurs twice, the later value counts. Samples before
+    ``begin`` (s) are ignored.
 
-    Raises ``UnknownNameError`` for a quantity or window, ``InputError`` where too few samples are there.
+    Raises ``UnknownNameError`` for an unknown quantity or window, ``InputError`` for too few samples.
     """
     if quantity not in QUANTITIES:
         raise UnknownNameError("quantity", quantity, QUANTITIES, where="spectrum")
@@ -102,7 +103,8 @@ def signal_spectrum(
 
 
 def _evenly(time: Array, signals: ArrayLike, sample_rate: float, begin: float) -> tuple[Array, float]:
-    """Evenly spaced samples (n, k), not the one at the very end, so that whole periods close; their rate."""
+    """Evenly spaced samples (n, k) and their rate. The last sample is omitted, because after whole periods it
+    equals the first."""
     values = np.asarray(signals, dtype=np.float64).reshape(time.size, -1)
     steps = np.diff(time)
     steps = steps[steps > 0.0]

@@ -1,4 +1,4 @@
-"""The matrices of a linear system with names: the data about which the functions of this package compute."""
+"""The matrices of a linear system with names: the data of the functions of this package."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class StateSpaceModel:
 
     ``A (nx, nx)``, ``B (nx, nu)``, ``C (ny, nx)``, ``D (ny, nu)``. All quantities are small changes about the
     operating ``point``. ``states``, ``inputs`` and ``outputs`` name the scalars, with their SI units; without
-    names they are ``x1``, ``u1``, ``y1`` … Raises ``InputError`` for matrices that do not fit together or
-    hold what is not a finite number.
+    names they are ``x1``, ``u1``, ``y1`` … Raises ``InputError`` for matrices whose shapes do not fit or
+    whose entries are not finite.
     """
 
     A: Array
@@ -68,7 +68,7 @@ class StateSpaceModel:
             )
 
     def __reduce__(self) -> tuple[object, ...]:
-        # By the constructor, because pickled arrays forget that they are read-only.
+        # Unpickled by the constructor, because pickling does not preserve that arrays are read-only.
         fields = {entry.name: getattr(self, entry.name) for entry in dataclasses.fields(self)}
         return partial(type(self), **fields), ()
 
@@ -79,7 +79,7 @@ class StateSpaceModel:
 
     @property
     def is_discrete(self) -> bool:
-        """Whether the system moves in steps of ``dt``."""
+        """Whether the system is discrete, with the sample time ``dt``."""
         return self.dt > 0.0
 
     @property
@@ -90,7 +90,8 @@ class StateSpaceModel:
     def select(
         self, outputs: str | Sequence[str] | None = None, inputs: str | Sequence[str] | None = None
     ) -> Self:
-        """The same system seen through some of its ends: names, or the name of a vector for all its entries.
+        """The same system with some of its inputs and outputs, by name; a vector's name selects all its
+        entries.
 
         Raises ``UnknownNameError``.
         """
@@ -108,7 +109,7 @@ class StateSpaceModel:
         )
 
     def transformed(self, T: ArrayLike) -> Self:
-        """The same system in other states, ``x = T x_new``."""
+        """The same system in other state coordinates, ``x = T x_new``."""
         matrix = np.asarray(T, dtype=np.float64)
         return dataclasses.replace(
             self,
@@ -121,11 +122,12 @@ class StateSpaceModel:
 
 
 SystemT = TypeVar("SystemT", bound=StateSpaceModel)
-"""The class of a system that a function returns changed: what comes in is what goes out."""
+"""Type variable: functions that change a system return the class of their argument."""
 
 
 def _checked_matrices(system: StateSpaceModel) -> tuple[int, int, int]:
-    """Make the matrices fresh, two-dimensional and read-only; the counts of states, inputs and outputs."""
+    """Replace the matrices by two-dimensional read-only copies; return the numbers of states, inputs,
+    outputs."""
     for letter in "ABCD":
         matrix = np.array(getattr(system, letter), dtype=np.float64)
         if matrix.ndim != 2:

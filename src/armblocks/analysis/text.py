@@ -1,4 +1,4 @@
-"""A linear system as text and as a notebook shows it."""
+"""Display of a linear system as text and in notebooks."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from armblocks.analysis.state_space import StateSpaceModel
 Array = NDArray[np.float64]
 
 MOST_SHOWN = 12
-"""Rows and columns of a matrix that is written out."""
+"""Maximum number of rows and columns of a matrix that is displayed completely."""
 
 STYLE = """
 .ab-linear{font:13px/1.45 system-ui,-apple-system,"Segoe UI",Roboto,sans-serif;color:inherit;max-width:1120px}
@@ -41,7 +41,7 @@ def complex_number(value: complex, digits: int = 5) -> str:
 
 
 def heading(system: StateSpaceModel) -> str:
-    """What it is, in one line."""
+    """One line with the name, the type, the sizes and the stability of a system."""
     kind = f"sampled every {system.dt:g} s" if system.is_discrete else "continuous"
     counts = ", ".join(
         f"{count} {word}{'' if count == 1 else 's'}"
@@ -56,7 +56,7 @@ def heading(system: StateSpaceModel) -> str:
 
 
 def stability(system: StateSpaceModel) -> str:
-    """In words; a pole on the edge is neither stable nor growing."""
+    """Stability as text, with a separate text for a pole on the stability boundary."""
     largest = growth(system)
     if largest < 0.0:
         return "stable"
@@ -64,7 +64,7 @@ def stability(system: StateSpaceModel) -> str:
 
 
 def matrix_lines(matrix: Array, rows: tuple[str, ...], columns: tuple[str, ...]) -> list[str]:
-    """A matrix with names, in columns; the middle of a large one is left out."""
+    """A matrix with names, in columns; the middle of a large matrix is omitted."""
     chosen_rows, chosen_columns = _shown(len(rows)), _shown(len(columns))
     table = [["", *("…" if k is None else columns[k] for k in chosen_columns)]]
     for i in chosen_rows:
@@ -87,7 +87,7 @@ def _shown(count: int) -> list[int | None]:
 
 
 def matrices(system: StateSpaceModel) -> list[tuple[str, Array, tuple[str, ...], tuple[str, ...]]]:
-    """Letter, matrix as it is shown, names of rows and of columns; only those that have entries."""
+    """Letter, displayed matrix, names of its rows and columns; without empty matrices."""
     A, B, C, D = shown_matrices(system)
     all_four = [
         ("A", A, system.states, system.states),
@@ -112,7 +112,7 @@ def system_text(system: StateSpaceModel) -> str:
 
 
 def system_html(system: StateSpaceModel) -> str:
-    """Heading, matrices and a table of the poles, as one self-contained piece of HTML."""
+    """Heading, matrices and a table of the poles, as self-contained HTML."""
     parts = [
         f'<div class="ab-linear"><style>{STYLE}</style><h3>Linear system</h3><p>{escape(heading(system))}</p>'
     ]

@@ -1,4 +1,4 @@
-"""Step, impulse and forced responses, exact at every instant: matrix exponentials instead of steps."""
+"""Step, impulse and forced responses by matrix exponentials, which are exact at every sample."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ MOST_INSTANTS = 20_000
 
 @dataclass(frozen=True, kw_only=True)
 class StepMeasures:
-    """What a step response is judged by (all times in s, ``nan`` where there is no such thing).
+    """Characteristics of a step response (all times in s; ``nan`` if undefined).
 
-    ``final``: the value at rest; ``rise_time`` from 10 to 90 per cent of it; ``settling_time`` after which it
-    stays within 2 per cent; ``overshoot`` and ``undershoot`` per cent of it; ``peak`` the largest value in
-    its direction and ``peak_time`` when.
+    ``final``: the steady-state value. ``rise_time``: from 10 to 90 per cent of it. ``settling_time``: after
+    which the response stays within 2 per cent of it. ``overshoot`` and ``undershoot``: per cent of it.
+    ``peak``: the largest value in the direction of the final value, at ``peak_time``.
     """
 
     final: float
@@ -44,9 +44,9 @@ class StepMeasures:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TimeResponse(Generic[SystemT_co]):
-    """``values`` (N, ny, nu): every output for every input by itself, at ``time`` (N,) s.
+    """``values`` (N, ny, nu): every output for each single input, at ``time`` (N,) s.
 
-    A forced response has one column for all inputs together. ``states`` (N, nx, nu) likewise.
+    A forced response has one column for all inputs together. ``states`` (N, nx, nu) has the same columns.
     """
 
     system: SystemT_co
@@ -62,7 +62,8 @@ class TimeResponse(Generic[SystemT_co]):
 
 
 def natural_times(system: StateSpaceModel) -> tuple[float, float]:
-    """How long the slowest motion takes to die away (or to show how it grows), and the fastest time, s."""
+    """The time in which the slowest mode decays or visibly grows, and the time constant of the fastest mode,
+    s."""
     small = minimal(system)
     roots = poles(small)
     if small.is_discrete:
@@ -78,7 +79,7 @@ def natural_times(system: StateSpaceModel) -> tuple[float, float]:
         decay = abs(pole.real)
         turns = 2.0 * math.pi / abs(pole.imag) if pole.imag else math.inf
         if decay < 1e-3 * abs(pole):
-            spans.append(10.0 * turns)  # hardly damped: ten turns show it
+            spans.append(10.0 * turns)  # lightly damped: show ten periods
         elif pole.real < 0.0:
             spans.append(min(7.0 / decay, 25.0 * turns))
         else:
@@ -102,7 +103,7 @@ def _instants(system: StateSpaceModel, stop_time: float | None, points: int) -> 
         return system.dt * np.arange(min(count, MOST_INSTANTS) + 1, dtype=np.float64)
     if stop_time is None:
         end = _rounded_up(end)
-    # Enough for the fastest motion that a person can see on the whole.
+    # Enough points for the fastest motion that is visible in the whole figure.
     count = int(min(max(points, 8.0 * end / fastest), 4000.0))
     return np.linspace(0.0, end, count + 1, dtype=np.float64)
 
@@ -124,10 +125,11 @@ def _powers(transition: Array, start: Array, count: int) -> Array:
 
 
 def step_response(system: SystemT, stop_time: float | None, points: int) -> TimeResponse[SystemT]:
-    """Of every output to every input; ``stop_time`` s, or long enough for the slowest motion."""
+    """The response of every output to a step of every input. ``stop_time=None``: until the slowest mode
+    settles."""
     time = _instants(system, stop_time, points)
     n, nu = system.B.shape
-    # Inputs that stand still are states with no rate of their own.
+    # Constant inputs are states with the derivative 0.
     transition = _held(system, float(time[1]))
     start = np.vstack([np.zeros((n, nu)), np.eye(nu)])
     states = _powers(transition, start, time.size)[:, :n]
@@ -137,7 +139,8 @@ def step_response(system: SystemT, stop_time: float | None, points: int) -> Time
 
 
 def impulse_response(system: SystemT, stop_time: float | None, points: int) -> TimeResponse[SystemT]:
-    """Of every output to every input. The jump of a direct way at time 0 is not shown: it has no height."""
+    """The response of every output to an impulse of every input, without the impulses of direct
+    feedthrough."""
     time = _instants(system, stop_time, points)
     n = system.order
     transition = _held(system, float(time[1]))[:n, :n]
@@ -169,7 +172,7 @@ def _held(system: StateSpaceModel, step: float) -> Array:
 def forced_response(
     system: SystemT, time: ArrayLike, inputs: ArrayLike, start: ArrayLike | None
 ) -> TimeResponse[SystemT]:
-    """See :meth:`LinearSystem.response`. Raises ``InputError`` for shapes and instants that do not fit."""
+    """See :meth:`LinearSystem.response`. Raises ``InputError`` for shapes and times that do not fit."""
     with from_extra("analysis", "responses of a linear system"):
         from scipy.linalg import expm
 
@@ -216,7 +219,7 @@ def forced_response(
             continue
         key = float(f"{step:.12e}")
         if key not in maps:
-            # Inputs that rise straight: their slopes are states too (Van Loan, 1978).
+            # Inputs that are linear in time: their derivatives are states too (Van Loan, 1978).
             whole = np.zeros((n + 2 * nu, n + 2 * nu))
             whole[:n, : n + nu] = np.hstack([system.A, system.B])
             whole[n : n + nu, n + nu :] = np.eye(nu)
@@ -230,7 +233,7 @@ def forced_response(
 
 
 def step_measures(time: Array, values: Array, final: float) -> StepMeasures:
-    """Measures of one curve that ends at ``final``; between instants the curve is taken as straight."""
+    """Characteristics of one curve that ends at ``final``, interpolated linearly between samples."""
     if not math.isfinite(final) or final == 0.0:
         k = int(np.argmax(np.abs(values)))
         nan = math.nan
@@ -280,12 +283,12 @@ def _settled_after(time: Array, shares: Array, band: float) -> float:
 
 
 def shown_measures(response: TimeResponse[StateSpaceModel], output: int = 0, column: int = 0) -> StepMeasures:
-    """:meth:`TimeResponse.measures`; overshoot and undershoot are 0 where rounding alone makes them."""
+    """:meth:`TimeResponse.measures` with overshoot and undershoot 0 if they are only rounding errors."""
     found = response.measures(output, column)
     system = response.system
     if not found.final or not math.isfinite(found.final):
         return found
-    # Every instant is a product with the same matrix, and the output a sum over the states.
+    # Every sample is a product with the same matrix, and the output is a sum over the states.
     terms = np.abs(response.states[:, :, column]) @ np.abs(system.C[output]) + abs(system.D[output, column])
     errors = max(system.order, 1) * response.time.size * EPSILON * float(terms.max())
     least = 100.0 * ROUNDOFFS * errors / abs(found.final)

@@ -1,4 +1,4 @@
-"""One output over one input as zeros, poles and gain, from which the polynomials follow."""
+"""The transfer function of one input and one output by zeros, poles and gain."""
 
 from __future__ import annotations
 
@@ -54,7 +54,8 @@ class TransferFunction:
 
 
 def transfer_function(system: StateSpaceModel) -> TransferFunction:
-    """Of a system with one input and one output; roots that stand in both are taken off."""
+    """The transfer function of a system with one input and one output; common zeros and poles are
+    cancelled."""
     if not system.is_siso:
         raise InputError(
             f"the system has {system.D.shape[1]} inputs and {system.D.shape[0]} outputs",
@@ -64,11 +65,11 @@ def transfer_function(system: StateSpaceModel) -> TransferFunction:
         )
     small = minimal(system)
     found_zeros, found_poles = zeros(small), poles(small)
-    # The gain from the value at a place far from all roots, where no factor is small.
+    # The gain is computed from the value at a point far from all roots, where no factor is small.
     far = 2.0 * max(1e-300, float(np.abs(np.concatenate([found_zeros, found_poles])).max(initial=0.0))) or 1.0
     far = far if len(found_zeros) + len(found_poles) else 1.0
     value = complex(evaluate(small, np.array([far], dtype=np.complex128))[0, 0, 0])
-    # Factor by factor in pairs, so that nothing overflows.
+    # The factors are divided in pairs, so that no intermediate result overflows.
     gain = value
     for k in range(max(len(found_zeros), len(found_poles))):
         gain *= (far - found_poles[k]) if k < len(found_poles) else 1.0
@@ -82,10 +83,12 @@ def _multiplied_out(roots: Complex) -> Array:
 
 
 def polynomial(coefficients: Array, letter: str, roots: Complex) -> str:
-    """``3 s^2 + s - 2``: six digits. A coefficient that rounding of the roots alone explains is left out.
+    """``3 s^2 + s - 2``, with six digits. Coefficients that are only rounding errors of the roots are
+    omitted.
 
-    The k-th coefficient is the sum of all products of k roots: an error of each root by a share of the
-    largest one, ``r``, changes it by at most that share of ``k`` times the count of products times ``r^k``.
+    The k-th coefficient is the sum of all products of k roots. If ``r`` is the largest magnitude of a root
+    and each root has an error of at most ``e r``, the coefficient changes by at most ``e k r^k`` times the
+    number of products.
     """
     largest = float(np.abs(roots).max(initial=0.0))
     parts: list[str] = []

@@ -4,10 +4,10 @@ The unknowns are the states that are not given, the discrete states of clocks, t
 unknowns of implicit equations, and the free parameters. The equations are: the derivatives of all non-moving
 states are 0, ticks change no state, outputs of delays equal their inputs, the implicit equations hold, and
 the chosen signals have their required values. Steps are those of Levenberg and Marquardt (Moré, Lecture Notes
-in Mathematics 630, 1978, 105-116), each unknown in the scale of its own column and kept within its bounds; of
-several solutions the one near the start is found, and where there are infinitely many, the nearest. The modes
-are updated at the solution, and the iteration is repeated. If this fails (the line of a table's first segment
-may reach zero far beyond the last segment), the modes are updated at every step.
+in Mathematics 630, 1978, 105-116), with each unknown scaled by its column and limited to its bounds. Of
+several solutions, one near the start is found. The modes are updated at the solution, and the iteration is
+repeated. If this fails, the modes are updated at every step. An example is a table whose first segment,
+extended as a straight line, reaches zero only far beyond the last segment.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ MOST_ITERATIONS = 200
 MOST_MODES = 20
 """Maximum number of mode changes."""
 ROUNDOFFS = 4.0 * float(np.finfo(np.float64).eps)
-"""Rounding error of a term of an equation, as a share of it."""
+"""Relative rounding error of a term of an equation."""
 NAMED = 6
 """Maximum number of equations that a message names."""
 
@@ -40,9 +40,10 @@ NAMED = 6
 class TrimProblem:
     """A trim problem.
 
-    ``start`` the first guess, ``free_states`` places in ``x`` that may change, ``resting`` places in ``x``
-    whose rate has to be 0, ``free_parameters`` places in ``p``, ``rows`` places in ``y`` that have to have
-    the values ``targets``. ``bounds``: lower and upper end by the name of an unknown scalar.
+    ``start`` is the first guess. The others are indices: ``free_states`` of the states in ``x`` that may
+    change, ``resting`` of the states whose derivative must be 0, ``free_parameters`` in ``p``, ``rows`` of
+    the signals in ``y`` that must have the values ``targets``. ``bounds``: lower and upper bound by the name
+    of an unknown scalar.
     """
 
     system: HybridSystem
@@ -60,9 +61,9 @@ class TrimProblem:
 class TrimResult:
     """An operating point with its residuals.
 
-    ``free``: the parameters that were found, as ``simulate(parameters=…)`` takes them. ``accuracies``: bound
-    of the rounding error of everything that was sought, by name and in its shape. ``residuals``: what is left
-    of every equation, by name. ``at_bounds``: unknowns that ended at an end of their range.
+    ``free``: the parameters that were found, in the form for ``simulate(parameters=…)``. ``accuracies``:
+    bounds of the rounding errors of all unknowns, by name and in their shape. ``residuals``: the residual of
+    every equation, by name. ``at_bounds``: unknowns that are at a bound of their range.
     """
 
     point: OperatingPoint
@@ -74,11 +75,11 @@ class TrimResult:
 
     @property
     def largest_residual(self) -> float:
-        """Magnitude of what is farthest from resting."""
+        """The largest magnitude of a residual."""
         return max((abs(value) for value in self.residuals.values()), default=0.0)
 
     def shown(self, name: str, value: Array) -> Array:
-        """A value of the point or of ``free`` with 0 for every number that is 0 to its accuracy."""
+        """A value of the point or of ``free``, with 0 for every number that is 0 within its accuracy."""
         least = self.accuracies.get(name)
         return value + 0.0 if least is None else np.where(np.abs(value) <= least, 0.0, value)
 
@@ -97,7 +98,8 @@ class TrimResult:
 
 
 def trim_system(problem: TrimProblem) -> TrimResult:
-    """Solve a problem. Raises ``SimulationError``, what was reached as ``partial``, where it cannot rest."""
+    """Solve a problem. Raises ``SimulationError`` if there is no equilibrium; ``partial`` is the last
+    point."""
     search = _Search(problem)
     point, iterations, chasing = _modes_afterwards(search)
     if chasing or not search.rests(point):
@@ -120,7 +122,8 @@ def trim_system(problem: TrimProblem) -> TrimResult:
 
 
 def _modes_afterwards(search: _Search) -> tuple[Point, int, list[str]]:
-    """Seek with the modes that stand, let them settle, seek again; the modes that never come to an end."""
+    """Solve with constant modes, update the modes, and repeat. Also returns the modes that remain
+    inconsistent."""
     point, iterations = search.problem.start, 0
     seen: list[bytes] = []
     while True:
@@ -139,7 +142,7 @@ def _elements(layout: Signature) -> list[str]:
 
 
 class _Search:
-    """Equations, slopes and steps of one problem."""
+    """Equations, derivatives and steps of one problem."""
 
     def __init__(self, problem: TrimProblem) -> None:
         system = problem.system
@@ -190,7 +193,7 @@ class _Search:
         return Point(t=point.t, x=x, z=z, w=unknowns, p=p)
 
     def residuals(self, point: Point) -> Array:
-        """What is left of every equation."""
+        """The residuals of all equations."""
         problem, evaluated = self.problem, self.evaluated
         parts = [evaluated.derivative(point)[problem.resting]]
         if self.ticked.size:
@@ -201,8 +204,8 @@ class _Search:
         return np.concatenate(parts)
 
     def _slope_blocks(self, point: Point) -> list[tuple[Slopes, Places, Places]]:
-        """Derivatives of the equations in their order: slopes, their rows, and which of z is taken off each
-        of these."""
+        """Derivatives of the equations in their order: the derivatives, the selected rows, and for each row
+        the index of the entry of z that the equation subtracts."""
         problem, evaluated = self.problem, self.evaluated
         flow = evaluated.derivative_slopes(point)
         nobody = np.zeros(0, dtype=np.intp)
@@ -231,12 +234,12 @@ class _Search:
     def errors(self, point: Point) -> Array:
         """Bound of the rounding error of every unknown at a solution.
 
-        Each equation is a sum whose terms are the slopes times the values, each with a few roundings; its
-        error and what is left of it move the unknowns by the inverse of the slopes (Golub and Van Loan,
-        Matrix Computations, 4th ed., 2.6).
+        Each equation is a sum of terms, derivative times value, each with a few roundings. The error of the
+        equation and its residual, multiplied by the inverse Jacobian, bound the error of the unknowns (Golub
+        and Van Loan, Matrix Computations, 4th ed., 2.6).
         """
         matrix = self.slopes(point)
-        if not np.isfinite(matrix).all():  # of a search that failed
+        if not np.isfinite(matrix).all():  # the search has failed
             return np.zeros(len(self.unknowns))
         free = point.p[self.problem.free_parameters]
         sizes: list[Array] = []
@@ -257,18 +260,19 @@ class _Search:
         )
 
     def settled(self, point: Point) -> Array:
-        """``z`` with the modes that a point asks for; what clocks move stays."""
+        """``z`` with consistent modes; the entries that clocks update are unchanged."""
         if not point.z.size:
             return point.z
         return np.where(self.sampled, point.z, self.whole.settled(point))
 
     def unsettled(self, point: Point) -> list[str]:
-        """Modes that are not what the point asks for."""
+        """The inconsistent modes at a point."""
         names = _elements(self.problem.system.discrete)
         return [names[k] for k in np.flatnonzero(self.settled(point) != point.z).tolist()]
 
     def run(self, start: Point, *, settling: bool = False) -> tuple[Point, int]:
-        """Damped steps until they no longer help; ``settling``: the modes follow every step that is tried."""
+        """Take damped steps until they no longer reduce the residuals; ``settling``: update the modes at each
+        trial."""
         point = self.spread(np.clip(self.gathered(start), self.lower, self.upper), start)
         if settling:
             point = dataclasses.replace(point, z=self.settled(point))
@@ -296,14 +300,14 @@ class _Search:
         return point, MOST_ITERATIONS
 
     def _step(self, point: Point, slopes: Array, residuals: Array, damping: float, scale: Array) -> Array:
-        """One step of the damped normal equations, within the bounds; who would leave them stays there."""
+        """One step of the damped normal equations. Unknowns that would leave their bounds stay at them."""
         here = self.gathered(point)
         weights = np.sqrt(damping) * np.where(scale > 0.0, scale, 1.0)
         free = np.ones(here.size, dtype=np.bool_)
         step = np.zeros(here.size)
         for _ in range(here.size + 1):
             matrix = np.vstack([slopes[:, free], np.diag(weights[free])])
-            # Who stands at an end of the range already counts in the right-hand side.
+            # The right-hand side includes the steps of the unknowns that are at their bounds.
             right = np.concatenate([-(residuals + slopes[:, ~free] @ step[~free]), np.zeros(int(free.sum()))])
             step[free] = np.linalg.lstsq(matrix, right, rcond=None)[0]
             beyond = free & ((here + step < self.lower) | (here + step > self.upper))
@@ -314,7 +318,7 @@ class _Search:
         return step
 
     def result(self, point: Point, iterations: int) -> TrimResult:
-        """What was reached, by name."""
+        """The result at a point, by name."""
         if self.rests(point):
             point = solved(self.whole, point)
         values = self.gathered(point)
@@ -345,7 +349,7 @@ class _Search:
 
 
 def _failure(problem: TrimProblem, search: _Search, point: Point, result: TrimResult) -> SimulationError:
-    """Which equations do not hold, and what stands in the way."""
+    """The error that names the equations that do not hold, and the likely cause."""
     left = {name: value for name, value in result.residuals.items() if not abs(value) <= problem.tolerance}
     worst = sorted(left, key=lambda name: -abs(left[name]) if np.isfinite(left[name]) else -np.inf)
     listed = ", ".join(f"{name} is {_left(name, left[name])}" for name in worst[:NAMED])

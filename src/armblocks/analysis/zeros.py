@@ -2,8 +2,8 @@
 
 The algorithm of Emami-Naeini and Van Dooren (Automatica 18, 1982, 415-430): the system is reduced, by
 orthogonal transformations only, to one with an invertible ``D`` and the same finite zeros. Infinite zeros are
-taken off by rank decisions and do not spoil the finite ones, as they do in the plain generalised eigenvalue
-problem.
+removed by rank decisions. In the generalised eigenvalue problem of the unreduced system they would reduce the
+accuracy of the finite zeros.
 """
 
 from __future__ import annotations
@@ -37,26 +37,26 @@ def zeros(system: StateSpaceModel) -> Complex:
 def zero_pencil(A: Array, B: Array, C: Array, D: Array) -> tuple[Array, Array, float] | None:
     """``M``, ``N`` and the size of their rounding errors: the zeros are the roots of ``det(M - s N)``.
 
-    ``None`` where there are no zeros.
+    ``None`` if there are no zeros.
     """
     if not A.size or not B.size or not C.size:
         return None
     a, b, c = balanced(A, B, C)
-    # Inputs and outputs are scaled to one size: this moves no zero.
+    # Inputs and outputs are scaled to similar sizes, which does not change the zeros.
     b, d = _columns_scaled(b, D)
     c, d = (part.T for part in _columns_scaled(c.T, d.T))
     whole = np.block([[a, b], [c, d]])
     tolerance = 10.0 * max(whole.shape) * np.finfo(np.float64).eps * float(np.linalg.norm(whole))
     a, b, c, d = _reduced(a, b, c, d, tolerance)
     if a.size:
-        # The same of the dual system, whose inputs are the outputs.
+        # The same reduction of the dual system, whose inputs are the outputs.
         a, c, b, d = (part.T for part in _reduced(a.T, c.T, b.T, d.T, tolerance))
     n = a.shape[0]
     if not n:
         return None
     if not d.size:
         return a, np.eye(n), tolerance
-    # [C D] W = [0 *] takes the inputs out without dividing by D.
+    # [C D] W = [0 *] eliminates the inputs without dividing by D.
     _, _, right = np.linalg.svd(np.hstack([c, d]))
     free = right[d.shape[0] :].T
     return np.hstack([a, b]) @ free, free[:n], tolerance
@@ -80,13 +80,13 @@ def _reduced(a: Array, b: Array, c: Array, d: Array, tolerance: float) -> tuple[
         if rank == d.shape[0]:
             break
         c, d = left.T @ c, left.T @ d
-        plain = c[rank:]  # outputs without a direct way from the inputs
+        plain = c[rank:]  # outputs without direct feedthrough
         c, d = c[:rank], d[:rank]
         _, sizes, right = np.linalg.svd(plain)
         seen = _rank(sizes, tolerance)
         if not seen:
             break
-        turn = np.vstack([right[seen:], right[:seen]]).T  # first the states that these outputs do not see
+        turn = np.vstack([right[seen:], right[:seen]]).T  # first the states that do not affect these outputs
         a, b, c = turn.T @ a @ turn, turn.T @ b, c @ turn
         rest = a.shape[0] - seen
         c, d = np.vstack([c[:, :rest], a[rest:, :rest]]), np.vstack([d, b[rest:]])

@@ -12,15 +12,15 @@ Every operation works on IEEE 754 doubles and rounds to nearest. Where languages
 * ``SELECT c a b`` is ``a`` if ``c`` is true, else ``b``. The other value has no influence, even if it is NaN.
 * ``MODULO`` is C's ``fmod`` (sign of the dividend, exact); ``REMAINDER`` is IEEE's (nearest quotient, ties to
   even, exact).
-* ``READ x n i`` reads a table of ``n`` scalars, which begins at input ``x`` and lies in one slot. The result is
-  the entry with the index ``i``, truncated to an integer and limited to 0 … n - 1 (0 for a NaN). ``n`` is a
-  constant.
-* ``SOLVE a11 a12 … ann b1 … bn`` solves n linear equations (:mod:`armblocks.compiler.linear_solution`). It has
-  n results. ``MEMBER s k`` is result k of the operation ``s``, where k is a constant, counted from 0. Only
-  ``MEMBER`` may read the results.
+* ``READ x n i`` reads a table of ``n`` scalars, which begins at input ``x`` and lies in one slot. The result
+  is the entry with the index ``i``, truncated to an integer and limited to 0 … n - 1 (0 for a NaN). ``n`` is
+  a constant.
+* ``SOLVE a11 a12 … ann b1 … bn`` solves n linear equations (:mod:`armblocks.compiler.linear_solution`). It
+  has n results. ``MEMBER s k`` is result k of the operation ``s``, where k is a constant, counted from 0.
+  Only ``MEMBER`` may read the results.
 * ``PRODUCT a m n x1 … xn c1 … cm`` adds a matrix times a vector. Its result i, for ``MEMBER``, is
-  ``((ci + ai1 x1) + ai2 x2) + … + ain xn``, each term by ``FMA``. The matrix is the ``m n`` scalars that begin
-  at input ``a`` and lie in one slot, row by row; ``m`` and ``n`` are constants
+  ``((ci + ai1 x1) + ai2 x2) + … + ain xn``, each term by ``FMA``. The matrix is the ``m n`` scalars that
+  begin at input ``a`` and lie in one slot, row by row; ``m`` and ``n`` are constants
   (:mod:`armblocks.compiler.matrix_products`).
 * ``POWER`` follows C99: ``x**0`` and ``1**y`` are 1 even with NaN.
 """

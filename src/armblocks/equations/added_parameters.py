@@ -17,8 +17,8 @@ from armblocks.equations.traced_function import TracedFunction
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AddedParameter:
-    """A parameter that starts at 0: ``changes`` are the increments of other parameters, in terms of
-    ``symbol``."""
+    """An added parameter ``symbol`` with the value 0. ``changes`` are the increments of other parameters as
+    expressions of ``symbol``."""
 
     slot: Slot
     symbol: SX
@@ -28,8 +28,8 @@ class AddedParameter:
 def with_added_parameters(system: HybridSystem, added: tuple[AddedParameter, ...]) -> HybridSystem:
     """The same equations with parameters appended; at 0 they have no effect.
 
-    Changes of parameters that the system does not have are ignored. ``derivatives by`` an added parameter are
-    directional derivatives along its changes.
+    Changes of parameters that the system does not have are ignored. The derivative by an added parameter is
+    the directional derivative along its changes.
     """
     old = system.parameters
     layout = Signature((*old.slots, *(entry.slot for entry in added)))

@@ -26,9 +26,10 @@ def ratio(numerator: float, denominator: float) -> Fraction:
 
 
 def simplest_between(low: Fraction, high: Fraction) -> Fraction:
-    """The fraction of least denominator in ``[low, high]``, ``0 <= low <= high``; of several the smallest.
+    """The fraction with the smallest denominator in ``[low, high]``, ``0 <= low <= high``; the smallest of
+    several.
 
-    By continued fractions (Knuth, The Art of Computer Programming, volume 2, 4.5.3, exercise 39).
+    Method: continued fractions (Knuth, The Art of Computer Programming, volume 2, 4.5.3, exercise 39).
     """
     whole = math.ceil(low)
     if whole <= high:
@@ -40,7 +41,8 @@ def simplest_between(low: Fraction, high: Fraction) -> Fraction:
 def exact_clocks(clocks: Sequence[SampleClock]) -> list[tuple[Fraction, Fraction]]:
     """Period and offset (s) of each clock.
 
-    The first period is the simplest fraction that rounds to its double, the others have their ratios to it.
+    The first period is the simplest fraction that rounds to its double. The other periods follow from their
+    ratios to the first.
     """
     first = clocks[0].period
     below, above = (Fraction(math.nextafter(first, side)) for side in (0.0, math.inf))

@@ -40,7 +40,7 @@ _OPERATIONS = {
     int(casadi.OP_POW): "power",
     int(casadi.OP_CONSTPOW): "power",
 }
-"""CasADi's operations whose values come from the C library, with our names."""
+"""CasADi's operations whose values come from the C library, with their names in armblocks."""
 
 
 def elementary(name: str, *values: SX) -> SX:
@@ -64,8 +64,8 @@ def elementary(name: str, *values: SX) -> SX:
 def _power(base: SX, exponent: SX) -> SX:
     """``base**exponent``, whose derivative by the exponent has the factor ``log base``.
 
-    CasADi evaluates that logarithm during differentiation if the base is a constant; here it is hidden from
-    CasADi.
+    CasADi would evaluate that logarithm during differentiation if the base is a constant. Here the base is
+    passed in a form that CasADi does not recognise as a constant.
     """
     positive = base.is_constant() and all(float(base[k]) > 0.0 for k in range(base.numel()))
     if positive and not exponent.is_constant():

@@ -39,8 +39,8 @@ class Point:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Slopes:
-    """Derivatives of one function: by the time (m, 1), the states (m, nx), the discrete variables (m, nz),
-    the unknowns (m, nw), and the selected parameters (m, k)."""
+    """Derivatives of one function by time (m, 1), states (m, nx), discrete variables (m, nz), unknowns (m,
+    nw), and selected parameters (m, k)."""
 
     t: Array
     x: Array
@@ -50,7 +50,7 @@ class Slopes:
 
 
 def refuse_called(system: HybridSystem, what: str) -> None:
-    """Raise ``InputError`` if Python computes a part of a system: that part has no equations."""
+    """Raise ``InputError`` if a block of the system is computed in Python, because it has no equations."""
     if system.called:
         raise InputError(
             f"block '{system.called[0]}' calls Python, which has no {what}",
@@ -64,7 +64,7 @@ class EvaluatedSystem:
     """A system's functions and their derivatives as numbers.
 
     ``parameters``: indices into ``p`` of the parameters for derivatives; ``signals``: the rows of ``y`` to
-    compute (``None``: all). Every function is prepared when first used.
+    compute (``None``: all). Every function is prepared at its first use.
     """
 
     def __init__(
@@ -126,7 +126,7 @@ class EvaluatedSystem:
         return self._call(self.system.guards, point.ends)
 
     def update(self, point: Point, ticking: Array) -> Array:
-        """``z`` (nz,) after the clocks with ``ticking[k] = 1`` have ticked."""
+        """``z`` (nz,) after the ticks of the clocks with ``ticking[k] = 1``."""
         return self._call(self.system.update, [*point.ends, ticking])
 
     def settled(self, point: Point) -> Array:

@@ -13,11 +13,10 @@ from armblocks.equations.traced_function import TracedFunction
 
 @dataclass(frozen=True, eq=False)
 class FlowJacobian:
-    """Derivatives of ``F = (derivative, residual)`` by ``v = (x, w)`` and by the time.
+    """Derivatives of ``F = (derivative, residual)`` by ``v = (x, w)`` and by time.
 
-    ``function`` has the inputs of ``derivative`` and the outputs ``J``, the entries of ``dF/dv`` that are not
-    zero for structural reasons, and ``T (nx + nw,)``, ``dF/dt``. Entry ``k`` stands in row ``rows[k]`` and
-    column ``columns[k]``.
+    ``function`` has the inputs of ``derivative``. Its outputs are ``J``, the structurally nonzero entries of
+    ``dF/dv``, and ``T (nx + nw,)``, ``dF/dt``. Entry ``k`` is in row ``rows[k]`` and column ``columns[k]``.
     """
 
     rows: tuple[int, ...]
@@ -26,7 +25,7 @@ class FlowJacobian:
 
 
 def trace_flow_jacobian(system: HybridSystem) -> FlowJacobian:
-    """Differentiate the traced equations; the work is shared between columns that do not overlap."""
+    """Differentiate the traced equations; structurally orthogonal columns are computed together."""
     flow = system.derivative
     t, x, z, w, p = flow.arguments
     (residual,) = system.residual.casadi_function().call([t, x, z, w, p], True, False)

@@ -112,9 +112,9 @@ class HybridSystem:
     """Derivative of ``residual`` by ``w``."""
     update: TracedFunction
     guards: TracedFunction
-    """An event happens where one of its entries crosses zero."""
+    """Guards: an event occurs where an entry crosses zero."""
     guard_directions: tuple[int, ...]
-    """+1 upwards, -1 downwards, 0 both."""
+    """The direction in which each guard fires: +1 upwards, -1 downwards, 0 both."""
     guard_names: tuple[str, ...]
     """The block of each guard, for messages."""
     reset: TracedFunction
@@ -123,36 +123,37 @@ class HybridSystem:
     initial_algebraic: TracedFunction
     breakpoints: TracedFunction
     aliases: Mapping[str, str]
-    """Other names of signals: the block's bare name where it has one output, and an input port
-    (``scope/u``) for the signal that drives it."""
+    """Other names of signals: the name of a block with one output, and an input port (``scope/u``) for the
+    signal that drives it."""
     guard_actions: tuple[str, ...] = ()
-    """For each guard its effect on the run where it is positive: ``stop`` ends the run, ``fail`` ends it with
-    an error, ``warn`` is reported at its end, empty has no effect."""
+    """The effect of each guard when it is positive: ``stop`` ends the run, ``fail`` ends it with an error,
+    ``warn`` is reported at the end of the run, an empty text has no effect."""
     modes: tuple[int, ...] = ()
     """The indices of the modes in ``z``."""
     followers: tuple[bool, ...] = ()
     """For each mode, whether it is a function of the present signals."""
     remembered: tuple[tuple[int, int], ...] = ()
-    """Pairs of indices in ``z``: a mode that also depends on its value before an instant (or before the
-    latest event at it), and that value."""
+    """Pairs of indices in ``z``: a mode with memory, and its previous value, which is the value before the
+    instant or before the latest event at it."""
     recaptured: tuple[int, ...] = ()
-    """The indices in ``z`` of captured values of such modes, which are captured again at events."""
+    """The indices in ``z`` of the captured values of modes with memory, which are captured again at
+    events."""
     momentary: tuple[int, ...] = ()
-    """The indices in ``z`` of what is 0 again at the end of every instant."""
+    """The indices in ``z`` of the momentary values, which become 0 at the end of every instant."""
     silenced: tuple[tuple[int, int], ...] = ()
-    """Guards, each with the index in ``z`` of a momentary value. Where it is not 0, the guard does not fire,
-    and begins anew at the end of the instant, with the sign that it has then."""
+    """Guards, each with the index in ``z`` of a momentary value. While that value is nonzero the guard does
+    not fire; at the end of the instant its stored sign becomes that of its value."""
     locating: tuple[int, ...] = ()
-    """The guards whose zeros only locate changes of such modes."""
+    """The guards that only locate changes of modes that are functions of the signals."""
     tangents: tuple[int, int, int] | None = None
-    """The first indices in ``x``, ``z`` and the guards that belong to derivatives, if any."""
+    """The first indices in ``x``, ``z`` and the guards that belong to derivatives, if there are any."""
     contradictions: TracedFunction | None = None
-    """The inconsistent modes; ``None`` without modes."""
+    """The function that is nonzero for inconsistent modes; ``None`` without modes."""
     delays: Delays | None = None
     """The delayed signals."""
     captures: bool = False
-    """Whether some discrete variable stores a left limit."""
+    """Whether a discrete variable stores a left limit."""
     called: tuple[str, ...] = ()
-    """Blocks without equations: Python computes their outputs at each of their ticks."""
+    """Blocks without equations, whose outputs are computed in Python at their ticks."""
     loops: LinearLoops | None = None
     """The linear loops that are solved in place."""

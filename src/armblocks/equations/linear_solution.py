@@ -20,7 +20,7 @@ _DERIVATIVE = re.compile(r"(fwd|adj)(\d+)_(.*)")
 
 
 def linear_solution(A: SX, b: SX) -> SX:
-    """x (n, 1) with A x = b, for A (n, n) and b (n, 1); not finite where A is singular."""
+    """x (n, 1) with A x = b, for A (n, n) and b (n, 1); not finite if A is singular."""
     return _solver(A.shape[0])(A, b)
 
 
@@ -32,7 +32,7 @@ def solution_size(name: str) -> int | None:
 
 @cache
 def derivative_rule(name: str) -> Function | None:
-    """The derivative of this name as an expression; ``None`` if it is no derivative of a linear solution.
+    """The derivative of this name as an expression; ``None`` if it is not a derivative of a linear solution.
 
     The names are CasADi's: ``fwd2_linear_solution_3`` has two directions. Its arguments are those of the
     function, then its results (which are not used), then the directions side by side.

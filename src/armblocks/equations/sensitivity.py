@@ -1,9 +1,9 @@
 """A system together with the derivatives of its signals by some of its parameters.
 
-For each chosen parameter ``p`` the state ``S = dx/dp`` is added, with ``S' = f_x S + f_z Z + f_w W + f_p``,
-and likewise ``Z = dz/dp``, which ticks move by the derivative of ``update``, and ``W = dw/dp``, which the
-differentiated implicit equations determine. At instants whose times depend on parameters they jump besides:
-see :mod:`armblocks.equations.sensitivity_instants`. Delayed signals bring their sensitivities along:
+For each chosen parameter ``p`` the state ``S = dx/dp`` is added, with ``S' = f_x S + f_z Z + f_w W + f_p``.
+``Z = dz/dp`` changes at ticks by the derivative of ``update``, and ``W = dw/dp`` follows from the
+differentiated implicit equations. At instants whose times depend on parameters, the sensitivities also jump:
+:mod:`armblocks.equations.sensitivity_instants`. Sensitivities of delayed signals are delayed as well:
 :mod:`armblocks.equations.sensitivity_delays`.
 """
 
@@ -32,7 +32,7 @@ never), and the number of one of their guards, from 1."""
 
 
 def parameters_read_by_index(system: HybridSystem) -> frozenset[str]:
-    """The parameters that are long tables, for whose entries derivatives are not available
+    """The parameters that are tables read by index. Derivatives by their entries are not available
     (``table_reading``)."""
     functions = (system.derivative, system.signals, system.residual, system.update, system.guards)
     tables = {
@@ -54,9 +54,9 @@ def sensitivity_system(
 ) -> HybridSystem:
     """The system with the derivatives of ``outputs`` (paths of signals) by ``parameters`` (paths) as signals.
 
-    Raises ``UnknownNameError`` for names, ``InputError`` for a parameter that is a table that is read by
-    index, that acts only through its integer part, or that moves an event at the start; and for implicit
-    equations together with delays or with a parameter that determines when a signal jumps.
+    Raises ``UnknownNameError`` for unknown names. Raises ``InputError`` for a parameter that is a table read
+    by index, that acts only through its integer part, or that moves an event at the start; also for implicit
+    equations together with delays or with a parameter that determines the time of a jump.
     """
     refuse_called(system, "derivatives")
     _refuse_tables(system, parameters)
@@ -141,7 +141,7 @@ class _Augmented:
         self.instants = Instants(self.columns, self.delays) if self.moving else None
 
     def _names(self, count: int) -> list[str]:
-        """What messages call the guards of the instants themselves: by their blocks, if they have some."""
+        """Names of the added guards for messages: the names of their blocks, or of the system."""
         if self.instants is None:
             return []
         elements = [element for slot in self.old.discrete for element in slot.elements]
@@ -152,12 +152,12 @@ class _Augmented:
         return names
 
     def rate(self, expression: SX, k: int) -> SX:
-        """Its derivative by parameter ``k``, everything following."""
+        """The total derivative of an expression by parameter ``k``."""
         c = self.columns
         return c.along(expression, t=0.0, x=c.S[k], z=self.delays.Z[k], w=c.W[k], p=c.seeds[k])
 
     def widened(self, expression: SX) -> SX:
-        """The expression and all its derivatives in one column."""
+        """The expression and its derivatives by all parameters in one column."""
         return vertcat(expression, *(self.rate(expression, k) for k in range(len(self.columns.names))))
 
     def start(self, traced: TracedFunction, letter: str) -> TracedFunction:
@@ -183,7 +183,7 @@ class _Augmented:
             still = SX.zeros(r.numel())
             by_time = self.instants.over_time(r)
             parts.append(by_time)
-            # While S is that along an instant, so is W.
+            # While S is the derivative along an instant, W is so too.
             fixed = c.along(r, t=1.0, x=SX.zeros(c.x.numel()), z=self.delays.rate_along, w=still, p=0.0 * c.p)
             for k, instant in enumerate(self.instants.instant_p):
                 parts[k + 1] = parts[k + 1] + self.instants.open * instant * fixed
@@ -247,7 +247,7 @@ class _Augmented:
         )
 
     def loops(self, old: LinearLoops) -> LinearLoops:
-        """The loops of the system itself: those of the derivatives have the same matrices."""
+        """The linear loops of the original system; those of the derivatives have the same matrices."""
         c = self.columns
         matrices = c.function("loop_matrices", {}, A=c.value(old.matrices))
         return dataclasses.replace(old, matrices=matrices)

@@ -1,10 +1,11 @@
 """Sensitivities of delayed signals, and the arrival of their jumps.
 
-For ``y(t) = u(t - d)`` the derivative by a parameter is ``y_p = u_p(t - d) - u'(t - d) d_p``: ``u_p`` is a
-delayed signal of its own. A jump of ``u`` at ``s`` arrives where ``t - d = s``, at an instant with the
-derivative ``(s_p + d_p) / (1 - d')``. Three additional delayed signals describe it: the number of jumps,
-``s_p`` of the last jump, and the value of ``u`` before it. A guard fires where the delayed count changes.
-Where equations read the slope ``u'(t - d)`` too, ``u''`` and the slope before a jump are delayed likewise.
+For ``y(t) = u(t - d)`` the derivative by a parameter is ``y_p = u_p(t - d) - u'(t - d) d_p``, so ``u_p``
+becomes another delayed signal. A jump of ``u`` at the time ``s`` arrives when ``t - d = s``. The derivative
+of the arrival time is ``(s_p + d_p) / (1 - d')``. Three more delayed signals describe the jump: the number of
+jumps, ``s_p`` of the last jump, and the value of ``u`` before it. A guard fires when the delayed number
+changes. If equations also read the derivative ``u'(t - d)``, then ``u''`` and the derivative before a jump
+are delayed too.
 
 Source: Bellen and Zennaro, Numerical Methods for Delay Differential Equations, 2003, chapter 2.
 """
@@ -19,7 +20,7 @@ from armblocks.equations.signatures import signature
 from armblocks.equations.traced_function import TracedFunction
 
 SAME_VALUE = 1e-11
-"""Beside its size, by how much a signal that does not jump may differ between the sides of an instant."""
+"""Relative difference between the two sides of an instant up to which a signal counts as continuous."""
 
 
 class DelayedSensitivities:
@@ -38,7 +39,7 @@ class DelayedSensitivities:
         self.slopes = [] if delays is None else list(delays.slopes)
         self.reads_slopes = delays is not None and self._slopes_are_read()
         self.curvature = columns.add("curvature", self.n if self.reads_slopes else 0)
-        """u'' of the time before, where slopes are read."""
+        """u'' at the delayed time, if derivatives of delayed signals are read."""
         self.Z = [self._corrected(k) for k in range(len(columns.names))]
         """Sensitivities of z: those of delayed values are computed from the history."""
         if delays is None:
@@ -67,7 +68,7 @@ class DelayedSensitivities:
         return c.along(expression, t=0.0, x=c.S[k], z=c.Z[k], w=c.W[k], p=c.seeds[k])
 
     def _corrected(self, k: int) -> SX:
-        """At the index of a delayed value, ``u_p(t - d)`` is stored."""
+        """The sensitivities of z. At the index of a delayed value, Z stores only ``u_p(t - d)``."""
         corrected = SX(self.columns.Z[k])
         for i, (value, slope) in enumerate(zip(self.values, self.slopes)):
             corrected[value] = corrected[value] - self.columns.z[slope] * self.tau_p[k][i]
@@ -97,7 +98,8 @@ class DelayedSensitivities:
         return value[self.values]
 
     def set_flow(self, flow: SX) -> None:
-        """``flow``: x', from which ``delay_rate`` = d' follows, and the rate of the delayed values."""
+        """Set x' to ``flow``, and compute ``delay_rate`` = d' and the time derivatives of the delayed
+        values."""
         if not self.n:
             return
         c = self.columns
@@ -120,7 +122,8 @@ class DelayedSensitivities:
         return {"left limit": self.u, "left slope": self.du} if self.n else {}
 
     def guards(self, at_instant: SX) -> list[SX]:
-        """Upwards, where a jump arrives, and where a signal that is delayed has jumped at this instant."""
+        """Guards that fire upwards: when a jump arrives, and when the input of a delay has jumped at this
+        instant."""
         if not self.n:
             return []
         size = fabs(self.u) + fabs(self.left)
@@ -138,12 +141,12 @@ class DelayedSensitivities:
         return delays
 
     def arrival(self, k: int) -> SX:
-        """The derivative by parameter ``k`` of the instant at which the last jump has arrived, (n,)."""
+        """The derivative by parameter ``k`` of the arrival time of the last jump, (n,)."""
         steady = if_else(self.delay_rate == 1.0, 0.0, self.delay_rate)
         return (self.past_p[k] + self.tau_p[k]) / (1.0 - steady)
 
     def before_arrival(self, fired: SX) -> SX:
-        """z with the delayed values as they were before the jumps that have arrived."""
+        """z with the delayed values before the jumps that have arrived."""
         z = SX(self.columns.z)
         for i, value in enumerate(self.values):
             z[value] = if_else(fired[i], self.past_before[i], z[value])
@@ -153,7 +156,8 @@ class DelayedSensitivities:
         return z
 
     def after(self, arrived: SX, jumped: SX, instants: list[SX]) -> dict[str, SX]:
-        """What changes where jumps arrive, and where signals jump; ``instants``: derivatives of this one."""
+        """Changes of discrete variables where jumps arrive and where inputs of delays jump; ``instants``: the
+        derivatives of the present instant."""
         if not self.n:
             return {}
         changes = {
@@ -170,7 +174,8 @@ class DelayedSensitivities:
     # The delayed signals of the whole system.
 
     def delays(self) -> Delays | None:
-        """All delayed scalars: those of the system, their sensitivities, and what tells of jumps."""
+        """All delayed scalars: those of the system, their sensitivities, and the signals that describe
+        jumps."""
         if not self.n:
             return None
         c, old, n, nz = self.columns, self._delays, self.n, self.columns.z.numel()
@@ -211,7 +216,7 @@ class DelayedSensitivities:
         )
 
     def _places(self, name: str, count: int = 1) -> list[list[int]]:
-        """The places of an added variable in the whole of z, in so many parts."""
+        """The places of an added variable in the augmented z, in ``count`` parts."""
         start = self.columns.place(name)
         return [list(range(start + k * self.n, start + (k + 1) * self.n)) for k in range(count)]
 

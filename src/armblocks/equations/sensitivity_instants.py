@@ -1,23 +1,23 @@
-"""Sensitivities at instants, the times of which may depend on parameters.
+"""Sensitivities at instants whose times may depend on parameters.
 
 Let signals jump at an instant ``s`` that depends on a parameter, with ``s_p = ds/dp``. The derivative of
-``x(s(p); p)``, along the instant, is ``S* = S + x' s_p``. Every jump at the instant transforms ``S*`` by its
-total derivative, however many jumps follow one another there::
+``x(s(p); p)``, called the derivative along the instant, is ``S* = S + x' s_p``. Every jump at the instant
+transforms ``S*`` by its total derivative, and there may be several jumps::
 
     S* = S- + f- s_p,    S* := R_x S* + R_z Z* + R_w W* + R_p + R_t s_p (each jump),    S+ = S* - f+ s_p
 
 For a single jump this is the saltation matrix of Hiskens and Pai, IEEE Trans. Circuits and Systems I 47,
 2000, 204-220. Likewise ``Z* = Z + z' s_p``, where z' is 0 except for left limits and delayed values.
 
-``s_p`` is 0 at ticks. At a zero of a guard it is ``-g_p / g'``. Where a source jumps at a known time it is
+``s_p`` is 0 at ticks. At a zero of a guard it is ``-g_p / g'``. For a source that jumps at a known time it is
 the derivative of this time. For the arrival of a delayed jump see
-:mod:`armblocks.equations.sensitivity_delays`. A guard that fires because of these jumps fires at the same
-instant. Where instants of different derivatives coincide, the cause of such a guard is not known: the time
-and one of the guards are noted in ``mixed``.
+:mod:`armblocks.equations.sensitivity_delays`. A guard that fires because of one of these jumps belongs to the
+same instant. If instants with different derivatives coincide, it is unknown to which of them such a guard
+belongs. ``mixed`` then stores the time and one of the guards.
 
-The jumps at an instant are calls of ``reset``. The first call goes from S to S*. A guard that is added fires
-when no other guard fires any more; this last call goes from S* to S. There are two such guards, used in turn,
-because a guard that has just fired does not fire again at once.
+Each jump at an instant is a call of ``reset``. The first call replaces S by S*. An added guard fires after
+all other guards; its call replaces S* by S. There are two such guards, which alternate, because a guard that
+has just fired cannot fire again at once.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from armblocks.equations.sensitivity_delays import DelayedSensitivities
 from armblocks.equations.sensitivity_layout import Columns
 
 LOCATED = 1e-8
-"""A guard that would be 0 within this relative time counts as located; else it has jumped."""
+"""A guard whose zero is within this relative time counts as located; otherwise it has jumped."""
 SAME_INSTANT = 2.0**-48
 """Relative tolerance of equal times."""
 SAME_DERIVATIVE = 1e-6
@@ -81,7 +81,7 @@ class Instants:
         self.times, self.moved = self._breakpoints()
 
     def _breakpoints(self) -> tuple[SX, list[int]]:
-        """Known times at which signals jump, and the places of those that parameters move."""
+        """The breakpoints, and the indices of those that depend on the parameters."""
         c = self.columns
         (p,) = c.system.breakpoints.arguments
         times = vertcat(*c.system.breakpoints.results, SX(0, 1))
@@ -91,7 +91,7 @@ class Instants:
         return times, moved
 
     def source(self, place: int) -> str:
-        """The block with a parameter that moves one of the known times."""
+        """The block with a parameter on which the breakpoint with index ``place`` depends."""
         c = self.columns
         names = zip(c.names, c.seeds)
         movers = [name for name, seed in names if not jtimes(self.times, c.p, seed)[place].is_zero()]
@@ -109,7 +109,7 @@ class Instants:
         c = self.columns
         return c.along(expression, t=0.0, x=c.S[k], z=self.delays.Z[k], w=c.W[k], p=c.seeds[k])
 
-    # Guards of the instants themselves.
+    # Added guards.
 
     def all_guards(self) -> SX:
         c = self.columns
@@ -122,13 +122,13 @@ class Instants:
         )
 
     def directions(self) -> tuple[int, ...]:
-        """Of the guards added."""
+        """The directions of the added guards."""
         return 0, 0, *[1] * (len(self.moved) + 2 * self.delays.n)
 
     # Just before an instant.
 
     def update(self, m: SX) -> SX:
-        """``update`` of everything: at ticks, which are at fixed times, and just before an instant."""
+        """``update`` of the augmented system: at ticks, whose times are fixed, and just before an instant."""
         c = self.columns
         begins = dot(m, m) == 0.0 if m.numel() else SX(1.0)
         updated = c.value(c.system.update, m)
@@ -150,7 +150,8 @@ class Instants:
         return vertcat(updated, *Z, *added.values())
 
     def _captured_by(self, updated: SX, k: int) -> SX:
-        """The derivative of an update by parameter ``k``; between the events of an instant, along it."""
+        """The derivative of an update by parameter ``k``; between the events of an instant, along the
+        instant."""
         c, instant = self.columns, self.open * self.instant_p[k]
         z = self.delays.Z[k] + self.delays.rate_along * instant
         return c.along(updated, t=instant, x=c.S[k], z=z, w=c.W[k], p=c.seeds[k])
@@ -158,7 +159,7 @@ class Instants:
     # At an instant.
 
     def reset(self, e: SX) -> tuple[SX, SX]:
-        """All states and discrete variables after the events ``e``, those of the added guards included."""
+        """All states and discrete variables after the events ``e``, including those of the added guards."""
         c, d, names = self.columns, self.delays, self.columns.names
         ends = [self.guards, 2, len(self.moved), d.n, d.n]
         own, arms, sources, arrived, jumped = vertsplit(e, [0, *accumulate(ends)])
@@ -205,24 +206,25 @@ class Instants:
             "arms": if_else(flips, -self.arms, self.arms),
             "mixed": if_else(logic_and(mixed > 0.0, self.mixed[0] < 0.0), vertcat(c.t, mixed), self.mixed),
             **{f"instant by {name}": instant for name, instant in zip(names, instants)},
-            # A signal that had jumped before the first reset did so at a tick, if at nothing else.
+            # A signal that jumped before the first reset jumped at a tick, whose time is fixed.
             **d.after(arrived, jumped, [if_else(caused, instant, 0.0) for instant in instants]),
         }
         added = [changes.get(name, now) for name, now in c.added.items()]
         return vertcat(*x), vertcat(*z, *added)
 
     def _with_left_limits(self, Z: SX, first: SX, instant: SX) -> SX:
-        """Sensitivities of left limits along the instant, from the first reset on."""
+        """Z with the sensitivities of left limits taken along the instant at the first reset."""
         corrected = SX(Z)
         for number, place in enumerate(self.kept):
             corrected[place] = corrected[place] + first * instant * self.kept_rate[number]
         return corrected
 
     def _instants(self, own: SX, quiet: SX, sources: SX, arrived: SX) -> tuple[list[SX], SX]:
-        """The derivatives of this instant; the number, from 1, of a guard that contradicts them, or 0."""
+        """The derivatives of this instant by the parameters, and the number (from 1) of a guard with
+        different derivatives, or 0."""
         located = logic_and(logic_or(own != 0.0, quiet), self.located)
         marks = vertcat(located, SX.zeros(2), sources != 0.0, arrived != 0.0)
-        # A guard that fired without a zero here was moved by a jump: perhaps by one at a fixed time.
+        # A guard that fired without a located zero was moved by a jump, perhaps by one at a fixed time.
         at_fixed = [self.ticked, *(self._is_now(k) for k in range(self.times.numel()) if k not in self.moved)]
         moved = logic_and(own != 0.0, logic_not(self.located))
         follows = vertcat(moved, SX.zeros(2), sources != 0.0, SX.zeros(arrived.numel()))
@@ -245,7 +247,7 @@ class Instants:
         return instants, if_else(self.known, 0.0, last)
 
     def _is_now(self, k: int) -> SX:
-        """Whether a known time at which signals jump is this instant."""
+        """Whether breakpoint ``k`` is this instant."""
         return fabs(self.columns.t - self.times[k]) <= SAME_INSTANT * self.columns.t
 
     def _times_by_parameter(self, k: int) -> SX:

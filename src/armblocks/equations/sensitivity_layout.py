@@ -1,4 +1,4 @@
-"""The vectors of a system with sensitivities: the symbols of its variables, and the place of each."""
+"""The vectors of a system with sensitivities: the symbols of its variables, and their positions."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from armblocks.equations.signatures import Signature, Slot
 from armblocks.equations.traced_function import TracedFunction
 
 OWN = "sensitivity/"
-"""What the names of the discrete variables begin with that only the sensitivities need."""
+"""Prefix of the names of discrete variables that only the sensitivities need."""
 
 
 def sensitivity_name(path: str, parameter: str) -> str:
@@ -47,14 +47,14 @@ class Columns:
         self.starts: dict[str, SX] = {}
 
     def add(self, name: str, size: int, start: SX | float | Sequence[float] = 0.0) -> SX:
-        """One more discrete variable (size,), with its value at the start."""
+        """Add a discrete variable (size,) with its initial value; return its symbol."""
         symbol = SX.sym(name, size)
         self.added[name] = symbol
         self.starts[name] = densify(SX.ones(size) * SX(start))
         return symbol
 
     def place(self, name: str) -> int:
-        """Where an added discrete variable begins in the whole of ``z``."""
+        """The first index of an added discrete variable in the augmented ``z``."""
         place = self.z.numel() * (1 + len(self.names))
         for other, symbol in self.added.items():
             if other == name:
@@ -63,11 +63,11 @@ class Columns:
         raise KeyError(name)
 
     def value(self, traced: TracedFunction, *more: SX) -> SX:
-        """The results of one of the system's functions of ``t, x, z, w, p``, in these symbols."""
+        """The results of a system function of ``t, x, z, w, p`` as expressions in these symbols."""
         return self.value_at(traced, self.t, self.x, self.z, self.w, *more)
 
     def value_at(self, traced: TracedFunction, t: SX, x: SX, z: SX, w: SX, *more: SX) -> SX:
-        """The same at another point."""
+        """The results of a system function at another point."""
         function = Function("f", list(traced.arguments), [vertcat(*traced.results, SX(0, 1))])
         (result,) = function.call([t, x, z, w, self.p, *more], True, False)
         return densify(result)
@@ -97,7 +97,7 @@ class Columns:
         return parts[letter]
 
     def function(self, name: str, more: Mapping[str, SX], **results: SX) -> TracedFunction:
-        """A function of the whole system: with flat symbols for all inputs, as every system has them."""
+        """A function of the augmented system, with flat symbols for all inputs."""
         inside: dict[str, list[SX]] = {"t": [self.t]}
         inside |= {letter: self._parts(letter) for letter in "xzw"}
         inside |= {"p": [self.p]} | {letter: [column] for letter, column in more.items()}

@@ -1,7 +1,8 @@
-"""Events at the start, which a change of a parameter would move into the run or out of it.
+"""Events at the start of a run that a change of a parameter would move into the run or before it.
 
-There is one derivative for a change that moves the event into the run and another one for a change that moves
-it out, unless both sides of the event are alike. The start is evaluated in Python, once, before a run.
+A change that moves the event into the run and a change that moves it before the run have different
+derivatives, unless flow and signals are the same on both sides of the event. The start is evaluated once, in
+Python, before a run.
 """
 
 from __future__ import annotations
@@ -19,15 +20,15 @@ from armblocks.errors import InputError
 Array = NDArray[np.float64]
 
 AT_ZERO = 1e-8
-"""A guard that would be 0 within this time (s) counts as 0."""
+"""A guard whose zero is within this time (s) counts as 0."""
 ALIKE = 1e-9
 """Relative tolerance of equal derivatives of states and signals."""
 
 
 def refuse_moving_start(system: HybridSystem, parameters: Sequence[str]) -> None:
-    """Raise ``InputError`` where an event is at the start, a parameter moves it, and its sides differ.
+    """Raise ``InputError`` if an event is at the start, depends on a parameter, and its two sides differ.
 
-    Not checked: diagrams with implicit equations, whose unknowns are not known yet.
+    Diagrams with implicit equations are not checked, because their unknowns are not solved yet.
     """
     if not system.guard_directions or system.algebraic.size:
         return
@@ -45,7 +46,7 @@ def refuse_moving_start(system: HybridSystem, parameters: Sequence[str]) -> None
 
 
 class _Start:
-    """The instant 0 of a run: after the ticks, and with consistent modes."""
+    """The time 0 of a run, after the ticks and with consistent modes."""
 
     def __init__(self, system: HybridSystem) -> None:
         self.system = system
@@ -68,7 +69,7 @@ class _Start:
         return tuple(value.ravel() for value in traced(0.0, x, z, np.empty(0), self.p, *more))
 
     def moving_guards(self, entries: slice) -> list[int]:
-        """The guards that are at zero, move with some of these parameters, and have sides that differ."""
+        """The guards that are zero, depend on one of these parameters, and whose two sides differ."""
         found: set[int] = set()
         for point in (self.before, self.after):
             g, rate, moves = self._guards(*point, entries)
@@ -82,7 +83,8 @@ class _Start:
         return sorted(found)
 
     def held_states(self, entries: slice) -> list[str]:
-        """The blocks whose initial states do not depend on these parameters."""
+        """The blocks with states whose derivative by these parameters is changed by the reset at the
+        start."""
         system = self.system
         t, x, z, w, p, e = system.reset.arguments
         after = vertcat(*system.reset.results)[: x.numel()]
@@ -95,7 +97,8 @@ class _Start:
         return [names[place].rpartition("/")[0] for place in np.flatnonzero(found > AT_ZERO)]
 
     def _initial_rates(self, p: SX, entries: slice) -> list[tuple[SX, SX, SX]]:
-        """Of each parameter the derivatives of the states and of the discrete variables at the start."""
+        """For each parameter entry the derivatives of the initial states and discrete variables, and its unit
+        vector."""
         found: list[tuple[SX, SX, SX]] = []
         for place in range(entries.start, entries.stop):
             seed = SX.zeros(p.numel())
@@ -110,7 +113,7 @@ class _Start:
         return found
 
     def _guards(self, x: Array, z: Array, entries: slice) -> tuple[Array, Array, Array]:
-        """The guards, their time derivatives, and by how much the parameters move them, each (ng,)."""
+        """The guards, their time derivatives, and their largest derivative by the parameters, each (ng,)."""
         t, states, discrete, w, p = self.system.guards.arguments
         g = vertcat(*self.system.guards.results)
         derivative = self.system.derivative
@@ -127,7 +130,7 @@ class _Start:
     def _numbers(
         self, symbols: list[SX], results: list[SX], point: tuple[Array, Array], *more: Array
     ) -> list[Array]:
-        """Expressions of ``t, x, z, w, p`` and what comes behind them, at the start."""
+        """The values of expressions in ``symbols`` at the start; ``more`` follows after ``t, x, z, w, p``."""
         given = [np.zeros(1), *point, np.empty(0), self.p, *more]
         values = Function("f", symbols, [densify(result) for result in results]).call(given)
         return [np.array(value, dtype=np.float64).ravel() for value in values]

@@ -23,9 +23,10 @@ Shape = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Slot:
-    """One named quantity: its shape and its SI unit (``""`` where it has none or they differ).
+    """One named quantity: its shape and its SI unit (``""`` if it has none or its entries differ).
 
-    ``entries`` are names of the entries of a vector, such as those of joints; without them they are numbered.
+    ``entries`` are the names of the entries of a vector, such as joint names; without names they are
+    numbered.
     """
 
     name: str
@@ -47,7 +48,8 @@ class Slot:
 
     @property
     def entry_names(self) -> tuple[str, ...]:
-        """A name for each entry: ``entries``, or indices, ``0`` or ``0,3``; one empty name of a scalar."""
+        """A name for each entry: ``entries``, else indices such as ``0`` or ``0,3``; an empty name for a
+        scalar."""
         if self.entries:
             return self.entries
         places = itertools.product(*(range(count) for count in self.shape))
@@ -107,7 +109,7 @@ class Signature:
         return self._by_name[name]
 
     def with_entries(self, entries: Mapping[str, tuple[str, ...]]) -> Signature:
-        """The same quantities, some of them with names of their entries."""
+        """The same quantities, with ``entries`` as the names of the entries of some."""
         if not entries:
             return self
         return Signature(

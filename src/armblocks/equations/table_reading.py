@@ -53,7 +53,7 @@ def reads_tables(function: Function) -> bool:
 
 
 def tables_read(function: Function) -> set[tuple[int, int, int]]:
-    """Which tables a function reads: the input that each is part of, its first place there, its length."""
+    """The tables that a function reads: the input of each, its first index there, its length."""
     found: set[tuple[int, int, int]] = set()
     if not reads_tables(function):
         return found
@@ -120,7 +120,7 @@ def evaluate_with_reads(function: Function, arguments: Sequence[NDArray[np.float
 
 
 def _called(function: Function, values: Sequence[float]) -> list[float]:
-    """All structural entries of the results of a function that is called, for those of its arguments."""
+    """All structural entries of the results of a called function, from the entries of its arguments."""
     starts = itertools.accumulate((function.nnz_in(k) for k in range(function.n_in())), initial=0)
     spans = itertools.pairwise(starts)
     arguments = [DM(function.sparsity_in(k), list(values[start:end])) for k, (start, end) in enumerate(spans)]

@@ -22,10 +22,10 @@ class TracedFunction:
     ``arguments[i]`` is the flat column of symbols of input slot ``i`` and ``results[j]`` the flat dense
     column of output slot ``j`` (both row by row, see :mod:`armblocks.equations.signatures`).
 
-    ``rounded``: products that are separate values, such as signals. Numerics round them even if they could be
-    fused with a following sum. Such a signal then has the same bits in every function of a system, and a sum
-    of signals is the sum of the recorded values. Products inside a block may be fused if no other expression
-    of the function uses them.
+    ``rounded``: products that are separate values, such as signals. The compiler rounds them even if they
+    could be fused with a following sum. A signal is then bitwise the same in every function of a system, and
+    a sum of signals is the sum of the recorded values. Products inside a block may be fused if no other
+    expression of the function uses them.
     """
 
     name: str
@@ -41,8 +41,8 @@ class TracedFunction:
     ) -> TracedFunction:
         """Call ``equations`` once with symbols.
 
-        It gets one SX per input slot in its natural shape (scalar 1x1, vector a column, matrix as it is) and
-        returns one SX per output slot, likewise.
+        ``equations`` receives one SX per input slot in its natural shape (scalar 1x1, vector as a column,
+        matrix) and returns one SX per output slot in the same form.
         """
         symbols = tuple(SX.sym(slot.name, *matrix_shape((slot.size,))) for slot in inputs)
         natural = [unflatten(symbol, slot.shape) for symbol, slot in zip(symbols, inputs)]
