@@ -36,7 +36,7 @@ FAMILIES = (
     "lookup",
     "functions",
 )
-"""The families in the order in which lists show them; within a family the types are in alphabetical order."""
+"""The families in their order in lists. Within a family the types are in alphabetical order."""
 
 _KNOWN_TO_THE_DIAGRAM: dict[str, tuple[type[Block], ...]] = {
     "routing": (BusAssignment, BusCreator, BusSelector, From, Goto, Merge),
@@ -51,7 +51,7 @@ _KNOWN_TO_THE_DIAGRAM: dict[str, tuple[type[Block], ...]] = {
         TriggeredSubsystem,
     ),
 }
-"""The block types that passes over a diagram handle themselves; the diagram layer defines them."""
+"""The block types that the diagram layer defines, because its passes over a diagram process them."""
 
 
 def _kinds_of(family: str) -> Iterator[type[Block]]:

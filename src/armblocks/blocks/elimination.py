@@ -11,7 +11,7 @@ from casadi import SX, fabs, horzcat, if_else, vertcat
 
 
 def solve(A: SX, B: SX) -> SX:
-    """X (n, k) with A X = B, for A (n, n) and B (n, k); not finite where A is singular."""
+    """X (n, k) with A X = B, for A (n, n) and B (n, k); not finite if A is singular."""
     n = A.shape[0]
     rows, _ = _triangular(horzcat(A, B))
     found: list[SX] = [SX(0, 0)] * n

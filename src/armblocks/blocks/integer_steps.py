@@ -27,9 +27,9 @@ ROUNDINGS: Mapping[str, Callable[[SX], SX]] = {
 
 
 def rounding_edges(function: str, n: SX, mirrored: bool = False) -> tuple[SX, SX]:
-    """The border above which a rounding exceeds n, and whether the border itself is rounded above n.
+    """The border above which a rounding exceeds n, and whether the border itself is rounded to more than n.
 
-    ``mirrored``: of -f(-u) in the place of f(u).
+    ``mirrored``: the same for -f(-u) instead of f(u).
     """
     if function == "round":
         return n + 0.5, n >= 0.0

@@ -17,9 +17,10 @@ from armblocks.blocks.splines import spline_slopes
 from armblocks.equations import Shape, flatten
 
 METHODS = ("linear", "nearest", "flat", "cubic")
-"""Piecewise linear; the nearest entry (halfway: the upper one); the entry at or below; the cubic spline."""
+"""Interpolation methods: piecewise linear; nearest entry (halfway: the upper one); entry at or below; cubic
+spline."""
 EXTRAPOLATIONS = ("clip", "linear")
-"""Extrapolation: the value at the end, or the tangent at the end."""
+"""Extrapolation methods: the value at the end, or the tangent at the end."""
 
 Point = float | SX
 
@@ -31,9 +32,9 @@ def weights(
     extrapolation: str = "clip",
     cell: SX | None = None,
 ) -> list[SX]:
-    """The weight of each of n >= 2 rising break points at position ``u``, a scalar.
+    """The weight of each of n >= 2 ascending break points at position ``u``, a scalar.
 
-    Break points may be symbols where the method is not ``cubic``.
+    Break points may be symbols, except for the method ``cubic``.
 
     ``cell``, if given, is the number of :func:`borders` at or below u and selects the equations.
     """
@@ -63,7 +64,8 @@ def weights(
 
 
 def borders(points: Sequence[Point], method: str, extrapolation: str) -> list[Point]:
-    """The positions at which the curve or its derivative jumps; of a spline, only where it is clipped."""
+    """The positions at which the curve or its derivative jumps; for a spline, only the ends if it is
+    clipped."""
     if method == "flat":
         return list(points[1:])
     if method == "nearest":

@@ -108,7 +108,7 @@ class RationalBlock(Block):
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         b, a = self._normalised(p)
-        # y = b0 u + sum (b_i - b0 a_i) x_i; a strictly proper system has no b0 and no feedthrough.
+        # y = b0 u + sum (b_i - b0 a_i) x_i; for a strictly proper system b0 is 0, so there is no feedthrough.
         return {"y": b[0] * u["u"] + dot(b[1:] - b[0] * a[1:], x["x"])}
 
     def initial_states(self, p: Signals) -> Signals:

@@ -47,7 +47,7 @@ class LinearSystem:
 def complex_roots(given: ArrayLike, where: str, name: str) -> Roots:
     """Zeros or poles, as (n,) real numbers or (n, 2) rows (real, imaginary).
 
-    Raises ``InputError`` where a complex root lacks its conjugate.
+    Raises ``InputError`` if a complex root lacks its conjugate.
     """
     values = np.asarray(given, dtype=np.float64)
     if values.ndim == 2 and values.shape[1] != 2:
@@ -99,7 +99,8 @@ def _sections(zeros: Roots, poles: Roots) -> list[tuple[list[complex], list[comp
     pole_groups = _groups(poles)
     zero_groups = _groups(zeros)
     pairs = [group for group in zero_groups if len(group) == 2]
-    # A pair of zeros needs a section with two poles; real poles are paired where conjugate pairs are too few.
+    # A pair of zeros needs a section with two poles; if there are too few conjugate pairs, real poles are
+    # paired.
     while sum(len(group) == 2 for group in pole_groups) < len(pairs):
         first, second = [group for group in pole_groups if len(group) == 1][:2]
         pole_groups = [group for group in pole_groups if group is not first and group is not second]
@@ -119,7 +120,7 @@ def _groups(roots: Roots) -> list[list[complex]]:
 
 
 def _section(zeros: Sequence[complex], poles: Sequence[complex]) -> tuple[LinearSystem, float]:
-    """``factor`` times the section, and the factor that makes its gain about 1."""
+    """The section multiplied by a factor that makes its gain about 1, and the factor."""
     size = max(map(magnitude, poles)) or 1.0
     factor = math.prod([size] * len(poles)) / math.prod(max(magnitude(zero), size) for zero in zeros)
     above, below = factor * _polynomial(zeros), _polynomial(poles)

@@ -22,7 +22,7 @@ AGAIN = Guard("again", (), "the input has been sampled", -1)
 
 
 def sample_time(p: Signals, count: SX) -> SX:
-    """The sample time t_k: one product and one sum, as for the ticks of a clock."""
+    """The sample time t_k = offset + k T, computed as for the ticks of a clock."""
     return p["offset"] + count * p["period"]
 
 

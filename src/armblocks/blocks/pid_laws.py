@@ -138,7 +138,7 @@ class ContinuousPid:
         return found
 
     def resets(self, x: Signals, p: Signals, fired: Signals) -> Signals:
-        """Modes and states after events."""
+        """The modes and states after events."""
         found = dict[str, SX]()
         if self.limited:
             found["limit"] = zone_after(x["limit"], fired)

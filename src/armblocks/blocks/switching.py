@@ -19,7 +19,7 @@ from armblocks.diagram import (
 from armblocks.errors import InputError
 
 JUST = 1e-300
-"""An offset below any signal resolution: it assigns the threshold itself to one side."""
+"""An offset below the resolution of any signal, which assigns the threshold itself to one side."""
 
 
 SMALLEST_JUMP = 1e-9
@@ -56,7 +56,7 @@ def located(block: Block, *conditions: Condition) -> tuple[Condition, ...]:
 
 
 def limits_in_order(block: Block, lower: str, upper: str) -> None:
-    """Raise ``InputError`` where a lower limit exceeds the upper one."""
+    """Raise ``InputError`` if a lower limit exceeds the upper limit."""
     low, high = block.parameter_value(lower), block.parameter_value(upper)
     broadcast({lower: shape_of(low), upper: shape_of(high)})
     if np.any(np.greater(np.asarray(low), np.asarray(high))):

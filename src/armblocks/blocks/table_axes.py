@@ -1,8 +1,8 @@
 """The axes of a lookup table: cells, and events at which a position enters another cell.
 
-Along each axis the *borders* are the positions at which the value or its derivative jumps; *cell* k lies
-above k borders. With event location, the cell is a mode, so that a step sees one smooth piece of the table.
-The points of short tables are part of the equations; long tables are read by index (see :mod:`.long_tables`).
+Along each axis the *borders* are the positions at which the value or its derivative jumps. *Cell* k is above
+k borders. With event location, the cell is a mode, so that the table is smooth within a solver step. The
+points of short tables are part of the equations; long tables are read by index (see :mod:`.long_tables`).
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class Axis(Protocol):
 
     @property
     def has_borders(self) -> bool:
-        """Whether the axis has events."""
+        """Whether entering another cell of the axis is an event."""
         ...
 
     def cell(self, u: SX) -> SX:
@@ -75,11 +75,11 @@ class Axis(Protocol):
         ...
 
     def to_next(self, u: SX, cell: SX) -> SX:
-        """The distance of u beyond the upper border of its cell; -inf if there is none."""
+        """The distance of u beyond the upper border of its cell; -inf without an upper border."""
         ...
 
     def to_last(self, u: SX, cell: SX) -> SX:
-        """The distance of u beyond the lower border of its cell; inf if there is none."""
+        """The distance of u beyond the lower border of its cell; inf without a lower border."""
         ...
 
 
@@ -229,7 +229,7 @@ class Axes:
         )
 
     def guard_values(self, x: Signals, u: Signals) -> Signals:
-        """The distances of the inputs to both ends."""
+        """The distances of the inputs beyond both ends of their cells."""
         found = dict[str, SX]()
         for port, k, axis in self._moving():
             place = [u[port], x[f"cell{k}"]]
@@ -355,7 +355,7 @@ class BlockWithAxes(Block):
 
     @classmethod
     def _positions(cls) -> tuple[str, ...]:
-        """The parameters that hold positions."""
+        """The parameters that contain positions."""
         return tuple(rule.name for rule in cls.parameters() if rule.name.startswith("positions"))
 
     def _along(self) -> Mapping[str, list[float]]:
@@ -375,7 +375,7 @@ class BlockWithAxes(Block):
         return str(self.parameter_value("method"))
 
     def _axes(self, p: Signals | None = None) -> Axes:
-        """The axis of each input; with run inputs where these hold the positions."""
+        """The axis of each input, with the positions from run inputs where the table is long."""
         extrapolation = str(self.parameter_value("extrapolation"))
         found = dict[str, Axis]()
         if p and is_spline(self, self._is_long()):

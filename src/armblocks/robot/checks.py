@@ -17,7 +17,8 @@ MOST_LINKS = 1000
 
 
 def check_robot(name: str, links: Sequence[Link], frames: Mapping[str, Transform], gravity: Vector3) -> None:
-    """Raise RobotError for the first inconsistency; warn (ArmblocksWarning) of friction that accelerates."""
+    """Raise RobotError for the first inconsistency; warn (ArmblocksWarning) if friction accelerates a
+    joint."""
     robot = f"robot '{name}'"
     for k, link in enumerate(links):
         check_kind(link, Link, where=f"{robot}, link number {k + 1}")
@@ -39,7 +40,7 @@ def check_robot(name: str, links: Sequence[Link], frames: Mapping[str, Transform
 
 
 def _check_tree(robot: str, links: Sequence[Link]) -> None:
-    """Count, names and parents: every chain of parents ends at the base."""
+    """Check the number of links, their names and parents: every chain of parents ends at the base."""
     if not links:
         raise RobotError("it has no links", where=robot, allowed="1 link or more", fix="add a link")
     if len(links) > MOST_LINKS:
@@ -164,7 +165,7 @@ def _numbers(transform: Transform) -> Iterator[float]:
 
 
 def _link_numbers(link: Link) -> Iterator[tuple[str, float]]:
-    """Every number of a link with the name of its field."""
+    """All numbers of a link, each with the name of its field."""
     if link.dh is not None:
         for name in ("alpha", "a", "d", "theta", "offset"):
             yield f"D-H {name}", getattr(link.dh, name)

@@ -117,6 +117,7 @@ def modified_dh(
 
 
 def serial_chain(links: Sequence[Link]) -> tuple[Link, ...]:
-    """The links with each one's parent set to the link before it, the first on the base."""
+    """The links as a chain: the parent of each link is the one before it, that of the first link is the
+    base."""
     parents = (None, *(link.name for link in links))
     return tuple(replace(link, parent=parent) for link, parent in zip(links, parents))

@@ -28,7 +28,7 @@ from armblocks.spatial import Transform, transl, trotx
 
 
 def converted(robot: Robot, convention: DhConvention) -> Robot:
-    """The same arm in rows of ``convention``: pose of the tool, Jacobian and joint torques stay.
+    """The same arm in rows of ``convention``: pose of the tool, Jacobian and joint torques are unchanged.
 
     The link frames change, and with them the meaning of a wrench in the last link's frame. Raises RobotError
     for a robot that is not a single chain of D-H rows.
@@ -39,7 +39,7 @@ def converted(robot: Robot, convention: DhConvention) -> Robot:
     shifts = [transl(row.a, 0.0, 0.0) @ trotx(row.alpha) for row in rows]
     if convention is DhConvention.MODIFIED:
         numbers = [(0.0, 0.0), *((row.alpha, row.a) for row in rows[:-1])]
-        moved = shifts  # a link's old frame as seen from its new one, which stands before the shift
+        moved = shifts  # pose of a link's old frame in its new frame, which precedes the shift
         ends = {"tool": shifts[-1] @ robot.tool}
     else:
         numbers = [*((row.alpha, row.a) for row in rows[1:]), (0.0, 0.0)]
@@ -53,9 +53,9 @@ def converted(robot: Robot, convention: DhConvention) -> Robot:
 
 
 def reread(robot: Robot, convention: DhConvention) -> Robot:
-    """The same numbers in rows of the other convention: another arm.
+    """The same numbers read as rows of the other convention, which describe another arm.
 
-    Raises RobotError as :func:`converted` does.
+    Raises RobotError in the cases of :func:`converted`.
     """
     rows = [replace(row, convention=convention) for row in _rows(robot)]
     return replace(
@@ -84,8 +84,8 @@ def _rows(robot: Robot) -> Sequence[DhRow]:
 
 
 def _retold(link: Link, row: DhRow, T_new_old: Transform) -> Link:
-    """The link with another row, with its body transformed to the new frame, in which the old one has this
-    pose."""
+    """The link with another row. Its body is transformed to the new frame, in which the old frame has the
+    given pose."""
     R = T_new_old.R
     inertia = R @ link.I @ R.T
     geometry = link.geometry

@@ -1,4 +1,4 @@
-"""One row of a Denavit-Hartenberg table and the transforms that it stands for."""
+"""One row of a Denavit-Hartenberg table and its transforms."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from armblocks.spatial import Transform, transl, trotx, trotz
 
 
 class DhConvention(Enum):
-    """Where the joint stands in the row."""
+    """The position of the joint in the row."""
 
     STANDARD = "standard"
-    """``T = Rz(theta) Tz(d) Tx(a) Rx(alpha)``: the link frame lies at the link's far end."""
+    """``T = Rz(theta) Tz(d) Tx(a) Rx(alpha)``: the link frame is at the distal end of the link."""
     MODIFIED = "modified"
-    """``T = Rx(alpha) Tx(a) Rz(theta) Tz(d)`` (Craig): the link frame lies on the link's own joint axis."""
+    """``T = Rx(alpha) Tx(a) Rz(theta) Tz(d)`` (Craig): the link frame is on the axis of the link's joint."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,8 +26,8 @@ class DhRow:
     """One row of a Denavit-Hartenberg table: a joint and the link that it carries.
 
     ``alpha`` rad, ``a`` m, ``d`` m, ``theta`` rad, ``sigma`` 0 revolute or 1 prismatic, ``offset`` rad, m.
-    As in the toolbox, the row's own ``theta`` of a revolute joint and ``d`` of a prismatic joint are places
-    of the joint variable and not used: the variable is ``q + offset``.
+    As in the toolbox, the numbers ``theta`` of a revolute joint and ``d`` of a prismatic joint are not used,
+    because the joint variable ``q + offset`` replaces them.
 
     Source: Denavit and Hartenberg 1955 as in Corke, *Robotics, Vision and Control*, 2nd ed., section 7.1;
     modified: Craig, *Introduction to Robotics*, section 3.4.
@@ -74,7 +74,7 @@ class DhRow:
 
     @property
     def _fixed_part(self) -> Transform:
-        """Of ``Rz(theta) Tz(d)`` the factor that does not move; the two commute."""
+        """The constant factor of ``Rz(theta) Tz(d)``; the two factors commute."""
         return trotz(self.theta) if self.sigma else transl(0.0, 0.0, self.d)
 
     def joint(self, limits: JointLimits | None = None) -> Joint:

@@ -14,8 +14,8 @@ _WIDTH = 10
 def dh_table(robot: Robot) -> list[str]:
     """The D-H table as releases 9 and 10 of the toolbox print it, but with the names of the joints.
 
-    Empty where a link has no D-H row. ``q`` stands in the place of the joint variable; theta, alpha
-    and the offset of a revolute joint in rad, the rest in m.
+    Empty if a link has no D-H row. The joint variable is printed as ``q``. theta, alpha and the offset of a
+    revolute joint are in rad, the other numbers in m.
     """
     if any(link.dh is None for link in robot.links):
         return []
@@ -38,7 +38,7 @@ def _cells(link: Link) -> Sequence[str]:
 
 
 def kinematics_text(robot: Robot) -> str:
-    """The D-H table, or a line for each link where there is none: its parent, joint, axis and place."""
+    """The D-H table; without D-H rows a line for each link with its parent, joint, axis and position."""
     table = dh_table(robot)
     if table:
         return "\n".join([*table, "theta and alpha in rad, d and a in m"])

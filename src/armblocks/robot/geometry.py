@@ -1,9 +1,9 @@
 """The geometry of a robot: shapes of the links, or castings derived from the kinematics.
 
-A link without ``geometry`` gets a body that follows its joint axes. From the joint that carries the link the
-body runs along that axis to the common normal of the two axes, along the normal, and along the next axis to
-the next joint: for a standard D-H row these are d and a, so that the drawing is the table made visible.
-Each joint that turns gets a motor drum, each that slides a rail and a carriage, the tip a flange.
+A link without ``geometry`` gets a body that follows its joint axes. The body begins at the joint of the link.
+It follows the axis to the common normal of this axis and the next one, then the normal, then the next axis to
+the next joint. For a standard D-H row these are the lengths d and a, so the drawing shows the D-H table. Each
+revolute joint gets a motor drum, each prismatic joint a rail and a carriage, the tip a flange.
 
 The sizes affect the appearance only, not the dynamics.
 """
@@ -27,22 +27,22 @@ from armblocks.spatial import Transform
 
 _Array = NDArray[np.float64]
 
-_BASE_RADIUS = 0.06  # of the reach: the drum of the first joint
-_TAPER = 0.82  # each joint's drum against the one before
-_SMALLEST = 0.45  # of the first drum: wrists stay visible
-_NEGLIGIBLE = 0.02  # of a drum's radius: shorter pieces are not drawn
+_BASE_RADIUS = 0.06  # radius of the first joint's drum, relative to the reach
+_TAPER = 0.82  # radius of each joint's drum, relative to the drum before
+_SMALLEST = 0.45  # minimum radius, relative to the first drum, so that wrists are visible
+_NEGLIGIBLE = 0.02  # shorter pieces, relative to a drum's radius, are not drawn
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Body:
-    """One mesh and the frame it moves with: ``row`` of ``link_poses`` (0 the base, then the links)."""
+    """One mesh, and the ``row`` of ``link_poses`` with its frame (0 the base, then the links)."""
 
     row: int
     mesh: TriangleMesh
 
 
 def robot_bodies(robot: Robot) -> tuple[Body, ...]:
-    """Everything that is drawn of a robot, each mesh in the frame of its row of ``link_poses``."""
+    """All meshes of a robot, each in the frame of its row of ``link_poses``."""
     return tuple(
         Body(row=row, mesh=triangles(shape))
         for row, shapes in enumerate(robot_shapes(robot))
@@ -52,14 +52,14 @@ def robot_bodies(robot: Robot) -> tuple[Body, ...]:
 
 @lru_cache(maxsize=32)
 def robot_shapes(robot: Robot) -> tuple[tuple[Shape, ...], ...]:
-    """The shapes of base, every link, and tool: as many rows as ``link_poses`` has."""
+    """The shapes of the base, every link, and the tool, with one row for each row of ``link_poses``."""
     plan = _Plan.of(robot)
     rows: list[list[Shape]] = [_base_shapes(robot, plan)]
     for link in robot.links:
         made = _link_shapes(robot, link, plan)
         rows.append(list(link.geometry) if link.geometry is not None else made)
     rows.append([])
-    # The rail that a sliding joint runs on belongs to what carries the joint.
+    # The rail of a prismatic joint belongs to the body that carries the joint.
     row_of = {link.name: row for row, link in enumerate(robot.links, start=1)}
     for link in robot.links:
         carrier = row_of[link.parent] if link.parent is not None else 0
@@ -75,7 +75,7 @@ def drum_radii(robot: Robot) -> dict[str, float]:
 
 @lru_cache(maxsize=32)
 def reach(robot: Robot) -> float:
-    """An upper bound of the distance from base to tip with sliding joints at rest, m; at least 0.1."""
+    """An upper bound of the distance from base to tip with prismatic joints at 0, m; at least 0.1."""
     length: dict[str, float] = {}
     for link in _parents_first(robot):
         own = math.hypot(*link.before.translation) + math.hypot(*link.after.translation)
@@ -86,11 +86,11 @@ def reach(robot: Robot) -> float:
 
 
 def _parents_first(robot: Robot) -> tuple[Link, ...]:
-    """The links, each after the one that carries it; a description may name them in any order."""
+    """The links sorted so that each follows its parent; a description may list them in any order."""
     known: set[str | None] = {None}
     ordered: list[Link] = []
     waiting = list(robot.links)
-    while waiting:  # Robot has checked that there is no circle, so every round places a link
+    while waiting:  # Robot has checked that there is no cycle, so every iteration places a link
         ready = [link for link in waiting if link.parent in known]
         ordered += ready
         known.update(link.name for link in ready)
@@ -101,8 +101,8 @@ def _parents_first(robot: Robot) -> tuple[Link, ...]:
 def link_frames(robot: Robot, q: Sequence[float]) -> NDArray[np.float64]:
     """Poses of base, every link and tool in the world at joint coordinates ``q``, (L+2, 4, 4), rad and m.
 
-    The rows of ``dynamics.trace_link_poses``, worked out link by link for a drawing that has no compiled
-    signal to read. ``q`` is not checked.
+    The rows of ``dynamics.trace_link_poses``, computed link by link for drawings without a compiled signal.
+    ``q`` is not checked.
     """
     frames: dict[str | None, Transform] = {None: robot.base}
     coordinates = {link.name: float(value) for link, value in zip(robot.moving_links, q)}
@@ -115,7 +115,8 @@ def link_frames(robot: Robot, q: Sequence[float]) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, eq=False)
 class _Plan:
-    """Sizes that links must agree on: the drum radius of every joint by link name, and who carries whom."""
+    """Sizes that several links share: the drum radius of every joint by link name, and the children of each
+    link."""
 
     radius: dict[str, float]
     children: dict[str | None, list[Link]]
@@ -137,7 +138,8 @@ class _Plan:
         return cls(radius, children, {link.name: link for link in robot.links}, size)
 
     def stands_up(self, link: Link) -> bool:
-        """Whether the link is a column on the base: a vertical joint whose body first runs well upwards."""
+        """Whether the link is a column on the base: a vertical joint whose body begins with a long upward
+        part."""
         upright = link.before.R @ np.array(link.joint.axis)
         if link.parent is not None or not link.joint.turn or upright[2] < 0.99:
             return False
@@ -153,7 +155,7 @@ class _Plan:
         return min(rises) > 1.8 * self.radius[link.name]
 
     def shares_centre(self, link: Link) -> bool:
-        """Whether the link's joint turns about another axis through the centre of its carrier's joint."""
+        """Whether the link's joint and its parent's joint have the same centre and different axes."""
         parent = self.links.get(link.parent) if link.parent is not None else None
         if parent is None or not (parent.joint.turn and link.joint.turn):
             return False
@@ -168,7 +170,7 @@ def _unit(vector: _Array) -> _Array:
 
 
 def _aligned(origin: _Array, z: _Array, x_hint: _Array | None = None) -> Pose:
-    """A frame at ``origin`` with its z axis along ``z`` and x as near to ``x_hint`` as that allows."""
+    """A frame at ``origin`` with its z axis along ``z`` and its x axis as close as possible to ``x_hint``."""
     z = _unit(z)
     hint = np.zeros(3) if x_hint is None else x_hint - (x_hint @ z) * z
     if np.linalg.norm(hint) < 1e-6:
@@ -186,7 +188,7 @@ def _body_path(start: _Array, start_axis: _Array, end: _Array, end_axis: _Array)
     across = np.cross(start_axis, end_axis)
     between = end - start
     square = float(across @ across)
-    if square < 1e-9:  # parallel axes: the normal may stand anywhere; go along the first axis first
+    if square < 1e-9:  # parallel axes: the common normal is not unique; follow the first axis first
         foot = start + (between @ start_axis) * start_axis
         return [start, foot, end, end]
     s = float(np.cross(between, end_axis) @ across) / square
@@ -201,10 +203,10 @@ def _link_shapes(robot: Robot, link: Link, plan: _Plan) -> list[Shape]:
     r = plan.radius[link.name]
     shapes: list[Shape] = []
     if plan.stands_up(link):
-        # The column rises from the base plate: the drum is a ring in it, clear of the floor.
+        # The column rises from the base plate: the drum is a ring in the column, above the floor.
         shapes += _drum(start + 1.35 * r * axis, axis, r, length=1.5 * r)
     elif link.joint.turn:
-        # Where two joints share their centre (shoulder, wrist) the inner drum pierces the outer collar.
+        # If two joints share their centre (shoulder, wrist), the inner drum passes through the outer collar.
         inside = plan.shares_centre(link)
         shapes += _drum(start, axis, r, length=2.15 * plan.radius[link.parent or ""] if inside else 2.0 * r)
     elif link.joint.slide:
@@ -262,12 +264,12 @@ def _casting(
 
 
 def _tip(robot: Robot, link: Link, start: _Array, axis: _Array, r: float) -> list[Shape]:
-    """The last casting of a branch with its flange, and the tool's shaft if this is the robot's tip."""
+    """The last casting of a branch with its flange, and the shaft of the tool at the robot's tip."""
     end = np.zeros(3)
     outward = np.array([0.0, 0.0, 1.0])
     shapes = _casting(start, axis, r, end, outward, 0.8 * r)
     if np.linalg.norm(end - start) < r:
-        # All axes meet in the wrist: the flange would be hidden in it, so it stands off a little.
+        # All axes meet in the wrist and would hide the flange, so it is shifted outwards.
         shapes.append(
             Housing(
                 start=(0.6 * r, 0.6 * r),
@@ -279,7 +281,7 @@ def _tip(robot: Robot, link: Link, start: _Array, axis: _Array, r: float) -> lis
             )
         )
         end = end + 1.5 * r * outward
-    # Where the last body already runs along the flange's axis the drum closes it, elsewhere it is a hub.
+    # If the last body is along the flange's axis, the drum is its end; otherwise the drum is a hub.
     shapes += [
         Cylinder(
             radius=0.72 * r,
@@ -313,7 +315,7 @@ def _tip(robot: Robot, link: Link, start: _Array, axis: _Array, r: float) -> lis
 
 
 def _base_shapes(robot: Robot, plan: _Plan) -> list[Shape]:
-    """A foot under each joint that stands on the base, and a beam to those that stand aside."""
+    """A foot under each joint on the base, and a beam to joints beside the base frame."""
     shapes: list[Shape] = []
     for link in plan.children.get(None, []):
         r = plan.radius[link.name]
@@ -322,7 +324,7 @@ def _base_shapes(robot: Robot, plan: _Plan) -> list[Shape]:
         if np.linalg.norm(foot) > r:
             shapes += _casting(np.zeros(3), np.array([0.0, 0.0, 1.0]), 1.1 * r, foot, axis, r)
         upright = np.array([0.0, 0.0, 1.0])
-        # A column stands on the base frame; a joint in the frame itself needs its foot below.
+        # A column is above the base frame; a joint at the origin of the frame needs a foot below it.
         bottom = 0.0 if plan.stands_up(link) else -1.16 * r
         shapes += [
             Housing(
@@ -345,10 +347,10 @@ def _base_shapes(robot: Robot, plan: _Plan) -> list[Shape]:
 
 
 def _rail(link: Link, plan: _Plan) -> Shape:
-    """The guide of a sliding joint over its whole range, in the frame of what carries the joint."""
+    """The rail of a prismatic joint over its whole range, in the frame of the body that carries the joint."""
     r = plan.radius[link.name]
     low, high = link.joint.limits.position or (0.0, 0.3 * plan.reach)
-    # From where the joint stands, whatever its range: a rail is fixed to something.
+    # The rail begins at the joint, whatever the range, so that it is connected to the body.
     low, high = min(low + link.joint.offset, 0.0) - 1.2 * r, high + link.joint.offset + 1.2 * r
     axis = link.before.R @ np.array(link.joint.axis)
     centre = np.array(link.before.translation) + axis * (low + high) / 2

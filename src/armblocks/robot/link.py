@@ -62,16 +62,16 @@ class Link:
     base).
 
     Pose in the parent's frame: ``T_parent_link = before joint.motion(q + offset) after``. ``dh`` is the
-    Denavit-Hartenberg row that the three came from, where they did, and must agree with them
-    (:func:`armblocks.robot.dh.standard_dh` builds all four).
+    Denavit-Hartenberg row from which ``before``, ``joint`` and ``after`` were computed, if there is one, and
+    must agree with them (:func:`armblocks.robot.dh.standard_dh` builds all four).
 
     ``mass`` kg; ``centre_of_mass`` m in the link's frame; ``inertia`` kg m2 about the centre of mass in the
-    link's axes: a (3, 3) array, or Ixx Iyy Izz, or Ixx Iyy Izz Ixy Iyz Ixz (the matrix entries themselves,
-    so Ixy is minus the integral of x y dm). ``motor`` drives the link's joint. ``geometry`` what the link is
-    drawn with; ``None`` leaves the drawing to be made from the kinematics.
+    link's axes: a (3, 3) array, or Ixx Iyy Izz, or Ixx Iyy Izz Ixy Iyz Ixz. These are the matrix entries, so
+    Ixy is minus the integral of x y dm. ``motor`` drives the link's joint. ``geometry`` are the shapes of the
+    drawing; ``None``: they are derived from the kinematics.
 
-    Raises RobotError for wrong shapes. Values are checked by :class:`armblocks.robot.Robot`, which can say
-    which link of which robot they stand in.
+    Raises RobotError for wrong shapes. :class:`armblocks.robot.Robot` checks the values, because its messages
+    name the robot and the link.
     """
 
     name: str
@@ -117,14 +117,14 @@ class Link:
         return np.array(self.centre_of_mass)
 
     def pose(self, q: float = 0.0) -> Transform:
-        """``T_parent_link`` at the joint coordinate ``q`` (rad or m; without use for a fixed joint)."""
+        """``T_parent_link`` at the joint coordinate ``q`` (rad or m; ignored for a fixed joint)."""
         return self.before @ self.joint.motion(q + self.joint.offset) @ self.after
 
 
 def inertia_matrix(value: ArrayLike, *, link: str = "") -> Matrix3:
     """A (3, 3) array, or Ixx Iyy Izz, or Ixx Iyy Izz Ixy Iyz Ixz, as a symmetric matrix.
 
-    Raises RobotError, naming ``link``, for another shape or an asymmetric matrix.
+    Raises RobotError that names ``link`` for another shape or an asymmetric matrix.
     """
     where = f"inertia of link '{link}'" if link else "inertia"
     entries = numbers(value, where=where)

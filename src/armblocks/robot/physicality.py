@@ -1,4 +1,4 @@
-"""Checks for inertias that no rigid body can have, for each link."""
+"""Checks whether the inertia of each link is that of a possible rigid body."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ from armblocks.robot.robot import Robot
 from armblocks.spatial import Vector3
 
 TOLERANCE = 1e-9
-"""Relative to the greatest principal moment: thin rods and flat plates lie on the border and are bodies."""
+"""Tolerance relative to the largest principal moment, because thin rods and flat plates are at the limit."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class InertiaFinding:
-    """One reason why a link's inertia belongs to no body; ``moments`` are its principal moments, kg m2."""
+    """One reason why a link's inertia is impossible for a body; ``moments`` are its principal moments, kg
+    m2."""
 
     robot: str
     link: str
@@ -58,6 +59,6 @@ def inertia_findings(robot: Robot) -> tuple[InertiaFinding, ...]:
 
 
 def warn_of_inertias(robot: Robot) -> None:
-    """Warn (InertiaWarning) once for every finding: what loading a robot does."""
+    """Issue an InertiaWarning for every finding; called when a robot is loaded."""
     for finding in inertia_findings(robot):
         warnings.warn(str(finding), InertiaWarning, stacklevel=3)

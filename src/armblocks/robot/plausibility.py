@@ -15,18 +15,20 @@ from armblocks.robot.link import Link
 from armblocks.robot.robot import Robot
 
 WHOLE_TURN = 2 * math.pi * (1 + 1e-6)
-"""rad, and a little for limits written with six digits."""
+"""A whole turn, rad, with a tolerance for limits that are written with six digits."""
 LARGEST_ANGLE = 4 * math.pi
-"""rad; larger start or end angles of a motion are probably degrees."""
+"""Start or end angles of a motion above this value (rad) are probably in degrees."""
 LONGEST_REACH = 20.0
-"""m; the largest arms of industry reach 5 m."""
+"""Maximum plausible reach, m; the largest industrial arms reach 5 m."""
 LARGEST_GYRATION = 3.0
-"""Radius of gyration of a link over the robot's reach; that of a body is less than its size."""
+"""Maximum plausible radius of gyration of a link relative to the robot's reach; it is below the link's
+size."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Doubt:
-    """One question: ``what`` was found at a ``link`` (``""`` for the whole robot), and what it may mean."""
+    """One finding: ``what`` was found at a ``link`` (``""`` for the whole robot), and a question about its
+    cause."""
 
     robot: str
     link: str = ""
@@ -41,14 +43,15 @@ class Doubt:
 def doubts(robot: Robot) -> tuple[Doubt, ...]:
     """Values that probably have a wrong unit or sign; they are warnings, not errors.
 
-    Limits of revolute joints beyond a whole turn (degrees?), a reach beyond 20 m and inertias that are far
-    too great for the robot's size (millimetres?), gravity that points up.
+    Findings are: limits of revolute joints beyond a whole turn (degrees?), a reach beyond 20 m and inertias
+    that are far too large for the robot's size (millimetres?), gravity that points upwards.
     """
     return tuple(_doubts(robot))
 
 
 def warn_of_degrees(angles: ArrayLike, where: str) -> None:
-    """Warn (ArmblocksWarning) where one of the angles, given in rad, is large enough to be degrees."""
+    """Issue an ArmblocksWarning if an angle, which should be in rad, is so large that it is probably in
+    degrees."""
     values = np.abs(np.asarray(angles, dtype=np.float64)).ravel()
     beyond = values[np.isfinite(values) & (values > LARGEST_ANGLE)]
     if beyond.size:

@@ -28,17 +28,16 @@ class Robot:
     ``base`` pose of the base frame in the world; ``tool`` pose of the tool in the frame of the tip, which is
     the last link; both accept a (4, 4) matrix. ``gravity`` m/s2 in the world frame, the acceleration
     of a falling body (toolbox files have the opposite sign); ``friction_model`` see :class:`FrictionModel`.
-    The joint coordinates q are in the order of the moving links. A link's joint is called by the link's
-    name.
+    The joint coordinates q are in the order of the moving links. A joint has the name of its link.
 
-    A value: two robots are equal, and hash alike, where all their numbers and names are. ``source`` (where
-    the numbers come from) is not compared.
+    Robots are values: two robots are equal and have the same hash if all their numbers and names are equal.
+    ``source`` (the origin of the numbers) is not compared.
 
-    Raises RobotError, and says robot, link and field, for no or too many links, names that occur twice,
+    Raises RobotError that names robot, link and field for no or too many links, names that occur twice,
     unknown or circular parents, numbers that are not finite, zero axes, reversed limits, a gear ratio of
-    zero, a negative mass, a D-H row that disagrees with the transforms. Warns of friction that drives.
-    Inertias that no body can have are accepted (the published sets hold some):
-    :func:`armblocks.robot.inertia_findings` names them.
+    zero, a negative mass, a D-H row that disagrees with the transforms. Warns if friction accelerates a
+    joint. Physically impossible inertias are accepted, because some published models have them;
+    :func:`armblocks.robot.inertia_findings` lists them.
     """
 
     name: str
@@ -107,23 +106,23 @@ class Robot:
 
     @property
     def qlim(self) -> NDArray[np.float64]:
-        """Lowest and highest joint coordinates, a new (n, 2) array, rad or m; infinite where not limited."""
+        """Lowest and highest joint coordinates, a new (n, 2) array, rad or m; infinite without a limit."""
         unlimited = (-np.inf, np.inf)
         return np.array([joint.limits.position or unlimited for joint in self.joints]).reshape(-1, 2)
 
     @property
     def speed_limits(self) -> NDArray[np.float64]:
-        """Greatest joint speeds, a new (n,) array, rad/s or m/s; infinite where not limited."""
+        """Maximum joint speeds, a new (n,) array, rad/s or m/s; infinite without a limit."""
         return _or_infinite([joint.limits.speed for joint in self.joints])
 
     @property
     def torque_limits(self) -> NDArray[np.float64]:
-        """Greatest joint torques, a new (n,) array, N m or N; infinite where not limited."""
+        """Maximum joint torques, a new (n,) array, N m or N; infinite without a limit."""
         return _or_infinite([joint.limits.torque for joint in self.joints])
 
     @property
     def gear_ratios(self) -> NDArray[np.float64]:
-        """G of each joint, a new (n,) array; 1 where there is no motor."""
+        """G of each joint, a new (n,) array; 1 without a motor."""
         return np.array([motor.gear_ratio if motor else 1.0 for motor in self.motors])
 
     def link(self, name: str) -> Link:
@@ -134,7 +133,8 @@ class Robot:
         raise UnknownNameError("link", name, [link.name for link in self.links], where=f"robot '{self.name}'")
 
     def with_link(self, name: str, **changes: object) -> Robot:
-        """A copy in which the named link has other fields, as ``dataclasses.replace`` takes them."""
+        """A copy with changed fields of the named link; the fields are arguments of
+        ``dataclasses.replace``."""
         changed = replace(self.link(name), **changes)  # pyright: ignore[reportArgumentType] - fields by name
         return replace(self, links=tuple(changed if link.name == name else link for link in self.links))
 
@@ -143,7 +143,7 @@ class Robot:
         return replace(self, friction_model=model)
 
     def nofriction(self, *, coulomb: bool = True, viscous: bool = True) -> Robot:
-        """A copy without Coulomb friction, viscous friction, or both; motor inertia stays."""
+        """A copy without Coulomb friction, viscous friction, or both; motor inertia is unchanged."""
 
         def quiet(motor: Motor) -> Motor:
             return replace(

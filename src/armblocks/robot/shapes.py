@@ -1,7 +1,6 @@
-"""Solid shapes that a link is drawn with: values only, no meshes (see :mod:`armblocks.robot.geometry`).
+"""Solid shapes of links for drawings: values only, no meshes (see :mod:`armblocks.robot.geometry`).
 
-Every shape stands in its link's frame: ``pose`` maps the shape's own axes to the link's axes
-(p_link = pose p_shape), lengths are in m.
+Every shape has a pose in its link's frame (p_link = pose p_shape). Lengths are in m.
 """
 
 from __future__ import annotations
@@ -20,10 +19,10 @@ IDENTITY: Pose = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.
 
 
 class Material(Enum):
-    """What a body is made of, as far as the eye is concerned."""
+    """The appearance of a body's surface."""
 
     PAINT = "paint"
-    """Painted casting: the arm's own colour."""
+    """Painted casting, in the colour of the arm."""
     JOINT = "joint"
     """Graphite: motor drums, gear covers, rails."""
     FLANGE = "flange"
@@ -88,4 +87,4 @@ class Mesh:
 
 
 Shape: TypeAlias = Cylinder | Housing | Box | Sphere | Mesh
-"""Any of the shapes."""
+"""Any shape type."""

@@ -1,4 +1,4 @@
-"""The robot numbered for algorithms: moving bodies only, parents before children, every joint axis z."""
+"""The robot in a form for algorithms: only moving bodies, parents before children, every joint axis is z."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ BASE = -1
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Body:
-    """A link that moves against its parent, with every link that is fixed to it.
+    """A link that moves relative to its parent, with all links that are fixed to it.
 
-    ``T_parent_body(q) = placement Rz(turn (q + offset)) Tz(slide (q + offset))``: the body frame lies on the
-    joint's axis, which is its z. ``parent`` index of another body or BASE; ``joint`` index in q.
-    ``inertia`` in the body frame, of all lumped links. ``motor`` of the joint.
+    ``T_parent_body(q) = placement Rz(turn (q + offset)) Tz(slide (q + offset))``: the z axis of the body
+    frame is the joint axis. ``parent``: index of another body, or BASE. ``joint``: index in q. ``inertia``:
+    of all lumped links, in the body frame. ``motor``: the motor of the joint.
     """
 
     link: str
@@ -52,9 +52,11 @@ class Frame:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class KinematicTree:
-    """``bodies`` parents before children; ``links`` where each link of the robot rides, in the robot's order;
-    ``tip`` the last link; ``tool`` the tool frame; ``base`` pose of the base in the world; ``gravity`` m/s2
-    in *base* axes; ``grounded`` the inertia of links fixed to the base.
+    """The bodies of a robot and its frames.
+
+    ``bodies``: parents before children. ``links``: the frame of each link, in the robot's order. ``tip``: the
+    frame of the last link. ``tool``: the tool frame. ``base``: pose of the base in the world. ``gravity``:
+    m/s2, in *base* axes. ``grounded``: the inertia of the links fixed to the base.
     """
 
     robot: Robot
@@ -66,7 +68,7 @@ class KinematicTree:
 
     @classmethod
     def of(cls, robot: Robot) -> KinematicTree:
-        """Number the robot's joints, merge fixed links, turn every axis to z."""
+        """Number the robot's joints, merge fixed links, and rotate every joint axis to z."""
         joint_of = {link.name: index for index, link in enumerate(robot.moving_links)}
         frames: dict[str | None, Frame] = {None: Frame(body=BASE, pose=Transform())}
         bodies: list[Body] = []
@@ -111,7 +113,7 @@ class KinematicTree:
 
     @property
     def n(self) -> int:
-        """Count of joint coordinates, which is the count of bodies."""
+        """Number of joint coordinates, which is the number of bodies."""
         return len(self.bodies)
 
     @property
@@ -125,7 +127,7 @@ class KinematicTree:
         return Frame(body=self.tip.body, pose=self.tip.pose @ self.robot.tool)
 
     def ancestors(self, body: int) -> tuple[int, ...]:
-        """The bodies between ``body`` and the base, nearest first, without itself."""
+        """The ancestors of ``body``, from its parent towards the base."""
         path: list[int] = []
         body = self.bodies[body].parent if body != BASE else BASE
         while body != BASE:
@@ -135,13 +137,13 @@ class KinematicTree:
 
 
 def _parents_first(links: Sequence[Link]) -> list[Link]:
-    """The links in an order in which every parent precedes its children, otherwise as given."""
+    """The links sorted so that every parent precedes its children; otherwise the given order is kept."""
     placed: set[str | None] = {None}
     ordered: list[Link] = []
     waiting = list(links)
     while waiting:
         ready = [link for link in waiting if link.parent in placed]
-        # One at a time keeps a chain that is written in order exactly as it was written.
+        # One link at a time, so that links already in a valid order keep it.
         link = ready[0]
         ordered.append(link)
         placed.add(link.name)
@@ -150,7 +152,7 @@ def _parents_first(links: Sequence[Link]) -> list[Link]:
 
 
 def _axis_to_z(axis: Vector3) -> tuple[Transform, float]:
-    """A rotation A and a sign with ``A z = sign axis``: exact for the six coordinate directions."""
+    """A rotation A and a sign with ``A z = sign axis``; exact for the six coordinate directions."""
     x, y, z = axis
     if x == y == 0:
         return Transform(), 1.0 if z > 0 else -1.0

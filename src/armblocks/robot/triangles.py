@@ -1,4 +1,4 @@
-"""Shapes as triangles with normals: what renderers, on this machine or in a browser, can draw."""
+"""Shapes as triangles with normals, for renderers in Python and in the browser."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from armblocks.robot.shapes import Box, Cylinder, Housing, Material, Mesh, Shape, Sphere
 
 SIDES = 28
-"""Facets around a round body: with interpolated normals its outline looks round at any usual size."""
+"""Number of facets around a round body. With interpolated normals the outline looks round at usual sizes."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -57,7 +57,8 @@ _Surface = tuple[NDArray[np.float64], NDArray[np.float64]]
 def _quads(
     a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64], d: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Two triangles for each quadrilateral a b c d (K, 3); flat ones (a point repeated) drop out."""
+    """Two triangles for each quadrilateral a b c d (K, 3), without degenerate triangles (a point occurs
+    twice)."""
     return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
 
 
@@ -67,7 +68,7 @@ def _ring_surface(
     lower_normals: NDArray[np.float64],
     upper_normals: NDArray[np.float64],
 ) -> _Surface:
-    """The strip between two closed rings (S, 3), both anticlockwise seen from the upper one."""
+    """The strip between two closed rings (S, 3), both anticlockwise seen from the upper ring."""
     follow = np.roll(np.arange(len(lower)), -1)
     corners = _quads(lower, lower[follow], upper[follow], upper)
     normals = _quads(lower_normals, lower_normals[follow], upper_normals[follow], upper_normals)
@@ -82,7 +83,8 @@ def _circle(radius: float, z: float) -> NDArray[np.float64]:
 
 
 def _lathe(profile: list[tuple[float, float]]) -> _Surface:
-    """Turn a profile of (radius, z), listed upwards on the outside, about z; every segment is one face."""
+    """The surface of revolution of a profile of (radius, z) about z, listed upwards on the outside; every
+    segment is one face."""
     parts: list[_Surface] = []
     for (r0, z0), (r1, z1) in pairwise(profile):
         length = math.hypot(r1 - r0, z1 - z0)
@@ -112,7 +114,8 @@ def _cylinder_profile(shape: Cylinder) -> list[tuple[float, float]]:
 
 
 def _housing(shape: Housing) -> _Surface:
-    # Superellipse |x/a|^p + |y/b|^p = 1 with p = 2 / roundness; near 0 it would be all corner.
+    # Superellipse |x/a|^p + |y/b|^p = 1 with p = 2 / roundness; for a roundness near 0 all points would be
+    # near the corners.
     power = max(shape.roundness, 0.08)
     angle = (np.arange(SIDES) + 0.5) * (2 * math.pi / SIDES)
     cosine, sine = np.cos(angle), np.sin(angle)

@@ -26,7 +26,7 @@ from armblocks.errors import InputError
 
 Matrix = NDArray[np.float64]
 ROUNDING = 1e-12
-"""Relative to the largest singular value: smaller singular values count as 0."""
+"""Singular values below this fraction of the largest one count as 0."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,7 +128,7 @@ class _Explicit:
 def _explicit(*given: Any) -> _Explicit:
     """Eliminate the algebraic equations.
 
-    Raises ``InputError`` where they do not determine their unknowns.
+    Raises ``InputError`` if they do not determine their unknowns.
     """
     E, A, B, C, D = (np.asarray(value) for value in given)
     U, sizes, Vt = np.linalg.svd(E)

@@ -29,11 +29,10 @@ from armblocks.diagram.signs import FaceSign, graph
 class FirstOrderHold(Block):
     """A first-order hold: y(t) = u(t_k) + (u(t_k) - u(t_(k-1))) (t - t_k) / T until t_(k+1).
 
-    ``extrapolation`` continues the straight line through the last two samples, so that it is exact for a
-    straight line; at each sample time y may jump to the new sample. ``interpolation`` connects the samples
-    without a jump, one period late: y(t) = u(t_(k-1)) + (u(t_k) - u(t_(k-1))) (t - t_k) / T. Simulink's First
-    Order Hold extrapolates. The sample before the first one is ``initial``, which is also y before the
-    offset.
+    ``extrapolation`` continues the straight line through the last two samples. It is exact for a linear
+    input; at each sample time y may jump to the new sample. ``interpolation`` connects the samples without a
+    jump, one period late: y(t) = u(t_(k-1)) + (u(t_k) - u(t_(k-1))) (t - t_k) / T. Simulink's First Order
+    Hold extrapolates. The sample before the first one is ``initial``, which is also y before the offset.
 
     A sampled block that ticks at t_k reads the left limit of y.
     """

@@ -77,7 +77,7 @@ class AnalogFilter(Block):
         inputs={"u": made("SignalGenerator", waveform="square", frequency=0.25)},
     )
 
-    design: str = parameter("butterworth", choices=FILTER_DESIGNS, doc="the kind of filter")
+    design: str = parameter("butterworth", choices=FILTER_DESIGNS, doc="the design of the filter")
     filter_type: str = parameter("low_pass", choices=FILTER_TYPES, doc="what passes")
     order: int = parameter(2, minimum=1, maximum=20, doc="order of the low-pass prototype")
     edge: float = parameter(

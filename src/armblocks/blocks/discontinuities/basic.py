@@ -142,7 +142,7 @@ class DeadZone(Block):
 class Relay(Block):
     """A relay with hysteresis: on_value once u rises to on_point, off_value once u falls to off_point.
 
-    It starts off, unless u begins at or above on_point.
+    It is off at the start, unless u is at or above on_point then.
     """
 
     title: ClassVar[str] = "Relay"

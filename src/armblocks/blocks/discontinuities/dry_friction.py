@@ -78,16 +78,16 @@ class CoulombFriction(Block):
 class Backlash(Block):
     """Backlash between two parts: y is constant while u moves within the play, and follows u at its ends.
 
-    y' = u' while y = u - width/2 and u' > 0, or y = u + width/2 and u' < 0; else y' = 0. Where u jumps beyond
-    the play, y jumps with it.
+    y' = u' while y = u - width/2 and u' > 0, or y = u + width/2 and u' < 0; else y' = 0. If u jumps beyond
+    the play, y jumps to the end of the play.
     """
 
     title: ClassVar[str] = "Backlash"
     sign: ClassVar[FaceSign] = graph((0, 0), (0.55, 1), (1, 1), (0.45, 0), (0, 0))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows=(
-            "A gear with play 1: the output follows with half of it missing, and stands still while "
-            "the play is taken up."
+            "A gear with play 1: the output follows at half the play and is constant while "
+            "the input crosses the play."
         ),
         inputs={"u": made("SineWave", amplitude=2.0)},
     )
@@ -141,7 +141,8 @@ class Backlash(Block):
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         ahead, half = u["u"] - x["rest"], p["width"] / 2.0
         band = SMALLEST_JUMP * fmax(1.0, fabs(u["u"]))
-        # Where u turns at an end of the play, rounding must not drive the output the other way again.
+        # When u reverses at an end of the play, rounding must not drive the output in the old direction
+        # again.
         above, below = if_else(u["u'"] < 0.0, band, 0.0), if_else(u["u'"] > 0.0, -band, 0.0)
         by_place = if_else(ahead - half > above, 1.0, if_else(ahead + half < below, -1.0, 0.0))
         # A driven output stops when u reverses or jumps back; beyond the other end it is driven back.
@@ -159,7 +160,7 @@ class Backlash(Block):
 class StickSlipFriction(Block):
     """A mass with dry friction: mass v' = F - sign(v) coulomb - viscous v, and v = 0 while |F| <= static.
 
-    It rests truly: once it stops under a force that static friction holds, its speed is exactly 0, until the
+    The mass sticks: once it stops under a force that static friction holds, its speed is exactly 0, until the
     force exceeds static friction.
     """
 
@@ -211,7 +212,7 @@ class StickSlipFriction(Block):
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         sliding = x["mode"] * p["coulomb"] + p["viscous"] * x["v"]
-        # Also after a jump of the force, static friction is not exceeded.
+        # The friction is limited to static friction, also after a jump of the force.
         breaking = logic_and(same_instant(t, x["instant"]), fabs(u["F"]) > p["static"])
         holding = if_else(breaking, sign(u["F"]) * p["coulomb"], u["F"])
         return {"x": x["x"], "v": x["v"], "friction": if_else(x["mode"] == 0.0, holding, sliding)}

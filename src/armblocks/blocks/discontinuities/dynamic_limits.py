@@ -152,7 +152,7 @@ class HitCrossing(Block):
     def output_ports(self) -> tuple[Port, ...]:
         return (
             Port("count", "number of crossings so far"),
-            Port("last", "time of the last one; 0 before any", "s"),
+            Port("last", "time of the last crossing; 0 before the first one", "s"),
         )
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:

@@ -177,8 +177,8 @@ class RateLimiterContinuous(RateLimiting):
 class RateLimiterDynamic(RateLimiting):
     """A rate limiter whose limits are signals: y = u while falling <= u' <= rising, else y' equals the limit.
 
-    It works as the Rate Limiter (continuous). Where ``falling`` exceeds ``rising``, no rate satisfies both
-    limits, and y moves towards u at the limit that is active.
+    It works as the Rate Limiter (continuous). If ``falling`` exceeds ``rising``, no rate satisfies both
+    limits, and y moves towards u at the active limit.
     """
 
     title: ClassVar[str] = "Rate Limiter Dynamic"
@@ -236,7 +236,7 @@ class RateLimiter(Block):
         return (Port("y", "the limited signal"),)
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("x", self.output_shapes(inputs)["y"], "the output at the tick before"),)
+        return (State("x", self.output_shapes(inputs)["y"], "the output at the previous tick"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         least, most = x["x"] + p["falling"] * p["T"], x["x"] + p["rising"] * p["T"]

@@ -229,7 +229,7 @@ def _argument_ports(function: UserFunction) -> tuple[Port, ...]:
 
 
 def _check_results(block: Block, names: list[str]) -> None:
-    """Raise ``InputError`` where the results of a function cannot be ports."""
+    """Raise ``InputError`` if the results of a function cannot be ports."""
     taken = {port.name for port in block.input_ports()}
     wrong = [name for name in names if not name.isidentifier() or names.count(name) > 1 or name in taken]
     if wrong or not names:

@@ -1,7 +1,7 @@
 """Logic blocks: their outputs are 1 for true and 0 for false.
 
-An input that is not zero counts as true. The instants at which the answer of a comparison, or the truth of
-an input, changes between two events of other blocks are events and are located exactly.
+An input that is not zero counts as true. The times at which the result of a comparison or the truth of an
+input changes are located exactly, as events.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from armblocks.errors import InputError
 
 _MOST_CONDITIONS = 12
 _RELATIONS = {"==": "=", "~=": "≠", "<": "<", "<=": "≤", ">": ">", ">=": "≥"}
-"""Relations in MATLAB's spelling, each with its sign."""
+"""Relations in MATLAB's spelling, each with its mathematical sign."""
 _GATES: Mapping[str, tuple[Callable[[SX, SX], SX], bool]] = {
     "AND": (logic_and, False),
     "OR": (logic_or, False),
@@ -334,9 +334,9 @@ class CombinatorialLogic(Block):
 class TruthTable(Block):
     """A decision table: y = the actions of the first decision whose conditions are all met.
 
-    Each row of ``decisions`` says of every condition whether it has to be true (1), false (0) or may be
-    either (-1), and the same row of ``actions`` what comes out then. Every combination must be decided; a
-    last row of -1 is for all others.
+    Each row of ``decisions`` is a decision: it states for every condition whether it must be true (1), false
+    (0) or may be either (-1). The same row of ``actions`` is the output for this decision. Every combination
+    of conditions must be decided; a last row of -1 covers all others.
     """
 
     title: ClassVar[str] = "Truth Table"
@@ -381,7 +381,7 @@ class TruthTable(Block):
                 f"there are {rows.shape[1]} conditions",
                 where="TruthTable.decisions",
                 allowed=f"at most {_MOST_CONDITIONS}",
-                fix="decide in several tables",
+                fix="use several tables",
             )
         table = rows.tolist()
         for given in product((0, 1), repeat=rows.shape[1]):
@@ -417,7 +417,7 @@ class TruthTable(Block):
 
 
 def _truth_conditions(inputs: Shapes) -> tuple[Condition, ...]:
-    """Whether each input is above 0 and whether it is below; either makes it true."""
+    """Two conditions for each input: above 0 and below 0. The input is true if either holds."""
     return tuple(
         Condition(f"{name} {side}", shape, f"1 where {name} is {side} 0", closed=False)
         for name, shape in inputs.items()
@@ -436,7 +436,7 @@ def _truth(x: Signals, name: str) -> SX:
 
 
 def _sides(relation: str, shape: Shape) -> tuple[Condition, ...]:
-    """The conditions of a relation on the difference left minus right; equality needs two."""
+    """The conditions of a relation on the difference of left and right side; equality needs two."""
     above = Condition("above", shape, "1 where the left side is greater", closed=False)
     below = Condition("below", shape, "1 where the left side is less", closed=False)
     if relation in (">", "<="):

@@ -1,4 +1,4 @@
-"""Sampled logic with a memory: edges, flip-flops, counters. They work at their ticks."""
+"""Sampled logic blocks with memory: edge detection, flip-flops, counters."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ _PULSES = made("SineWave", frequency=2.0)
 
 @dataclass(frozen=True, kw_only=True)
 class EdgeDetection(Block):
-    """Whether the input changed since the tick before: y(k) = 1 where u(k-1), u(k) are the edge asked for.
+    """Edge detection: y(k) = 1 if the input changed from u(k-1) to u(k) in the chosen way, else 0.
 
     Simulink has one block for each edge: Detect Change, Detect Increase, Detect Decrease, Detect Rise
     Positive, Detect Rise Nonnegative, Detect Fall Negative, Detect Fall Nonpositive.
@@ -63,7 +63,7 @@ class EdgeDetection(Block):
         inputs={"u": _PULSES},
     )
 
-    edge: str = parameter("rise positive", choices=tuple(_EDGES), doc="what is looked for")
+    edge: str = parameter("rise positive", choices=tuple(_EDGES), doc="the change to detect")
     initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the input before the first tick")
     sample_time: ArrayLike = sample_time_parameter()
 
@@ -77,7 +77,7 @@ class EdgeDetection(Block):
         return (Port("y", "1 at the edge, else 0"),)
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("before", self.output_shapes(inputs)["y"], "the input at the tick before"),)
+        return (State("before", self.output_shapes(inputs)["y"], "the input at the previous tick"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": _EDGES[self.edge](u["u"], x["before"])}
@@ -91,7 +91,7 @@ class EdgeDetection(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class SRFlipFlop(Block):
-    """Set and reset: Q(k) = 1 if S, 0 if R, as before if neither; with both, Q and its opposite are 0."""
+    """A set-reset flip-flop: Q(k) = 1 if S, 0 if R, Q(k-1) if neither; if both, Q and not_Q are 0."""
 
     title: ClassVar[str] = "S-R Flip-Flop"
     sign: ClassVar[FaceSign] = Lines(("S-R", "Flip-Flop"))
@@ -112,7 +112,7 @@ class SRFlipFlop(Block):
         return (Port("S", "sets"), Port("R", "resets"))
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("Q", "the state"), Port("not_Q", "its opposite; 0 too while both inputs are true"))
+        return (Port("Q", "the state"), Port("not_Q", "1 - Q; 0 while both inputs are true"))
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
         shape = broadcast(inputs)
@@ -122,7 +122,7 @@ class SRFlipFlop(Block):
         return {"Q": (), "not_Q": ()}
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("state", broadcast(inputs), "Q at the tick before"),)
+        return (State("state", broadcast(inputs), "Q at the previous tick"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         set_, reset = u["S"] != 0.0, u["R"] != 0.0
@@ -138,21 +138,21 @@ class SRFlipFlop(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class DFlipFlop(Block):
-    """Takes its input at the rising edge of a clock: Q(k) = D(k) if CLK(k-1) <= 0 < CLK(k), else as before.
+    """A D flip-flop with a rising clock edge: Q(k) = D(k) if CLK(k-1) <= 0 < CLK(k), else Q(k-1).
 
-    With the trigger ``level`` it is the D latch: Q follows D while CLK is positive.
+    With the trigger ``level`` it is a D latch: Q follows D while CLK is positive.
     """
 
     title: ClassVar[str] = "D Flip-Flop"
     sign: ClassVar[FaceSign] = Lines(("D", "Flip-Flop"))
     sampled: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The sine, caught at each rising edge of the pulses.",
+        shows="The sine, sampled at each rising edge of the pulses.",
         parameters={"sample_time": 0.1},
         inputs={"D": made("SineWave"), "CLK": made("PulseGenerator", period=1.0, delay=0.5).named("clock")},
     )
 
-    trigger: str = parameter("rising edge", choices=("rising edge", "level"), doc="when D is taken")
+    trigger: str = parameter("rising edge", choices=("rising edge", "level"), doc="when Q is set to D")
     initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="Q before the first edge")
     sample_time: ArrayLike = sample_time_parameter()
 
@@ -171,7 +171,10 @@ class DFlipFlop(Block):
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         shape = self.output_shapes(inputs)["Q"]
-        return (State("state", shape, "Q at the tick before"), State("clock", (), "CLK at the tick before"))
+        return (
+            State("state", shape, "Q at the previous tick"),
+            State("clock", (), "CLK at the previous tick"),
+        )
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         high = u["CLK"] > 0.0
@@ -188,9 +191,9 @@ class DFlipFlop(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class JKFlipFlop(Block):
-    """Set, reset or toggled at the falling edge of a clock: J sets, K resets, both toggle, neither keeps Q.
+    """A JK flip-flop, which changes at a falling clock edge: J sets, K resets, both toggle, neither keeps Q.
 
-    The edge is CLK(k-1) > 0 >= CLK(k), as in Simulink.
+    A falling edge is CLK(k-1) > 0 >= CLK(k), as in Simulink.
     """
 
     title: ClassVar[str] = "J-K Flip-Flop"
@@ -224,11 +227,14 @@ class JKFlipFlop(Block):
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         shape = self.output_shapes(inputs)["Q"]
-        return (State("state", shape, "Q at the tick before"), State("clock", (), "CLK at the tick before"))
+        return (
+            State("state", shape, "Q at the previous tick"),
+            State("clock", (), "CLK at the previous tick"),
+        )
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         falls = logic_and(u["CLK"] <= 0.0, x["clock"] > 0.0)
-        # The characteristic equation: Q becomes J where it is 0 and not K where it is 1.
+        # The characteristic equation: the next Q is J if Q is 0, and not K if Q is 1.
         after = if_else(x["state"], u["K"] == 0.0, u["J"] != 0.0)
         state = if_else(falls, after, x["state"])
         return {"Q": state, "not_Q": logic_not(state)}
@@ -242,12 +248,12 @@ class JKFlipFlop(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Counter(Block):
-    """Counts rising edges: y(k) = y(k-1) + 1 where u(k-1) <= 0 < u(k); ``initial`` while reset."""
+    """A counter of rising edges: y(k) = y(k-1) + 1 if u(k-1) <= 0 < u(k); ``initial`` during a reset."""
 
     title: ClassVar[str] = "Counter"
     sampled: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The waves of a sine are counted, until a step sets the count back.",
+        shows="The periods of a sine are counted until a step resets the count.",
         parameters={"sample_time": 0.1},
         inputs={"u": _PULSES, "reset": made("Step", time=8.0).named("reset")},
     )
@@ -256,7 +262,7 @@ class Counter(Block):
     sample_time: ArrayLike = sample_time_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "whose edges are counted"), Port("reset", "sets back while not 0", shape=()))
+        return (Port("u", "signal whose edges count"), Port("reset", "resets while not 0", shape=()))
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the count"),)
@@ -268,7 +274,7 @@ class Counter(Block):
         return {"y": ()}
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        before = State("before", inputs["u"], "the input at the tick before")
+        before = State("before", inputs["u"], "the input at the previous tick")
         return (State("count", inputs["u"], "the count"), before)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:

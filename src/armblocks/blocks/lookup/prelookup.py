@@ -33,13 +33,13 @@ from armblocks.errors import InputError
 class Prelookup(BlockWithAxes):
     """The interval of a position and the fraction in it: u = b(k) + f (b(k+1) - b(k)), k from 0.
 
-    Several Interpolation Using Prelookup blocks can share it. The index never passes the last interval, so
-    that f is 1 at the last break point; beyond the ends ``clip`` holds f at 0 or 1, ``linear`` lets it go on.
+    Several Interpolation Using Prelookup blocks can share it. At the last break point the index is that of
+    the last interval and f is 1. Beyond the ends ``clip`` limits f to 0 or 1, and ``linear`` extrapolates.
     """
 
     title: ClassVar[str] = "Prelookup"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The index of the interval that contains the input, and the fraction of it that is passed.",
+        shows="The index of the interval that contains the input, and the fraction of the interval.",
         parameters={"positions": (0.0, 2.0, 5.0, 10.0)},
         inputs={"u": made("Ramp")},
         shown=("k", "f"),
@@ -100,10 +100,10 @@ class Prelookup(BlockWithAxes):
 
 @dataclass(frozen=True, kw_only=True)
 class InterpolationUsingPrelookup(Block):
-    """Linear interpolation at known intervals: y = (1 - f) table[k] + f table[k + 1], and so along each axis.
+    """Linear interpolation at known intervals: y = (1 - f) table[k] + f table[k + 1], along each axis.
 
-    Indices and fractions come from Prelookup blocks, one pair for each axis of the table. An index is cut
-    down to an integer and held inside the table.
+    Indices and fractions come from Prelookup blocks, one pair for each axis of the table. An index is
+    truncated to an integer and limited to the table.
     """
 
     title: ClassVar[str] = "Interpolation Using Prelookup"
@@ -129,7 +129,7 @@ class InterpolationUsingPrelookup(Block):
                 f"the table has shape {shape_of(self.table)}",
                 where="InterpolationUsingPrelookup",
                 allowed="two or more entries along each axis",
-                fix="leave out the axis of one entry",
+                fix="omit the axis with one entry",
             )
 
     def input_ports(self) -> tuple[Port, ...]:
@@ -174,7 +174,7 @@ def _weights(k: SX, f: SX, n: int) -> list[SX]:
 class DirectLookup(BlockWithSteps):
     """The entry of a table at given indices, which count from 0: y = table[u1, u2, …].
 
-    An index is rounded down to an integer and held inside the table.
+    An index is rounded down to an integer and limited to the table.
     """
 
     title: ClassVar[str] = "Direct Lookup Table"

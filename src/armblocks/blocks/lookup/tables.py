@@ -1,4 +1,4 @@
-"""Lookup tables. Break points are constant, entries are tunable; inputs are looked up element by element."""
+"""Lookup tables with constant break points and tunable entries. Every element of the input is looked up."""
 
 from __future__ import annotations
 
@@ -132,8 +132,8 @@ class LookupTable2D(BlockWithAxes):
 class LookupTableND(BlockWithAxes):
     """A table of one to four axes: y = table(u1, u2, …), one input for each axis.
 
-    ``positions`` holds the positions of the first axis, then those of the second, and so on: as many
-    numbers as the table has entries along each.
+    ``positions`` lists the positions of the first axis, then those of the second, and so on. Each axis has as
+    many positions as the table has entries along it.
     """
 
     title: ClassVar[str] = "n-D Lookup Table"
@@ -200,8 +200,7 @@ class LookupTableND(BlockWithAxes):
 class LookupTableDynamic(Block):
     """A curve whose points are signals: y = table(u), linear between the points, held beyond the ends.
 
-    The positions must be strictly ascending at all times; where two of them are equal the output is not
-    finite.
+    The positions must be strictly ascending at all times; if two of them are equal the output is not finite.
     """
 
     memoryless: ClassVar[bool] = True
@@ -261,7 +260,7 @@ class LookupTableDynamic(Block):
         return self._axes(u["positions"]).resets(x, u, e)
 
     def _axes(self, positions: SX | int) -> Axes:
-        """The axis of positions that are signals; for counting borders only, any ascending positions."""
+        """The axis of positions that are signals. Any ascending positions suffice for counting borders."""
         whole = isinstance(positions, int)
         points = range(positions) if whole else (positions[k] for k in range(positions.numel()))
         return Axes({"u": axis([*points], "linear", "clip")}, self.zero_crossing)

@@ -67,10 +67,7 @@ class MatrixGain(Block):
 
     title: ClassVar[str] = "Matrix Gain"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows=(
-            "A matrix that turns by 90 degrees: the first output is minus the second input, the "
-            "second the first."
-        ),
+        shows=("A rotation by 90 degrees: the first output is minus the second input, the second the first."),
         parameters={"gain": ((0.0, -1.0), (1.0, 0.0))},
         inputs={"u": made("SineWave", amplitude=(1.0, 0.5))},
     )
@@ -392,7 +389,7 @@ class MinMax(Block):
 
     def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
         shape = self.output_shapes(inputs)["y"]
-        doc = "1 where input {} is beyond all before it"
+        doc = "1 if input {} is beyond all previous inputs"
         return located(
             self, *(Condition(f"beyond{k}", shape, doc.format(k), closed=False) for k in self._later())
         )

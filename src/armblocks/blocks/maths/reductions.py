@@ -190,7 +190,7 @@ class DotProduct(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Norm(Block):
-    """The norm of a vector or matrix: 2: sqrt(sum u^2), 1: sum abs(u), inf: max abs(u), fro: sqrt(sum u^2).
+    """The norm of a vector or matrix; 2: sqrt(sum u^2), 1: sum abs(u), inf: max abs(u), fro: sqrt(sum u^2).
 
     For a matrix, 1 is the greatest column sum and inf the greatest row sum. The 2-norm of a matrix (its
     greatest singular value) is not supported. The derivative of the norms 2 and fro at zero is NaN.

@@ -127,11 +127,11 @@ class Modulo(Block):
 # The remainder is u - n v; the integer n is a mode, so that the remainder is smooth between two events.
 
 _QUOTIENTS = {"mod": "floor", "rem": "fix"}
-"""The rounding that makes the integer n out of u / v."""
+"""The rounding that gives the integer n from u / v."""
 
 
 def remainder(function: str, u: SX, v: SX) -> SX:
-    """The exact ``mod`` (sign of the divisor; u where the divisor is zero) or ``rem``."""
+    """The exact ``mod`` (sign of the divisor; u if the divisor is zero) or ``rem``."""
     rest = fmod(u, v)
     if function == "rem":
         return rest

@@ -82,7 +82,7 @@ class Transpose(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class MatrixInverse(Block):
-    """The inverse of a square matrix: u y = I, by Gaussian elimination; not finite where u is singular."""
+    """The inverse of a square matrix: u y = I, by Gaussian elimination; not finite if u is singular."""
 
     title: ClassVar[str] = "Matrix Inverse"
     sign: ClassVar[FaceSign] = Words("A⁻¹")
@@ -107,7 +107,7 @@ class MatrixInverse(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class LinearSolve(Block):
-    """The solution of linear equations: A y = B, by Gaussian elimination; not finite where A is singular."""
+    """The solution of linear equations: A y = B, by Gaussian elimination; not finite if A is singular."""
 
     title: ClassVar[str] = "Matrix Solve"
     sign: ClassVar[FaceSign] = Words("A⁻¹ B")
@@ -217,7 +217,7 @@ class MatrixPower(Block):
         return (Port("u", "the matrix (n, n)"),)
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "its power (n, n)"),)
+        return (Port("y", "the power of the matrix (n, n)"),)
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
         _square(inputs["u"])

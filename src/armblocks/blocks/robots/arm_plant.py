@@ -53,9 +53,9 @@ class ArmPlant(Block):
     other joints too, and stays exactly at the limit until a torque moves it away. Joints that rest at their
     stops before the impact stay there.
 
-    ``payload``: mass, centre x y z and inertia xx yy zz xy yz xz about it, in the tool frame. Where it jumps,
-    the joint speeds do not change: a payload is picked up and released at the speed of the tool. ``wrench``:
-    force, then moment, of the tip on the environment, in the axes of the last link.
+    ``payload``: mass, centre x y z and inertia xx yy zz xy yz xz about it, in the tool frame. If the payload
+    jumps, the joint speeds do not change: a payload is picked up and released at the speed of the tool.
+    ``wrench``: force, then moment, of the tip on the environment, in the axes of the last link.
     """
 
     title: ClassVar[str] = "Arm Plant"

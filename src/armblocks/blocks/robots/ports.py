@@ -18,7 +18,7 @@ def apply_traced(traced: TracedFunction, *values: SX) -> SX:
 
 
 def coordinate_unit(robot: Robot) -> str:
-    """rad or m, or ``""`` where the robot has joints of both kinds."""
+    """rad or m, or ``""`` if the robot has joints of both types."""
     units = set(robot.joint_units)
     return units.pop() if len(units) == 1 else ""
 

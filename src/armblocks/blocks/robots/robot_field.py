@@ -15,9 +15,9 @@ class HasRobot(Protocol):
 
 
 class RobotField(Protocol):
-    """For type checkers, which read a field's type from the ``__set__`` and ``__get__`` of a descriptor.
+    """The type of the field ``robot`` for type checkers, which read it from ``__set__`` and ``__get__``.
 
-    A block takes a Robot or an Arm, and its attribute is the Robot. This class has no instances.
+    A block accepts a Robot or an Arm, and its attribute is the Robot. This class has no instances.
     """
 
     @overload

@@ -59,7 +59,7 @@ class Clock(Block):
 class Step(Block):
     """A step at a given time: y = initial for t < time, y = final from there on.
 
-    A Derivative block behind it ignores the jump.
+    The output of a Derivative block that follows has no impulse at the jump.
     """
 
     title: ClassVar[str] = "Step"

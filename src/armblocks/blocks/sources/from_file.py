@@ -1,4 +1,4 @@
-"""Playback of measurements: tables of any length, of which only the rows at the present time are read."""
+"""Playback of measurements from tables of any length. Only the rows around the present time are read."""
 
 from __future__ import annotations
 

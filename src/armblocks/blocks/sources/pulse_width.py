@@ -25,7 +25,7 @@ from armblocks.diagram.signs import FaceSign, pulses
 
 @dataclass(frozen=True, kw_only=True)
 class PWM(Block):
-    """Pulse width modulation: y = amplitude for t_k <= t < t_k + D(t_k) T, else 0, with D held to 0 … 1.
+    """Pulse width modulation: y = amplitude for t_k <= t < t_k + D(t_k) T, else 0, with D limited to 0 … 1.
 
     The duty cycle D is sampled at the start of each period, as in Simulink's PWM. Both edges are located
     exactly. The mean of y over a period is D times the amplitude. A sampled block that ticks at an edge reads

@@ -115,7 +115,7 @@ class SignalGenerator(Block):
 class RepeatingSequence(Block):
     """A periodic piecewise linear signal: y = values at times, linear in between, period times[-1].
 
-    Where the last value is not the first one, the signal jumps at the end of each period.
+    If the last value differs from the first one, the signal jumps at the end of each period.
     """
 
     memoryless: ClassVar[bool] = True

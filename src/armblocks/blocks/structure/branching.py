@@ -14,7 +14,7 @@ from armblocks.errors import InputError
 from armblocks.matlab.formula import Formula
 
 JUST = 1e-300
-"""An offset below any signal resolution: it assigns the border itself to one side."""
+"""An offset below the resolution of any signal, which assigns the border itself to one side."""
 
 
 @dataclass(frozen=True, kw_only=True)

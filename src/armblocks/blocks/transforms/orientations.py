@@ -174,7 +174,7 @@ class Quaternion2T(Block):
 class T2Quaternion(Block):
     """The unit quaternion (s, x, y, z) of a pose with s >= 0: s = cos(angle / 2), the rest along the axis.
 
-    Where the rotation angle passes pi, the quaternion jumps to its negative, which is the same orientation.
+    When the rotation angle passes pi, the quaternion jumps to its negative, which is the same orientation.
     """
 
     title: ClassVar[str] = "Pose to Quaternion"

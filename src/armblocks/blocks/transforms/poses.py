@@ -210,9 +210,9 @@ class Skew(Block):
 class Tr2Delta(Block):
     """The differential motion (d; r) from T1 to T2: body is (p; vex(R - I)) of T1^-1 T2, as in release 10.
 
-    ``world`` is that of the toolbox up to release 9: d = p2 - p1 and r = 1/2 (n1 x n2 + o1 x o2 + a1 x a2) of
-    the axes of both, in the axes of the reference frame of the poses. Both are accurate for small rotations
-    only. vex is half the difference of the opposite entries.
+    ``world`` is the formula of the toolbox up to release 9: d = p2 - p1 and r = 1/2 (n1 x n2 + o1 x o2 + a1 x
+    a2), where n, o, a are the axes of T1 and T2 in their reference frame. Both are accurate for small
+    rotations only. vex is half the difference of the opposite entries.
     """
 
     title: ClassVar[str] = "tr2delta"
@@ -254,8 +254,8 @@ class Tr2Delta(Block):
 class Delta2Tr(Block):
     """The pose of a differential motion: T = [I + skew(r), d; 0 0 0 1], as in the toolbox.
 
-    Its rotation part is a rotation to first order only. A motion in body axes leads from T1 to T1 T. A motion
-    in world axes leads from R1 to (I + skew(r)) R1 and from p1 to p1 + d.
+    Its rotation part is a rotation to first order only. A motion in body axes transforms T1 to T1 T. A motion
+    in world axes transforms R1 to (I + skew(r)) R1 and p1 to p1 + d.
     """
 
     title: ClassVar[str] = "delta2tr"

@@ -10,7 +10,7 @@ from armblocks.robot.joints.joint import Joint
 
 @dataclass(frozen=True, kw_only=True)
 class Fixed(Joint):
-    """No motion and no coordinate: the link is bolted to its parent."""
+    """A rigid connection to the parent, without a joint coordinate."""
 
     letter: ClassVar[str] = "F"
     unit: ClassVar[str] = ""

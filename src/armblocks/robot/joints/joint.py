@@ -17,10 +17,10 @@ from armblocks.spatial import Transform, Vector3, rotation_about, vector3
 
 @dataclass(frozen=True, kw_only=True)
 class JointLimits:
-    """The limits of a joint; ``None`` where unknown.
+    """The limits of a joint; ``None`` if unknown.
 
-    ``position`` lowest and highest joint coordinate (rad or m), ``speed`` greatest magnitude (rad/s or m/s),
-    ``torque`` greatest magnitude at the joint side (N m or N).
+    ``position``: lowest and highest joint coordinate (rad or m). ``speed``: maximum magnitude (rad/s or m/s).
+    ``torque``: maximum magnitude at the joint side (N m or N).
     """
 
     position: tuple[float, float] | None = None
@@ -51,11 +51,11 @@ class JointLimits:
 
 @dataclass(frozen=True, kw_only=True)
 class Joint(ABC):
-    """A joint with at most one degree of freedom: with ``s = q + offset`` the distal side turns by ``turn s``
-    rad about ``axis`` and slides by ``slide s`` m along it.
+    """A joint with at most one degree of freedom.
 
-    ``axis`` unit vector in the joint frame (normalised here; a zero axis is refused by the robot);
-    ``offset`` rad or m, added to the joint coordinate before anything else.
+    With ``s = q + offset`` the distal side rotates by ``turn s`` rad about ``axis`` and translates by ``slide
+    s`` m along it. ``axis`` is a unit vector in the joint frame; it is normalised here, and the robot rejects
+    a zero axis. ``offset`` (rad or m) is added to the joint coordinate.
     """
 
     axis: Vector3 = (0.0, 0.0, 1.0)
@@ -63,7 +63,7 @@ class Joint(ABC):
     limits: JointLimits = field(default_factory=JointLimits)
 
     letter: ClassVar[str] = ""
-    """R, P, F: as in the toolbox's ``RRRRRR``."""
+    """R, P or F, as in the toolbox's ``RRRRRR``."""
     unit: ClassVar[str] = ""
     """SI unit of the joint coordinate."""
 
@@ -74,7 +74,7 @@ class Joint(ABC):
     def __post_init__(self) -> None:
         axis = vector3(self.axis, where="axis of a joint")
         length = hypot(*axis)
-        # An axis that is normal up to rounding stays as it is: what a file gives back must be the same axis.
+        # An axis of unit length up to rounding is unchanged, so that an axis read from a file is the same.
         if length > 0 and abs(length - 1) > 1e-15 and math.isfinite(length):
             axis = (axis[0] / length, axis[1] / length, axis[2] / length)
         object.__setattr__(self, "axis", axis)
