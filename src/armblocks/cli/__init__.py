@@ -1,1 +1,1 @@
-"""The command line: ``armblocks run | show | list | bench``. The only place that knows typer and rich."""
+"""The command line: ``armblocks run | show | list | bench …``. Only this package imports typer and rich."""

@@ -51,7 +51,7 @@ def parse_value(text: str, where: str = "--set") -> Value:
         return text[1:-1]
     if _WHOLE.fullmatch(text):
         return int(text)
-    if _PLAIN.fullmatch(text):  # NaN too: the parameter's rule checks the range
+    if _PLAIN.fullmatch(text):  # also NaN: the rule of the parameter checks the range
         return float(text)
     if text in ("true", "false"):
         return text == "true"

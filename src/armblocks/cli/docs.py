@@ -62,9 +62,9 @@ def pages(folder: Path) -> dict[str, Path]:
 def built_pages(notify: Callable[[str], None], installed_pages: Path, script: Path) -> Path:
     """The folder of the built pages, which are built first in a checkout without pages.
 
-    ``notify`` gets a line before the build.
+    ``notify`` is called with a line before the build.
 
-    Raises ``FormatError`` where there are no pages and they cannot be built.
+    Raises ``FormatError`` if there are no pages and they cannot be built.
     """
     if (installed_pages / "index.html").is_file():
         return installed_pages

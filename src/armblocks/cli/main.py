@@ -1,7 +1,7 @@
 """The entry point of the command line: commands, and handling of errors, warnings and Ctrl-C.
 
 Exit codes: 0 done, 1 a defect of armblocks (with a traceback), 2 invalid input (a message, no traceback), 130
-interrupted with Ctrl-C. ``diff`` also exits with 1 where its diagrams differ.
+interrupted with Ctrl-C. ``diff`` also exits with 1 if its diagrams differ.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ GARBAGE_THRESHOLD = 50_000
 
 
 class Commands(TyperGroup):
-    """All commands; errors become a message and an exit code here."""
+    """All commands. Errors are converted to a message and an exit code here."""
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command given by the arguments."""
@@ -95,6 +95,7 @@ def options(
 
 def main() -> None:
     """The entry point of the installed ``armblocks`` script."""
-    # Imports and reports create many objects and few cycles: the default of 700 costs a tenth of their time.
+    # Imports and reports create many objects and few cycles. The default of 700 would take a tenth of their
+    # time for garbage collection.
     gc.set_threshold(GARBAGE_THRESHOLD)
     app()

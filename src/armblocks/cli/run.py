@@ -111,7 +111,7 @@ def run(
 
 
 def _stated(**settings: Any) -> dict[str, Any]:
-    """The settings of the command line; others are those of the model."""
+    """The settings: those of the command line, otherwise those of the model."""
     return {name: value for name, value in settings.items() if value is not None}
 
 
@@ -135,7 +135,7 @@ def _report(
     from armblocks.report.writing import usable_data_formats
 
     with warnings.catch_warnings():
-        # The summary lists exceeded limits already.
+        # The summary lists the exceeded limits.
         warnings.simplefilter("ignore", LimitWarning)
         return ab.write_report(
             folder,
@@ -157,7 +157,7 @@ def _check_files(diagram: Diagram, formats: list[DataFormat]) -> None:
 
 
 def _check_writable(folder: Path) -> None:
-    """Create the folder if absent; what cannot be written is refused before the run rather than after it."""
+    """Create the folder if absent. Raises ``FormatError`` before the run if the folder cannot be written."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         probe = folder / ".armblocks-probe"

@@ -55,7 +55,7 @@ def show(
         case DocumentKind.ROBOT:
             pass
     described = ab.load_robot(model, name=name).robot
-    # Loading a shipped robot gives no warnings about known deviations; here they are shown.
+    # Loading a shipped robot gives no warnings about known deviations; this command prints them.
     warn_of_inertias(described)
     warn_of_doubts(described)
     print_robot(described, console)

@@ -50,7 +50,7 @@ def _add_subsystems(tree: Tree, diagram: Diagram) -> None:
         branch = tree.add(Text.assemble(label, "  ", _count(inner)))
         if values := _values(block):
             branch.add(Text(values))
-        if not inner.link:  # the library describes the content
+        if not inner.link:  # the content is that of the library
             _add_subsystems(branch, inner)
 
 

@@ -117,7 +117,8 @@ def face(block: Block, room: Room, trend: Trend | None, *, flipped: bool = False
         case kinds.Goto() | kinds.From():
             return words(room.shrunk(6.0, 0.0), tag_text(block), size=11.0)
         case kinds.Product():
-            # If all inputs are factors, one sign is drawn; else the signs are drawn at the ports.
+            # If all inputs are factors, one sign is drawn in the middle; else the signs are drawn at the
+            # ports.
             return words(room, "×", size=20) if set(block.operators) == {"*"} else []
         case kinds.Scope():
             return scope(room, trend)
@@ -144,7 +145,8 @@ def face_at_ports(
 ) -> list[Mark] | None:
     """The drawing of a block that depends on its ports; ``None`` for all others.
 
-    ``heights`` (px) of the inputs at the side, ``tops``: names and places (px) of those on the upper edge.
+    ``heights``: positions (px) of the inputs at the side. ``tops``: names and positions (px) of the inputs on
+    the upper edge.
     """
     if is_subsystem(block):
         return subsystem_marks(block, room, tops)
@@ -185,13 +187,13 @@ def port_labels(block: Block) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def bus_width(block: Block, size: float) -> float:
-    """px of a bus block whose element names have a type of this size."""
+    """Width (px) of a bus block whose element names have this font size."""
     labels = [label for side in port_labels(block) for label in side]
     return max((text_width(label, size) for label in labels), default=0.0) + BAR + 14
 
 
 def _powered(gain: object) -> str:
-    """A long number with a power of ten, such as 2.5e4; nothing where that is long as well."""
+    """A long number with a power of ten, such as 2.5e4; an empty text if that is long as well."""
     array = np.asarray(gain, dtype=np.float64)
     if array.size != 1:
         return ""
@@ -201,7 +203,8 @@ def _powered(gain: object) -> str:
 
 
 def _gain(block: kinds.Gain | kinds.SliderGain, room: Room, *, flipped: bool) -> list[Mark]:
-    """The formula or the value, as much of both as the triangle holds; else the letter of every gain."""
+    """The formula and the value of a gain, as far as they fit into the triangle; else the letter of all
+    gains."""
     most = 0.56 * room.width
     wishes = (block.stated_text("gain"), value_text(block.gain), _powered(block.gain))
     text = next((wish for wish in wishes if wish and text_width(wish, 9.5) <= most), "K")
@@ -211,7 +214,7 @@ def _gain(block: kinds.Gain | kinds.SliderGain, room: Room, *, flipped: bool) ->
 
 
 def _robot(room: Room, robot: Robot, caption: str) -> list[Mark]:
-    """The robot's own joints and links as a small figure of sticks."""
+    """The joints and links of the robot as a small stick figure."""
     heavy = not caption
     box = room.shrunk(7.0, 7.0)
     if caption:

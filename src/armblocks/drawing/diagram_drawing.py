@@ -48,10 +48,10 @@ from armblocks.simulation.result import SimulationResult
 _MARGIN = 22.0
 NOTE_SIZE = 12.0
 NOTE_LINE = 17.0
-"""px: type size and line height of notes."""
+"""Font size and line height of notes, px."""
 _TRENDS = (ViewKind.TRACES, ViewKind.PATH, ViewKind.VALUE)
 _STUB = 16.0
-"""px of wire at the ports of a block that is drawn alone."""
+"""Length of the wires at the ports of a block that is drawn alone, px."""
 
 
 def diagram_picture(
@@ -171,12 +171,13 @@ def wire_label(diagram: Diagram, source: PortRef) -> str:
 
 
 def obstacle(box: Box) -> Obstacle:
-    """The area of a block and its name, which lines avoid."""
+    """The area of a block and its name, which wires avoid."""
     return Obstacle(box.x, box.y, box.width, box.height, _label(box))
 
 
 def _label(box: Box) -> tuple[float, float, float, float]:
-    """The rectangle of the block's name: below it; above for round sums, which wires enter from below."""
+    """The rectangle of the block's name: below the block, but above round sums, which wires enter from
+    below."""
     width = box.name_width
     if not box.upright:  # wires leave above and below
         return box.x + box.width + 5, box.y + box.height / 2 - 7, width, NAME_ROOM - 4
@@ -199,7 +200,7 @@ def _trend(path: str, view: View | None, result: SimulationResult | None) -> Tre
 
 
 def block_marks(box: Box, trend: Trend | None = None) -> list[Mark]:
-    """A block without its name: outline, port names and face, where its box stands.
+    """A block without its name: outline, port names and face, at the position of its box.
 
     A rotated block has a rotated outline and an upright drawing.
     """
@@ -215,7 +216,7 @@ def block_marks(box: Box, trend: Trend | None = None) -> list[Mark]:
         return marks
     flipped = box.flipped != (box.rotation == 180)
     if not box.upright and shape is Outline.TRIANGLE:
-        # The number stands in the wide half, which is the upper one of a triangle that points down.
+        # The number is in the wide half of the triangle, which is the upper half if the triangle points down.
         points_down = (box.rotation == 90) != box.flipped
         way = -1 if points_down else 1
         room = Room(room.x + 0.14 * room.width, room.y + way * 0.14 * room.height, room.width, room.height)

@@ -14,7 +14,8 @@ from armblocks.pictures.svg import svg_file
 from armblocks.simulation.result import SimulationResult
 
 DRAWING_FORMATS = ("svg", "png", "pdf")
-"""SVG and PDF are drawn with lines and text; PNG has 192 dots per inch. PDF and PNG hold DejaVu Sans."""
+"""SVG and PDF have vector lines and text; PNG has 192 dots per inch. Text in PDF and PNG is in DejaVu
+Sans."""
 
 
 def draw_diagram(
@@ -47,10 +48,10 @@ def drawing_bytes(
 ) -> bytes:
     """A sheet in one of ``DRAWING_FORMATS``.
 
-    ``sheet``: the path of a subsystem, ``""`` the top. ``result``: what the sinks show. ``rates``: clocks in
-    colours, with a legend. ``theme`` ``None``: SVG follows the viewer's preference, other formats are light.
-    Incomplete diagrams with unconnected inputs are drawn, too. Raises UnknownNameError for another format or
-    sheet.
+    ``sheet``: the path of a subsystem, ``""`` is the top level. ``result``: the data that sinks show.
+    ``rates``: clocks in colours, with a legend. ``theme`` ``None``: SVG follows the viewer's preference,
+    other formats are light. Incomplete diagrams with unconnected inputs are drawn, too. Raises
+    UnknownNameError for another format or sheet.
     """
     if kind not in DRAWING_FORMATS:
         raise UnknownNameError("drawing format", kind, DRAWING_FORMATS)

@@ -12,12 +12,12 @@ from armblocks.drawing.structure_faces import CONTROL_ROOM, control_ports
 from armblocks.pictures.text_width import text_width
 
 NAME_SIZE = 11.0
-"""px: type size of the names under the blocks."""
+"""Font size of the names under the blocks, px."""
 NAME_ROOM = 20.0
-"""px below a block that its name takes."""
+"""Height of the name below a block, px."""
 PORT_TEXT = 9.0
 PORT_TEXT_ROOM = 13.0
-"""px that the names of ports take at the upper or lower edge."""
+"""Height of the port names at the upper or lower edge, px."""
 _ROW_GAP = 26.0
 _COLUMN_GAP = 52.0
 _LANE = 11.0
@@ -59,7 +59,7 @@ class Box:
 
     @property
     def name_width(self) -> float:
-        """px that the block's name is wide, at most."""
+        """Maximum width of the block's name, px."""
         return min(text_width(self.name, NAME_SIZE), 168.0)
 
     def at(self, x: float, y: float) -> Box:
@@ -85,7 +85,7 @@ def boxes(diagram: Diagram) -> dict[str, Box]:
 
 
 def drawn_blocks(diagram: Diagram) -> Mapping[str, Block]:
-    """The blocks as they are drawn: ends whose number is not stated show the one that they have."""
+    """The blocks for drawing: In and Out blocks without a stated number show their actual number."""
     return diagram.keep("drawn blocks", lambda: _numbered(diagram))
 
 
@@ -101,7 +101,7 @@ def _numbered(diagram: Diagram) -> dict[str, Block]:
 
 
 def standing_box(name: str, block: Block, place: Placement) -> Box:
-    """The box of a block that stands at ``place``, whatever is connected to it."""
+    """The box of a block at ``place``, independent of its connections."""
     sized = sized_box(name, block)
     width, height = sized.width, sized.height
     if place.rotation % 180:
@@ -120,7 +120,7 @@ def standing_box(name: str, block: Block, place: Placement) -> Box:
 
 
 def _standing(box: Box) -> tuple[float, float]:
-    """Width and height of a block turned by a quarter: its drawing stays upright, its ports go round."""
+    """Width and height of a block rotated by 90 degrees: its ports rotate, its drawing stays upright."""
     shape = face_size(box.block)[0]
     if shape is Outline.TAG:  # as wide as its text
         return box.width, box.height + 10
@@ -168,7 +168,7 @@ def _apart(a: Box, b: Box) -> bool:
 
 
 def with_turned_sums(diagram: Diagram, placed: Mapping[str, Box]) -> dict[str, Box]:
-    """Round sums take each wire on the side that it comes from; the signs go with the ports."""
+    """Move each input of a round sum to the side from which its wire comes; the signs move with the ports."""
     turned = dict(placed)
     for name, box in placed.items():
         count = len(box.inputs)
@@ -183,7 +183,7 @@ def with_turned_sums(diagram: Diagram, placed: Mapping[str, Box]) -> dict[str, B
         if len(height) < count:
             continue  # an incomplete diagram: the direction of an open input is unknown
         ports = [spot.name for spot in box.inputs]
-        # The straightest line enters from the left, but never the feedback line of a loop.
+        # The straightest wire enters from the left, except the feedback wire of a loop.
         behind = {
             wire.target.port: placed[wire.source.block].x < box.x
             for wire in diagram.connections
@@ -210,9 +210,10 @@ def with_turned_sums(diagram: Diagram, placed: Mapping[str, Box]) -> dict[str, B
 def layered(diagram: Diagram, sized: Mapping[str, Box]) -> dict[str, Box]:
     """Blocks in columns so that wires run to the right, except those that close a loop.
 
-    1. Columns by the longest way from a source, loops cut where a depth-first walk returns. 2. Order within a
-    column by the mean place of the neighbours, in sweeps. 3. Heights by the neighbours' ports.
-    After Sugiyama, Tagawa, Toda, *Methods for visual understanding of hierarchical system structures*, 1981.
+    1. Columns from the longest path from a source, with loops cut at the back edges of a depth-first search.
+    2. Order within a column from the mean position of the neighbours, in sweeps. 3. Heights from the
+    neighbours' ports. Source: Sugiyama, Tagawa, Toda, *Methods for visual understanding of hierarchical
+    system structures*, 1981.
     """
     successors: dict[str, list[str]] = {name: [] for name in diagram.blocks}
     for wire in diagram.connections:
@@ -232,11 +233,11 @@ def layered(diagram: Diagram, sized: Mapping[str, Box]) -> dict[str, Box]:
 
 
 def _without_loops(successors: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:
-    """The edges without those that lead back to a block on the way to themselves."""
+    """The edges without the back edges of a depth-first search."""
     forward: dict[str, list[str]] = {name: [] for name in successors}
     entered = {target for targets in successors.values() for target in targets}
     colour: dict[str, int] = {}
-    # Blocks without inputs come first: a search from them follows the signals.
+    # The search starts with blocks without inputs, so that it follows the signals.
     for root in sorted(successors, key=lambda name: (name in entered, name)):
         if root in colour:
             continue
@@ -330,7 +331,8 @@ def _assign(
 
 
 def _stacked(wishes: Sequence[float], heights: Sequence[float]) -> list[float]:
-    """Tops in the given order, as near to the wishes as heights allow (pool adjacent violators)."""
+    """Upper edges in the given order, as close to the wanted ones as the heights allow (pool adjacent
+    violators)."""
     before = [sum(heights[:k]) for k in range(len(heights))]
     groups: list[tuple[float, int]] = []
     for wish, offset in zip(wishes, before):
@@ -349,7 +351,7 @@ def _port_y(spots: Sequence[PortSpot], port: str) -> float:
 
 
 def sized_box(name: str, block: Block) -> Box:
-    """A box of the size that suits the block, its ports along the edges, at the origin."""
+    """A box at the origin with the size of the block's face and with its ports along the edges."""
     shape, width, height = face_size(block)
     inputs, outputs = len(block.input_ports()) - len(control_ports(block)), len(block.output_ports())
     if shape is Outline.CARD:
@@ -366,7 +368,7 @@ def sized_box(name: str, block: Block) -> Box:
 
 
 def _with_ports(box: Box) -> Box:
-    """The box with its ports: those of the upright one, gone round with it."""
+    """The box with its ports, which are rotated with the block."""
     width, height = (box.width, box.height) if box.upright else (box.height, box.width)
     upright = _with_upright_ports(replace(box, x=0.0, y=0.0, width=width, height=height))
     inputs, outputs = upright.inputs, upright.outputs
@@ -388,7 +390,7 @@ def _with_upright_ports(box: Box) -> Box:
     entry, leave = (right, left) if box.flipped else (left, right)
     forwards = -1 if box.flipped else 1
     if shape is Outline.CIRCLE and len(into) in (2, 3):
-        # The first from behind, the second from below, a third from above, as round sums are drawn.
+        # Inputs of a round sum: the first from the left, the second from below, the third from above.
         cx, cy = box.x + box.width / 2, box.y + box.height / 2
         spots = [
             PortSpot(into[0], entry, cy, forwards, 0),

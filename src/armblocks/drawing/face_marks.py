@@ -1,4 +1,4 @@
-"""Drawing of signs: as large as the area of the face allows."""
+"""Drawing of signs, as large as the face allows."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from armblocks.pictures.style import Tone
 from armblocks.pictures.text_width import shorten, text_width
 
 _WORDS = (13.0, 9.0)
-"""px: the largest and the smallest type of a sign; smaller would not be read."""
+"""Largest and smallest legible font size of a sign, px."""
 _TITLE = 10.0
 _LEAST = 44.0
-"""px that a sign takes at least, so that it does not hide between the names of ports."""
+"""Minimum width of a sign, px, so that it is visible between the port names."""
 _MOST_TEXT = 132.0
-"""px: a sign may ask for no more; what is longer is cut."""
+"""Maximum width of a sign, px; longer signs are shortened."""
 
 
 @dataclass(frozen=True)
@@ -34,12 +34,12 @@ class Room:
         return self.x + self.width / 2, self.y + self.height / 2
 
     def shrunk(self, dx: float, dy: float) -> Room:
-        """The same room less a border."""
+        """The same area without a border."""
         return Room(self.x + dx, self.y + dy, max(self.width - 2 * dx, 1.0), max(self.height - 2 * dy, 1.0))
 
 
 def least_room(sign: FaceSign) -> tuple[float, float]:
-    """Width and height (px) that a sign needs to be read whole."""
+    """Width and height (px) of a complete sign."""
     match sign:
         case Words():
             return min(max(text_width(sign.text, 11.0) + 10, _LEAST), _MOST_TEXT), 24.0
@@ -58,7 +58,7 @@ def least_room(sign: FaceSign) -> tuple[float, float]:
 
 
 def sign_marks(sign: FaceSign, room: Room) -> list[Mark]:
-    """A sign in the middle of its room."""
+    """Draw a sign in the middle of an area."""
     match sign:
         case Words():
             size = _WORDS[0] if len(sign.text) > 2 else 16.0
@@ -74,7 +74,7 @@ def sign_marks(sign: FaceSign, room: Room) -> list[Mark]:
 
 
 def words(room: Room, text: str, *, size: float = _WORDS[0], italic: bool = False) -> list[Mark]:
-    """One line; its type shrinks before it is cut."""
+    """Draw one line of text. A long text gets a smaller font, then it is shortened."""
     x, y = room.middle
     shown = size
     while shown > _WORDS[1] and text_width(text, shown) > room.width - 6:
@@ -84,7 +84,8 @@ def words(room: Room, text: str, *, size: float = _WORDS[0], italic: bool = Fals
 
 
 def _broken(text: str, width: float) -> list[str]:
-    """Words and parts with a hyphen, as many on a line as fit; a word that is too long has its own line."""
+    """Lines of text, broken at spaces and hyphens to fit a width; a word that is too long has its own
+    line."""
     parts = [part for word in text.split() for part in _at_hyphens(word)]
     lines = [""]
     for part in parts:
@@ -98,7 +99,7 @@ def _broken(text: str, width: float) -> list[str]:
 
 def _at_hyphens(word: str) -> list[str]:
     first, hyphen, rest = word.partition("-")
-    # "Zero-Pole" may be broken, "S-R" and "n-D" are one sign.
+    # "Zero-Pole" may be broken, "S-R" and "n-D" must not be.
     return [first + hyphen, rest] if len(first) > 2 and len(rest) > 2 else [word]
 
 

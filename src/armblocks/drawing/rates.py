@@ -24,7 +24,7 @@ class Rates:
 
     @classmethod
     def of(cls, diagram: Diagram) -> Rates:
-        """The clocks of a diagram. Raises ``DiagramError`` where they are not known yet."""
+        """The clocks of a diagram. Raises ``DiagramError`` if they are not known yet."""
         sampling = sampling_of(diagram)
         return cls(sampling.clocks, sampling.clock_of)
 

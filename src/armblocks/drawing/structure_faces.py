@@ -14,9 +14,9 @@ from armblocks.pictures.text_width import text_width
 CONTROLS = ("enable", "trigger", "reset", "action")
 """Control inputs of a subsystem, which are on its upper edge with their symbols below."""
 CONTROL_ROOM = 18.0
-"""px below the upper edge of a conditional subsystem that the symbol of its control takes."""
+"""Height of the area below the upper edge of a conditional subsystem for the symbol of its control, px."""
 BAR = 6.0
-"""px: how thick the bar of a bus block is."""
+"""Thickness of the bar of a bus block, px."""
 _CONDITIONAL = (
     kinds.EnabledSubsystem,
     kinds.TriggeredSubsystem,
@@ -25,18 +25,18 @@ _CONDITIONAL = (
     kinds.ActionSubsystem,
 )
 _SYMBOL = 15.0
-"""px: height of the symbols of controls."""
+"""Height of the symbols of control inputs, px."""
 _MASK_SIZE = 10.5
 _MASK_LINE = 84.0
 _MOST_MASK = 140.0
-"""px: type size of what a mask says, the length that begins another line, and the longest line."""
+"""Text of a mask: font size (px), length from which a line is broken, and maximum length of a line."""
 Stroke = list[tuple[float, float]]
 _RISING: Stroke = [(0, 1), (0.5, 1), (0.5, 0), (1, 0)]
 _FALLING: Stroke = [(0, 0), (0.5, 0), (0.5, 1), (1, 1)]
 
 
 def is_subsystem(block: Block) -> bool:
-    """Whether a block holds a diagram."""
+    """Whether a block contains a diagram."""
     return isinstance(block, (kinds.Subsystem, *_CONDITIONAL))
 
 
@@ -65,7 +65,7 @@ def tag_outline(block: Block, x: float, y: float, width: float, height: float, f
 
 
 def bus_bar(block: Block, x: float, y: float, width: float, height: float, flipped: bool) -> Mark:
-    """The bar at the end where the bus is."""
+    """Draw the bar on the side of the bus."""
     at_inputs = isinstance(block, kinds.BusSelector)
     left = x if at_inputs != flipped else x + width - BAR
     return Rectangle(left, y, BAR, height, radius=1.5, fill=Tone.WIRE)
@@ -84,7 +84,7 @@ def subsystem_marks(block: Block, room: Room, tops: tuple[tuple[str, float], ...
 
 
 def mask_width(block: Block) -> float:
-    """px that a subsystem's drawing needs between the names of its ports."""
+    """Width of a subsystem's drawing between its port names, px."""
     inner: object = block.parameter_value("diagram")
     if not (isinstance(inner, Diagram) and inner.mask):
         return 44.0
@@ -93,7 +93,7 @@ def mask_width(block: Block) -> float:
 
 
 def mask_text(diagram: Diagram) -> tuple[str, ...]:
-    """The lines on the face of a masked subsystem: its name, broken where words end if it is long."""
+    """The lines on the face of a masked subsystem: its name, broken between words if it is long."""
     lines = [""]
     for word in diagram.name.replace("_", " ").split():
         together = f"{lines[-1]} {word}".strip()
@@ -105,7 +105,7 @@ def mask_text(diagram: Diagram) -> tuple[str, ...]:
 
 
 def _lines(room: Room, texts: Sequence[str]) -> list[Mark]:
-    """Lines in the middle of a room, each in a type that fits."""
+    """Draw lines of text in the middle of an area, each with a font size that fits."""
     height = _MASK_SIZE * 1.3
     top = room.middle[1] - height * len(texts) / 2
     rows = [Room(room.x, top + k * height, room.width, height) for k in range(len(texts))]
@@ -153,7 +153,8 @@ def _edge_arrow(x: float, y: float, *, up: bool) -> Mark:
 
 
 def lever_marks(block: Block, room: Room, heights: tuple[float, ...], flipped: bool) -> list[Mark]:
-    """Contacts at the heights of the inputs, the output's contact, and a lever between two of them."""
+    """Draw the contacts of a switch at the heights of the inputs, the output contact, and a lever between
+    two."""
     inner, outer = room.x + 0.2 * room.width, room.x + 0.8 * room.width
     begin, end = (outer, inner) if flipped else (inner, outer)
     middle = room.middle[1]
@@ -169,7 +170,7 @@ def lever_marks(block: Block, room: Room, heights: tuple[float, ...], flipped: b
 
 
 def stop_marks(room: Room) -> list[Mark]:
-    """The sign at the road that every reader knows."""
+    """The stop sign of road traffic."""
     x, y = room.middle
     r = 17.0
     near = 0.41421356 * r
@@ -182,30 +183,30 @@ def stop_marks(room: Room) -> list[Mark]:
 
 
 def port_number(block: kinds.Inport | kinds.Outport, room: Room) -> list[Mark]:
-    """Its place among the ports."""
+    """The number of the port."""
     return words(room, str(block.port or 1), size=11.0)
 
 
 def tag_width(block: kinds.Goto | kinds.From) -> float:
-    """px that a tag needs."""
+    """Width of a tag, px."""
     return min(max(52.0, text_width(tag_text(block), 11.0) + 28), 150.0)
 
 
 def oval(x: float, y: float, width: float, height: float) -> Mark:
-    """The round end of a diagram."""
+    """The outline of In and Out blocks: a rectangle with round ends."""
     return Rectangle(x, y, width, height, height / 2, Tone.SURFACE, Tone.WIRE, 1.2)
 
 
 def bus_outline(
     block: Block, x: float, y: float, width: float, height: float, flipped: bool
 ) -> tuple[Mark, ...]:
-    """A card whose one edge is the bar."""
+    """The outline of a bus block, of which one edge is the bar."""
     card = Rectangle(x, y, width, height, 2, Tone.SURFACE, Tone.HAIRLINE, 1.0)
     return card, bus_bar(block, x, y, width, height, flipped)
 
 
 def branch_labels(block: kinds.If | kinds.SwitchCase) -> tuple[str, ...]:
-    """The texts beside the outputs: the conditions."""
+    """The texts beside the outputs of an If block: the conditions."""
     if isinstance(block, kinds.If):
         texts = [text.strip() for text in block.expressions.split(";")]
         return (*(f"{'else' * (k > 0)}if {text}" for k, text in enumerate(texts)), "else")

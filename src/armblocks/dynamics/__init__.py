@@ -1,6 +1,6 @@
-"""Kinematics and dynamics of trees: each algorithm written once over symbols, traced with a robot's numbers.
+"""Kinematics and dynamics of trees. Each algorithm is written for symbols and traced with a robot's numbers.
 
-``TRACES`` names every quantity; :mod:`armblocks.dynamics.traces` says shapes, units and frames.
+``TRACES`` lists all quantities; :mod:`armblocks.dynamics.traces` describes shapes, units and frames.
 """
 
 from armblocks.dynamics.traces import (

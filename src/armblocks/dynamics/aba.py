@@ -21,12 +21,12 @@ def aba(
     gravity: Vector,
     on_bodies: Mapping[int, Wrench] | None = None,
 ) -> list[SX]:
-    """Joint accelerations from the joint torques less friction, in the order of q.
+    """Joint accelerations from the joint torques minus friction, in the order of q.
 
-    ``on_bodies`` wrenches that bodies exert on the surroundings, each in its body's frame.
-    Spatial vectors are angular, then linear. The cost grows with n instead of n^3: right for long chains.
-    Source: Featherstone, *Rigid Body Dynamics Algorithms*, table 7.1 (passes numbered so), with rotor
-    inertia added to each joint's own.
+    ``on_bodies``: wrenches that bodies exert on the surroundings, each in its body's frame. Spatial vectors
+    have the angular part first. The cost is proportional to n instead of n^3, which is an advantage for long
+    chains. Source: Featherstone, *Rigid Body Dynamics Algorithms*, table 7.1 (with its numbers of the
+    passes); rotor inertia is added to the inertia of each joint.
     """
     bodies = tree.bodies
     X = [_motion_transform(joint) for joint in joints]
@@ -53,7 +53,7 @@ def aba(
         body = bodies[i]
         U[i] = mtimes(IA[i], S[i])
         pivot = mtimes(S[i].T, U[i]) + body.reflected_inertia
-        # Not 1 / pivot: CasADi would turn every later product with that back into a division of its own.
+        # Not 1 / pivot: CasADi would replace every later product with it by a separate division.
         d[i] = 2.0 / (pivot + pivot)
         u[i] = tau[body.joint] - mtimes(S[i].T, pA[i])
         if body.parent != BASE:

@@ -1,4 +1,4 @@
-"""Inertial parameters regrouped, so that inverse dynamics has fewer terms and the same result."""
+"""Regrouped inertial parameters, with which inverse dynamics has fewer terms and the same result."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ from armblocks.spatial.vectors import ZERO, Symmetric
 def regrouped(tree: KinematicTree) -> KinematicTree:
     """The same equations of motion with the fewest inertial parameters.
 
-    Some parameters of a body have the same effect on its joint as parameters of its parent: a revolute joint
-    the mass, the first moment along its axis and an inertia that is equal across the axis; a prismatic joint
-    the whole inertia matrix. These move to the parent. Each body's origin is first slid along its joint's
-    axis to the foot of the common normal with the next axis, which spares the products with that distance.
+    Some parameters of a body have the same effect as parameters of its parent and are added to these. For a
+    revolute joint they are the mass, the first moment along the axis, and an inertia that is equal about all
+    directions normal to the axis; for a prismatic joint the whole inertia matrix. Before that, each body's
+    origin is shifted along its joint axis to the foot of the common normal with the next axis, which saves
+    the products with that distance.
 
     Joint torques, mass matrix and kinetic energy are those of the robot; the inertia of a single body is not.
     Source: Khalil, Dombre, *Modeling, Identification and Control of Robots*, 9.4 (base inertial parameters).
@@ -37,17 +38,17 @@ def _shared_with_parent(inertia: RigidInertia, *, turn: float, slide: float) -> 
     """The part of the inertia that can be assigned to either side of the joint."""
     second = inertia.second
     if turn:
-        # Equal across the axis and zero about it: a rotation neither changes it nor gives it momentum.
+        # Equal normal to the axis and zero about it: a rotation about the axis changes neither this inertia
+        # nor its momentum.
         second = Symmetric(second.yy, second.yy, 0.0, 0.0, 0.0, 0.0)
     if slide:
-        # Without mass a translation gives no momentum, and without first moment it does not change the
-        # inertia.
+        # Without mass a translation causes no momentum; without first moment it does not change the inertia.
         return RigidInertia(0.0, ZERO, second)
     return RigidInertia(inertia.mass, (0.0, 0.0, inertia.first[2]), second)
 
 
 def _without(inertia: RigidInertia, part: RigidInertia) -> RigidInertia:
-    """``inertia`` less ``part``, exactly zero where all of an entry leaves."""
+    """``inertia`` minus ``part``, exactly zero where an entry is moved completely."""
     mass, first, second = inertia
     return RigidInertia(
         mass - part.mass,
@@ -57,7 +58,7 @@ def _without(inertia: RigidInertia, part: RigidInertia) -> RigidInertia:
 
 
 def _origins_on_common_normals(tree: KinematicTree) -> KinematicTree:
-    """Slide each body's origin along its own axis to where its first child's origin has z = 0."""
+    """Shift each body's origin along its axis so that the origin of its first child has z = 0."""
     bodies = list(tree.bodies)
     links = list(tree.links)
     for i in reversed(range(tree.n)):
@@ -78,6 +79,6 @@ def _origins_on_common_normals(tree: KinematicTree) -> KinematicTree:
 
 
 def _level(placement: Transform, exact: bool) -> Transform:
-    """The placement with z exactly zero where it was shifted by just that."""
+    """The placement with z exactly zero if the shift removes it."""
     x, y, z = placement.translation
     return Transform(rotation=placement.rotation, translation=(x, y, 0.0 if exact else z))

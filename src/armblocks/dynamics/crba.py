@@ -1,4 +1,4 @@
-"""The joint-space inertia matrix by composite rigid bodies, and its factors."""
+"""The joint-space inertia matrix by the composite-rigid-body algorithm, and its factors."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from armblocks.spatial.inertia import RigidInertia
 from armblocks.spatial.vectors import Scalar, Vector, add, cross, rotate_symmetric
 
 SquareMatrix = list[list[Scalar]]
-"""Rows of scalars; entries that are zero for any q are the number 0."""
+"""Rows of scalars; entries that are zero for all q are the number 0."""
 
 
 def crba(tree: KinematicTree, joints: Sequence[JointMotion]) -> SquareMatrix:
     """Inertia matrix of the rigid bodies and rotors in the order of the *bodies*.
 
-    ``tree`` may be regrouped. Source: Featherstone, *Rigid Body Dynamics Algorithms*, table 6.2, with
-    three-vectors in body frames.
+    ``tree`` may have regrouped parameters. Source: Featherstone, *Rigid Body Dynamics Algorithms*, table 6.2,
+    with three-vectors in body frames.
     """
     n = tree.n
     bodies = tree.bodies
@@ -27,7 +27,7 @@ def crba(tree: KinematicTree, joints: Sequence[JointMotion]) -> SquareMatrix:
     composite = [body.inertia for body in bodies]
     for i in reversed(range(n)):
         body, inertia = bodies[i], composite[i]
-        # 1. The composite body joins its parent's.
+        # 1. The composite body is added to that of its parent.
         if body.parent != BASE:
             composite[body.parent] = composite[body.parent].plus(_in_parent(inertia, joints[i]))
         # 2. The wrench that gives the composite body unit acceleration of joint i.
@@ -59,8 +59,8 @@ def _in_parent(inertia: RigidInertia, joint: JointMotion) -> RigidInertia:
 def solve_factored(tree: KinematicTree, M: SquareMatrix, right: Sequence[Scalar]) -> list[SX]:
     """``x`` with ``M x = right``, all in the order of the bodies; ``M`` is symmetric positive definite.
 
-    ``M = L' D L`` from the tips inwards: entries that the tree's branches make zero stay zero.
-    Source: Featherstone, *Rigid Body Dynamics Algorithms*, 6.5 (tables 6.3 and 6.4).
+    ``M = L' D L``, factored from the tips to the base, so that entries that are zero between branches stay
+    zero. Source: Featherstone, *Rigid Body Dynamics Algorithms*, 6.5 (tables 6.3 and 6.4).
     """
     n = tree.n
     H = [list(row) for row in M]
@@ -68,7 +68,7 @@ def solve_factored(tree: KinematicTree, M: SquareMatrix, right: Sequence[Scalar]
     x = [SX(entry) for entry in right]
     for k in reversed(range(n)):
         ancestors = tree.ancestors(k)
-        # Not 1 / d: CasADi would turn every later product with that back into a division of its own.
+        # Not 1 / d: CasADi would replace every later product with it by a separate division.
         inverse_pivots[k] = 2.0 / (SX(H[k][k]) + H[k][k])
         factors = {i: H[k][i] * inverse_pivots[k] for i in ancestors}
         for i in ancestors:

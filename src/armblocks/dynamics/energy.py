@@ -20,7 +20,8 @@ from armblocks.spatial.vectors import (
 
 
 def kinetic_energy(tree: KinematicTree, joints: Sequence[JointMotion], qd: Sequence[Scalar]) -> Scalar:
-    """Of all bodies and rotors, J: ``sum (m v.v + 2 v.(w x h) + w.I w) / 2 + G^2 Jm qd^2 / 2``."""
+    """Kinetic energy of all bodies and rotors, J: ``sum (m v.v + 2 v.(w x h) + w.I w) / 2 + G^2 Jm qd^2 /
+    2``."""
     omegas: list[Vector] = []
     velocities: list[Vector] = []
     twice: Scalar = 0.0
@@ -59,7 +60,8 @@ def first_moment(tree: KinematicTree, joints: Sequence[JointMotion]) -> tuple[fl
 
 
 def potential_energy(tree: KinematicTree, joints: Sequence[JointMotion]) -> Scalar:
-    """In gravity, J, zero where the centre of mass is at the world's origin: ``-g . sum m c``."""
+    """Potential energy in gravity, J, ``-g . sum m c``: zero if the centre of mass is at the world's
+    origin."""
     mass, moment = first_moment(tree, joints)
     in_base = dot(tree.gravity, moment)
     to_base = tree.base.translation

@@ -18,8 +18,8 @@ from armblocks.spatial.vectors import Scalar
 
 MOST_JOINTS_BY_MATRIX = 18
 """Up to this number of joints the factored inertia matrix takes fewer operations than the articulated-body
-algorithm: counted on chains of revolute joints about any axes (6 joints: 2,200 against 4,345; 16 joints:
-12,165 against 14,555)."""
+algorithm, for chains of revolute joints with general axes (6 joints: 2,200 against 4,345; 16 joints: 12,165
+against 14,555)."""
 
 SAMPLES = 3
 NO_INERTIA = 1e-12
@@ -33,7 +33,7 @@ def forward_dynamics(
     tau: Sequence[Scalar],
     on_bodies: Mapping[int, Wrench] | None = None,
 ) -> list[SX]:
-    """Accelerations of the joints, in the order of q, where ``tau`` is the joint torque less friction."""
+    """Accelerations of the joints, in the order of q; ``tau`` is the joint torque minus friction."""
     joints = joint_motions(tree, q)
     n = tree.n
     if n > MOST_JOINTS_BY_MATRIX:
@@ -49,7 +49,7 @@ def forward_dynamics(
 
 
 def check_accelerations_exist(tree: KinematicTree) -> None:
-    """Raise RobotError, naming the joint, where the inertia at some joint is zero for all q.
+    """Raise RobotError that names the joint if the inertia at a joint is zero for all q.
 
     The criterion is a pivot of the factored inertia matrix (the inertia at the joint while all distal joints
     are free) that is not positive at several random positions.
@@ -76,7 +76,8 @@ def check_accelerations_exist(tree: KinematicTree) -> None:
 
 
 def _pivots(M: NDArray[np.float64]) -> NDArray[np.float64]:
-    """D of ``M = L' D L``, eliminated from the last row up; 0 for all that a zero pivot leaves undefined."""
+    """D of ``M = L' D L``, eliminated from the last row upwards; 0 for entries undefined after a zero
+    pivot."""
     H = M.copy()
     n = len(H)
     for k in reversed(range(n)):

@@ -23,8 +23,8 @@ from armblocks.robot.robot import Robot
 from armblocks.robot.tree import KinematicTree
 
 ROUNDING = 1e-9
-"""Relative torque margin: a torque against the sliding direction counts only beyond this fraction of the
-friction."""
+"""Relative margin of torques: a torque against the sliding direction counts only if it exceeds this fraction
+of the friction."""
 _SOME_PAYLOAD = SX([1.0, 0.1, 0.2, 0.3, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 
 
@@ -51,7 +51,7 @@ class DryFriction:
 
     @property
     def joints(self) -> tuple[int, ...]:
-        """The joints that have any."""
+        """The joints with Coulomb friction."""
         return tuple(int(k) for k in np.flatnonzero((self.forward != 0.0) | (self.backward != 0.0)))
 
     def sliding(self, mode: SX) -> SX:
@@ -72,8 +72,9 @@ def viscous_friction(robot: Robot) -> NDArray[np.float64]:
 class JointEquations:
     """``M(q) qdd + bias(q, qd) = torque`` at one state, where ``torque`` is the total joint torque.
 
-    ``bias`` has gravity, velocity terms and the ``wrench`` (see :mod:`armblocks.dynamics.traces`); ``M`` and
-    ``bias`` have the ``payload``. Raises RobotError, naming the joint, where the inertia at a joint is zero.
+    ``bias`` includes gravity, velocity terms and the ``wrench`` (see :mod:`armblocks.dynamics.traces`); ``M``
+    and ``bias`` include the ``payload``. Raises RobotError that names the joint if the inertia at a joint is
+    zero.
     """
 
     def __init__(
@@ -93,7 +94,7 @@ class JointEquations:
         self.M = SX(vertcat(*(vertcat(*(SX(self._M[i][j]) for j in place)).T for i in place)))
 
     def solve(self, right: SX, free: SX) -> SX:
-        """``x`` with ``M x = right`` in the rows of the free joints (1), and exactly 0 of the others (0)."""
+        """``x`` with ``M x = right`` in the rows of the free joints (1), and exactly 0 for the others (0)."""
         n, bodies = self._tree.n, self._tree.bodies
         on = [free[body.joint] for body in bodies]
         masked: SquareMatrix = [
@@ -148,9 +149,10 @@ def settled(
 
     ``driving`` is the torque (n,) at the joints without dry friction and rigid stops; ``start`` a first
     guess. A moving joint slides. Of the joints at rest, those beyond their friction limit are released, and
-    those that would slide against their direction are locked, in as many rounds as there are joints. (The
-    accelerations are those of least constraint, min 1/2 qdd' M qdd - qdd' (torque - bias) + sum of friction
-    |qdd|, which is convex and has a unique solution.) Remaining inconsistencies are found by the guards.
+    those that would slide against their direction are locked; this is repeated as many times as there are
+    joints. (The accelerations minimise 1/2 qdd' M qdd - qdd' (torque - bias) + sum of friction |qdd|, the
+    principle of least constraint. This function is convex and has a unique minimum.) Guards detect remaining
+    inconsistencies.
     """
     n = qd.numel()
     dry = np.zeros(n)

@@ -15,14 +15,14 @@ from armblocks.spatial import Transform
 from armblocks.spatial.vectors import ZERO, Scalar, Vector, add, cross, scale, subtract
 
 Column = tuple[Vector, Vector]
-"""Linear and angular velocity of the tool at unit rate of one joint."""
+"""Linear and angular velocity of the tool per unit speed of one joint."""
 
 MOST_COLUMNS_BY_MINORS = 8
-"""Up to this number of joints all 6x6 minors are formed; beyond, the Gram matrix is cheaper."""
+"""Up to this number of joints all 6x6 minors are computed; for more joints the Gram matrix is cheaper."""
 
 
 def world_columns(tree: KinematicTree, q: Sequence[Scalar]) -> list[Column]:
-    """Columns of ``jacob0``: point is the tool's origin, axes are the world's."""
+    """Columns of ``jacob0``: velocities of the tool's origin in world axes."""
     ground = constant_pose(tree.base)
     bodies = body_poses(tree, q, ground)
     tool = frame_pose(tree.tool, bodies, ground)
@@ -30,10 +30,9 @@ def world_columns(tree: KinematicTree, q: Sequence[Scalar]) -> list[Column]:
 
 
 def tool_columns(tree: KinematicTree, q: SX) -> list[Column]:
-    """Columns of ``jacobe``: point is the tool's origin, axes are the tool's.
+    """Columns of ``jacobe``: velocities of the tool's origin in tool axes.
 
-    Poses are propagated from the tool towards the base, so that no rotation into the world and back is
-    formed.
+    Poses are propagated from the tool towards the base, so that no rotation to world axes and back is needed.
     """
     columns: list[Column] = [(ZERO, ZERO)] * tree.n
     carrier = tree.tool.body
@@ -42,7 +41,7 @@ def tool_columns(tree: KinematicTree, q: SX) -> list[Column]:
     for i in () if carrier == BASE else (carrier, *tree.ancestors(carrier)):
         body, (c, s) = tree.bodies[i], joints[i].turn
         w = scale(body.turn, pose.z)
-        # The tool's origin is the origin here: z x (0 - p) = p x z.
+        # Here the tool's origin is the reference point: z x (0 - p) = p x z.
         v = add(cross(pose.p, w), scale(body.slide, pose.z))
         columns[body.joint] = (v, w)
         x = subtract(scale(c, pose.x), scale(s, pose.y))
@@ -74,13 +73,13 @@ def jacobian_matrix(columns: Sequence[Column]) -> SX:
 
 
 def yoshikawa(columns: Sequence[Column]) -> SX:
-    """Yoshikawa's measure: the product of the Jacobian's singular values, of which there are min(6, n).
+    """Yoshikawa's measure: the product of the min(6, n) singular values of the Jacobian.
 
-    ``sqrt(det(J J'))`` for six joints or more, ``sqrt(det(J' J))`` for fewer (where the toolbox's formula is
-    zero). By Cauchy and Binet it is the root of the sum of all squared minors: no cancellation and no
-    division, so it is good to the last digits near a singularity. Beyond eight joints there are too many of
-    them, and ``det(J J')`` itself is formed. Source: Yoshikawa, *Manipulability of Robotic Mechanisms*, IJRR
-    1985.
+    It is ``sqrt(det(J J'))`` for six joints or more, and ``sqrt(det(J' J))`` for fewer, for which the
+    toolbox's formula is zero. By the Cauchy-Binet formula it is the square root of the sum of all squared
+    minors. This formula has no cancellation and no division, so it is accurate near a singularity. For more
+    than eight joints there are too many minors, and ``det(J J')`` is computed directly. Source: Yoshikawa,
+    *Manipulability of Robotic Mechanisms*, IJRR 1985.
     """
     entries = [list(v + w) for v, w in columns]
     n = len(entries)
@@ -96,7 +95,7 @@ def yoshikawa(columns: Sequence[Column]) -> SX:
 
 
 def _minors(rows: Sequence[Sequence[Scalar]]) -> list[SX]:
-    """All minors of full height: by Laplace's expansion row after row, every smaller minor formed once."""
+    """All minors of full height, by Laplace expansion row by row, with every smaller minor computed once."""
     width = len(rows[0])
     known: dict[tuple[int, ...], Scalar] = {(): 1.0}
     for height, row in enumerate(rows, start=1):

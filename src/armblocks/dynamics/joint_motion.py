@@ -14,9 +14,9 @@ from armblocks.spatial.vectors import Scalar, Turn, Vector, add, rotate
 
 @dataclass(frozen=True, eq=False)
 class JointMotion:
-    """A body's joint at one q: ``turn`` about z, and where the body's origin lies in the parent body.
+    """The motion of a body's joint at one q: the rotation ``turn`` about z, and ``p``.
 
-    ``p`` position of the body's origin in the parent body's frame, m.
+    ``p`` is the position of the body's origin in the parent body's frame, m.
     """
 
     body: Body
@@ -28,7 +28,7 @@ class JointMotion:
         return self.turn.rotate_back(self.to_joint(a))
 
     def to_joint(self, a: Vector) -> Vector:
-        """A vector of the parent body's axes in the axes of the joint, before it turns."""
+        """A vector of the parent body's axes in the axes of the joint before its rotation."""
         R = self.body.placement.rotation
         return rotate((_column(R, 0), _column(R, 1), _column(R, 2)), a)
 
@@ -48,7 +48,7 @@ def entries(x: SX | Sequence[Scalar]) -> list[Scalar]:
 
 
 def cos_sin(variable: Scalar, constant: float) -> Turn:
-    """cos and sin of ``variable + constant``; a constant of whole quarter turns costs nothing."""
+    """cos and sin of ``variable + constant``; a constant multiple of 90 degrees needs no operations."""
     quarters = round(constant / (math.pi / 2))
     if abs(constant - quarters * (math.pi / 2)) > 4 * math.ulp(max(abs(constant), math.pi / 2)):
         variable, quarters = variable + constant, 0

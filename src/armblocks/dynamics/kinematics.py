@@ -42,7 +42,7 @@ class Pose(NamedTuple):
 
 
 class _TurnedPose(NamedTuple):
-    """A pose kept as ``start Rz(variable + constant)``, so that joints with parallel axes add their angles
+    """A pose in the form ``start Rz(variable + constant)``. Joints with parallel axes then add their angles
     instead of multiplying their matrices.
     """
 
@@ -54,7 +54,7 @@ class _TurnedPose(NamedTuple):
 
 
 def constant_pose(T: Transform) -> Pose:
-    """The pose that a constant transform stands for."""
+    """The pose of a constant transform."""
     R = T.rotation
     x, y, z = ((R[0][j], R[1][j], R[2][j]) for j in range(3))
     return Pose(x, y, z, T.translation)

@@ -1,4 +1,4 @@
-"""Loads that are known at run time only: a wrench at the tip and a payload on the tool."""
+"""Loads whose values are known only at run time: a wrench at the tip and a payload on the tool."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def carrying(tree: KinematicTree, payload: SX) -> KinematicTree:
 
 
 def at_tip(tree: KinematicTree, wrench: SX) -> dict[int, Wrench]:
-    """The wrench of the last link's frame, on the body that carries it."""
+    """The wrench at the last link's frame, in the frame of the body that carries this link."""
     tip = tree.tip
     if tip.body == BASE:
         return {}

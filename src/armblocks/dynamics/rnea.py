@@ -22,8 +22,9 @@ NO_WRENCH = Wrench(ZERO, ZERO)
 
 
 class BodyMotion(NamedTuple):
-    """Of one body, in its own axes: angular velocity and acceleration, acceleration of its origin (rad/s,
-    rad/s2, m/s2), and ``U = [omega_dot]x + [omega]x [omega]x``, which maps a point to its extra acceleration.
+    """The motion of one body in its own axes: angular velocity and acceleration, acceleration of the origin
+    (rad/s, rad/s2, m/s2). ``U = [omega_dot]x + [omega]x [omega]x`` maps a point to its acceleration relative
+    to the origin.
     """
 
     omega: Vector
@@ -42,16 +43,16 @@ def rnea(
 ) -> list[Scalar]:
     """Joint torques of the rigid bodies (no motor, no friction), in the order of q.
 
-    ``gravity`` m/s2 in base axes; ``on_bodies`` wrenches that bodies exert on the surroundings, each in its
+    ``gravity``: m/s2 in base axes. ``on_bodies``: wrenches that bodies exert on the surroundings, each in its
     body's frame. Source: Luh, Walker, Paul 1980 in the form of Khalil and Dombre, *Modeling, Identification
-    and Control of Robots*, 9.5 (passes numbered so); classical vectors of link frames.
+    and Control of Robots*, 9.5 (with its numbers of the passes), with three-vectors in link frames.
     """
     bodies = tree.bodies
     motions: list[BodyMotion] = []
     wrenches: list[Wrench] = []
     ground = BodyMotion(ZERO, ZERO, scale(-1.0, gravity), _rotation_accelerations(ZERO, ZERO))
     for i, (body, joint) in enumerate(zip(bodies, joints)):
-        # 1. Outward: velocities and accelerations. Gravity is an upward acceleration of the base.
+        # 1. Outward: velocities and accelerations. Gravity is treated as an acceleration of the base.
         motion = _carried(ground if body.parent == BASE else motions[body.parent], joint, qd, qdd)
         motions.append(motion)
         # 2. The net wrench on each body.
@@ -82,7 +83,7 @@ def _carried(
     spin, spin_rate = body.turn * qd[j], body.turn * qdd[j]
     if body.slide:
         slip, slip_rate = body.slide * qd[j], body.slide * qdd[j]
-        # 2 w x (slip z) + slip_rate z, w before the joint's own spin, which is along z
+        # 2 w x (slip z) + slip_rate z; w without the joint's rotation, which is along z
         acceleration = (
             acceleration[0] + 2.0 * slip * w[1],
             acceleration[1] - 2.0 * slip * w[0],
@@ -105,11 +106,12 @@ def _rotation_accelerations(w: Vector, alpha: Vector) -> Matrix:
 
 
 def inertial_wrench(inertia: RigidInertia, motion: BodyMotion) -> Wrench:
-    """Newton and Euler about the body's origin: ``f = m a + U h``, ``n = I alpha + w x I w + h x a``."""
+    """Newton-Euler equations about the body's origin: ``f = m a + U h``, ``n = I alpha + w x I w + h x
+    a``."""
     w, alpha, a, U = motion
     m, h, S = inertia
     force = add(scale(m, a), rotate(U, h))
-    # I alpha + w x I w, gathered so that the products of U serve again.
+    # I alpha + w x I w, arranged so that the products in U are reused.
     gyroscopic = (
         S.xx * alpha[0]
         + (S.zz - S.yy) * (w[1] * w[2])
@@ -131,7 +133,7 @@ def inertial_wrench(inertia: RigidInertia, motion: BodyMotion) -> Wrench:
 
 
 def _added(parent: Wrench, child: Wrench, joint: JointMotion) -> Wrench:
-    """The parent's wrench plus that of its child, about the parent's origin."""
+    """The parent's wrench plus that of a child, about the parent's origin."""
     force = joint.to_parent(child.force)
     moment = add(joint.to_parent(child.moment), cross(joint.p, force))
     return Wrench(add(parent.force, force), add(parent.moment, moment))

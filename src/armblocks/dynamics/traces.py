@@ -173,7 +173,7 @@ def trace_friction(robot: Robot) -> TracedFunction:
 def trace_accel(robot: Robot) -> TracedFunction:
     """``qdd (n,)`` for given joint torques, with friction, gravity and rotor inertia.
 
-    Raises RobotError, naming the joint, where the inertia at a joint is zero.
+    Raises RobotError that names the joint if the inertia at a joint is zero.
     """
     tree = regrouped(KinematicTree.of(robot))
     check_accelerations_exist(tree)
@@ -189,7 +189,7 @@ def trace_accel(robot: Robot) -> TracedFunction:
 def trace_accel_loaded(robot: Robot) -> TracedFunction:
     """``qdd (n,)`` as ``accel``, with a wrench at the tip and a payload at the tool.
 
-    Raises RobotError, naming the joint, where a joint has nothing to accelerate, whatever the payload.
+    Raises RobotError that names the joint if the inertia at a joint is zero for every payload.
     """
     tree = regrouped(KinematicTree.of(robot))
     some_payload = SX([1.0, 0.1, 0.2, 0.3, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
@@ -206,7 +206,7 @@ def trace_accel_loaded(robot: Robot) -> TracedFunction:
 
 
 def trace_kinetic_energy(robot: Robot) -> TracedFunction:
-    """``energy ()``, J, of bodies and rotors."""
+    """``energy ()``, J, kinetic energy of bodies and rotors."""
     tree = regrouped(KinematicTree.of(robot))
 
     def equations(q: SX, qd: SX) -> SX:
@@ -216,7 +216,7 @@ def trace_kinetic_energy(robot: Robot) -> TracedFunction:
 
 
 def trace_potential_energy(robot: Robot) -> TracedFunction:
-    """``energy ()``, J, in the robot's gravity: zero with the centre of mass at the world's origin."""
+    """``energy ()``, J, potential energy: zero if the centre of mass is at the world's origin."""
     tree = KinematicTree.of(robot)
 
     def equations(q: SX) -> SX:
@@ -283,7 +283,7 @@ def _trace(
 
 
 def _inputs(robot: Robot, names: Sequence[str]) -> Signature:
-    """Slots of the named inputs; joint quantities have the joints' unit where all have the same."""
+    """Slots of the named inputs; joint quantities have a unit if it is the same for all joints."""
     units = set(robot.joint_units)
     unit = units.pop() if len(units) == 1 else ""
     force = {"rad": "N m", "m": "N"}.get(unit, "")
@@ -308,7 +308,7 @@ def _body_of_joint(tree: KinematicTree) -> list[int]:
 
 
 def _sum(*terms: Sequence[Scalar]) -> SX:
-    """A column of the sums, entry by entry."""
+    """A column of the elementwise sums."""
     return SX(vertcat(*(sum(entry, SX(0.0)) for entry in zip(*terms))))
 
 

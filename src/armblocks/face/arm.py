@@ -160,7 +160,7 @@ class Arm:
 
     @cached_property
     def manipulability(self) -> OfConfiguration:
-        """``manipulability(q)`` → one number, Yoshikawa's sqrt(det(J J')): 0 where the arm is singular."""
+        """``manipulability(q)`` → one number, Yoshikawa's sqrt(det(J J')): 0 at a singularity."""
         return self._entry("manipulability")
 
     # ---- dynamics ----------------------------------------------------------------------------------------
@@ -195,17 +195,18 @@ class Arm:
 
     @cached_property
     def friction(self) -> OfSpeed:
-        """``friction(qd)`` → (n,) N m or N: joint torques that friction takes, a part of ``rne``."""
+        """``friction(qd)`` → (n,) N m or N: joint torques that overcome friction, a part of ``rne``."""
         return self._entry("friction")
 
     @cached_property
     def kinetic_energy(self) -> OfState:
-        """``kinetic_energy(q, qd)`` → energy in J, that of the rotors of motors included."""
+        """``kinetic_energy(q, qd)`` → energy in J, including the rotors of the motors."""
         return self._entry("kinetic_energy")
 
     @cached_property
     def potential_energy(self) -> OfConfiguration:
-        """``potential_energy(q)`` → energy in J, zero where the centre of mass is level with the origin."""
+        """``potential_energy(q)`` → energy in J, zero if the centre of mass is at the height of the
+        origin."""
         return self._entry("potential_energy")
 
     @cached_property
@@ -234,7 +235,7 @@ class Arm:
         return kernel
 
     def _entry(self, method: str) -> Callable[..., Array]:
-        """The native function of a method; it is pickled as robot and method name."""
+        """The native function of a method; pickling stores the robot and the name of the method."""
         kernel = self._kernel(method)
         return kernel.entry_before(kernel.__call__, maker=(Arm, (self.robot,)))
 
@@ -263,7 +264,7 @@ class Arm:
             try:
                 return loaded()(*arguments, force, carried, out=out, threads=threads)
             except InputError:
-                check_count(method, plain.inputs, arguments)  # the message concerns positional arguments only
+                check_count(method, plain.inputs, arguments)  # the message is about positional arguments only
                 raise
 
         return plain.entry_before(general, maker=(Arm, (self.robot,)))
@@ -281,7 +282,7 @@ class Arm:
 
 
 def _traces() -> Mapping[str, Callable[[Robot], TracedFunction]]:
-    """All traced quantities; imported here, because a warm cache needs no tracing."""
+    """All traced quantities; imported here, because code from the disk cache needs no tracing."""
     from armblocks.dynamics import TRACES
 
     return TRACES

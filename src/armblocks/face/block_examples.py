@@ -138,7 +138,7 @@ class _Assembly:
             self._handles[name] = self._builder.add(name, block)
             for port, deeper in fitting_feeds(block, feed.inputs).items():
                 self._wires.append((deeper, PortRef(name, port)))
-            while self._wires:  # its drivers now, so that names are assigned in reading order
+            while self._wires:  # add its drivers now, so that names are assigned in reading order
                 deeper, target = self._wires.pop(0)
                 self._builder.connect(self._source(deeper), target)
         return name
@@ -193,7 +193,7 @@ def fitting_feeds(block: Block, stated: Mapping[str, Feed]) -> Mapping[str, Feed
 
 
 def _fitting_shapes(block: Block) -> Shapes:
-    """The first of some candidate shapes that the block accepts, for all inputs without declared shape."""
+    """The first candidate shape that the block accepts for all inputs without a declared shape."""
     shapes: Shapes = {}
     for open_shape in _OPEN_SHAPES:
         shapes = {port.name: open_shape if port.shape is None else port.shape for port in block.input_ports()}

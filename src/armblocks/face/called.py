@@ -1,4 +1,4 @@
-"""The Python functions that a run calls: from blocks to indices in a compiled system."""
+"""The Python functions that a run calls, with their indices in the compiled system."""
 
 from __future__ import annotations
 

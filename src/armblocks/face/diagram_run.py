@@ -124,7 +124,7 @@ class DiagramRun:
 
 
 def tuned_parameters(before: Diagram, after: Diagram) -> dict[str, Array] | None:
-    """The tunable parameters, ``block.parameter``, that differ; ``None`` where the equations differ too."""
+    """The tunable parameters, ``block.parameter``, that differ; ``None`` if the equations differ too."""
     flat = flat_diagram(before)
     blocks, others = flat.blocks, flat_diagram(after).blocks
     if list(blocks) != list(others):

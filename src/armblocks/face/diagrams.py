@@ -34,8 +34,8 @@ def save_diagram(diagram: Diagram, path: str | PathLike[str]) -> Path:
 def to_python(diagram: Diagram) -> str:
     """The Python program that builds a diagram, as ``diagram``, and runs it, as ``result``.
 
-    Layout, notes and description are omitted. Raises ``FormatError`` where a block has a
-    robot that is neither shipped nor from a file, or a Python function.
+    Layout, notes and description are omitted. Raises ``FormatError`` if a block has a Python function, or a
+    robot that is neither shipped nor from a file.
     """
     check_type(diagram, Diagram, "a Diagram", where="to_python")
     return formats.diagram_to_python(diagram)

@@ -17,7 +17,7 @@ _Array = NDArray[np.float64]
 
 
 class LimitWatch:
-    """Checks the joint signals of every run of a diagram; cheap if no limit is exceeded."""
+    """Checks the joint signals of every run of a diagram. The check is fast if no limit is exceeded."""
 
     def __init__(self, diagram: Diagram, result: SimulationResult) -> None:
         self._arms = [(arm, *_limits(arm)) for arm in moving_arms(diagram, result)]
@@ -53,7 +53,7 @@ def _beyond(values: _Array, low: _Array, high: _Array) -> bool:
 
 
 def _warn_of_angles(diagram: Diagram) -> None:
-    """Warn of parameters in rad that look like degrees."""
+    """Issue a warning for parameters in rad whose values look like degrees."""
     for name, block in flat_diagram(diagram).blocks.items():
         for rule in block.parameters():
             if rule.unit == "rad":

@@ -26,7 +26,7 @@ from armblocks.face.settings import RunSettings, check_settings, takes_settings
 from armblocks.simulation import RunState
 
 Where = float | RunState | OperatingPoint
-"""A time of a run from the diagram's start (s), where a run ended, or an operating point."""
+"""A time of a run from the diagram's start (s), the final state of a run, or an operating point."""
 
 
 @overload
@@ -78,17 +78,17 @@ def linearize(
     operating point, plus the perturbation of an input at the same port. So ``inputs="e", outputs="e",
     open="e"`` is the loop transfer function, signs included.
 
-    ``at``: a time of a run (0: the start), several times (one system each), where a run ended
-    (``result.final_state``) or the point that ``trim`` found. ``delay_order``: number of states of the Padé
+    ``at``: a time of a run (0: the start), several times (one system each), the final state of a run
+    (``result.final_state``) or the operating point of ``trim``. ``delay_order``: number of states of the Padé
     approximation of each dead time; required if there is dead time. (:func:`frequency_response` is exact.)
-    ``parameters`` other values of parameters, ``settings`` those of the run to ``at``, as in
+    ``parameters``: other values of parameters. ``settings``: settings of the run up to ``at``, as in
     :func:`simulate`.
 
     Modes (a limiter at its limit) are constant. A diagram with sample times gives a discrete system with the
     common period of all clocks and held inputs. Explicit time is constant.
 
-    Raises ``UnknownNameError`` and ``InputError`` for names, ``SimulationError`` where the run or a
-    derivative is not finite.
+    Raises ``UnknownNameError`` and ``InputError`` for invalid names, ``SimulationError`` if a signal of the
+    run or a derivative is not finite.
     """
     check_settings(settings, linearize)
     described = described_diagram(diagram, parameters)
@@ -170,7 +170,7 @@ class _Prepared:
         )
         system = with_mask_parameters(system, diagram, self.points.inputs.values())
         places, names = input_ends(system, self.points.inputs)
-        # The flat diagram with points has no ports of subsystems.
+        # The flat diagram with linearisation points has no ports of subsystems.
         aliases = flatten_hierarchy(diagram).aliases
         known = (name if name in system.aliases else str(aliases.get(name, name)) for name in outputs)
         rows, ends = output_ends(system, dict(zip(outputs, known)))
@@ -180,7 +180,7 @@ class _Prepared:
         self.system = system
 
     def at(self, known: OperatingPoint, delay_order: int | None) -> LinearSystem:
-        """The linear system about a point of the diagram without points."""
+        """The linear system about an operating point of the diagram without linearisation points."""
         return linearise(self.evaluated, self._placed(known), self.ends, known, delay_order=delay_order)
 
     def response(self, known: OperatingPoint, frequencies: NDArray[np.float64]) -> NDArray[np.complex128]:
@@ -207,7 +207,7 @@ def _units(system: HybridSystem, path: str) -> tuple[str, ...]:
 
 
 def operating_point_at(diagram: Diagram, at: Where, **settings: Unpack[RunSettings]) -> OperatingPoint:
-    """The operating point of a diagram at a time of a run, or where a run ended."""
+    """The operating point of a diagram at a time of a run, or at the final state of a run."""
     if isinstance(at, OperatingPoint):
         return at
     if isinstance(at, float | int):
@@ -239,7 +239,7 @@ def operating_points_at(
         run: RunSettings = {**settings, "stop_time": time}
         result = simulate(compiled, initial_state=state, **run)
         state = result.final_state
-        assert state is not None  # a run that fails raises
+        assert state is not None  # a failed run has raised an error
         found[time] = _of_state(evaluated, state)
     return [found[time] for time in times]
 

@@ -115,7 +115,7 @@ class CompiledDiagram:
 
 
 Start = RunState | OperatingPoint | str | PathLike[str]
-"""The start of a run: another run's state, the path of a saved one, or an operating point."""
+"""The start of a run: the state of another run, the path of a saved state, or an operating point."""
 
 _compiled: dict[int, CompiledDiagram] = {}
 
@@ -126,8 +126,8 @@ def compile_diagram(diagram: Diagram | str | PathLike[str]) -> CompiledDiagram:
         return CompiledDiagram(load_diagram(diagram))
     known = _compiled.get(id(diagram))
     if known is None:
-        # Cached by identity, because comparing by content would cost more than a run. The entry is dropped
-        # with the diagram, and therefore holds a copy of it.
+        # Cached by identity, because comparing by content would take longer than a run. The entry is removed
+        # with the diagram, and therefore refers to a copy of it.
         _compiled[id(diagram)] = known = CompiledDiagram(dataclasses.replace(diagram))
         weakref.finalize(diagram, _compiled.pop, id(diagram), None)
     return known
@@ -162,7 +162,7 @@ def simulate(
 ) -> SimulationResult:
     """Run a diagram and return its recorded signals.
 
-    ``diagram`` an object, a shipped example's name or a path. ``settings`` override those of the diagram by
+    ``diagram``: an object, a shipped example's name or a path. ``settings`` override those of the diagram by
     the names of :class:`SimulationOptions`: ``stop_time``, ``solver``, ``step``, ``sample_time``,
     ``max_step``, ``rtol``, ``atol``. ``parameters`` changes parameters of blocks, ``{"jtraj.tmax": 5.0}``;
     tunable ones need no new compilation. ``progress(time, fraction, real_time_factor)`` is called repeatedly
@@ -174,7 +174,7 @@ def simulate(
     all extremes.
 
     Raises InputError for a setting out of range, UnknownNameError for an unknown argument, SimulationError
-    (with the ``partial`` result) where the run fails.
+    (with the ``partial`` result) if the run fails.
     """
     check_settings(settings, simulate)
     model = diagram if isinstance(diagram, CompiledDiagram) else compile_diagram(diagram)
@@ -199,7 +199,7 @@ def begin(
 ) -> DiagramRun:
     """Create a run of a diagram that can be paused, inspected and tuned; ``advance`` starts it.
 
-    Arguments are those of :func:`simulate`, and so are the errors.
+    Arguments and errors are those of :func:`simulate`.
     """
     check_settings(settings, begin)
     model = diagram if isinstance(diagram, CompiledDiagram) else compile_diagram(diagram)

@@ -1,4 +1,4 @@
-"""Notebook views of descriptions: the functions that their classes name."""
+"""Notebook views of robots and diagrams, which their classes refer to by name."""
 
 from __future__ import annotations
 

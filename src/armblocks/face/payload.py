@@ -54,7 +54,7 @@ class Payload:
 
     @cached_property
     def numbers(self) -> NDArray[np.float64]:
-        """The ten numbers in the order that the compiled dynamics take, read-only."""
+        """The ten numbers in the order of the compiled dynamics' input, read-only."""
         numbers = np.array([self.mass, *self.centre, *self.inertia], dtype=np.float64)
         numbers.flags.writeable = False
         return numbers

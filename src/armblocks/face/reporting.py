@@ -25,11 +25,11 @@ def write_report(
 ) -> ReportFiles:
     """Write ``report.html``, the diagram, figures and data of a run into a folder, created if absent.
 
-    ``formats`` of the figures: svg, png. ``data``: csv, parquet, npz, mat. By default svg and csv, with png
-    where matplotlib is installed and parquet where pyarrow is. The files of To File blocks are written there
-    too. Returns the paths. Raises UnknownNameError for another format, MissingLibraryError for one whose
-    library is not installed, DiagramError where two blocks ask for one file, FormatError where the folder
-    cannot be written.
+    ``formats`` of the figures: svg, png. ``data``: csv, parquet, npz, mat. The default is svg and csv, also
+    png if matplotlib is installed and parquet if pyarrow is. The files of To File blocks are written there
+    too. Returns the paths. Raises UnknownNameError for another format, MissingLibraryError for a format whose
+    library is not installed, DiagramError if two blocks write the same file, FormatError if the folder cannot
+    be written.
     """
     from armblocks import report
 
@@ -42,8 +42,8 @@ def write_files(folder: str | PathLike[str], diagram: Diagram, result: Simulatio
     """Write the files of the To File blocks of a run into an existing folder.
 
     A run itself writes no files. Here and in ``write_report`` the caller gives the folder to which the paths
-    of the blocks are relative; paths outside it are errors. Returns the paths. Raises DiagramError where two
-    blocks ask for one file, FormatError where one cannot be written.
+    of the blocks are relative; paths outside it are errors. Returns the paths. Raises DiagramError if two
+    blocks write the same file, FormatError if a file cannot be written.
     """
     from armblocks.report.sink_files import write_files
 

@@ -49,7 +49,7 @@ def _cells(link: Link) -> list[str]:
 
 
 def _dh_cells(link: Link) -> list[str]:
-    """The D-H row, with q in the place of the joint variable; empty where the link has none."""
+    """The D-H row, with q as the joint variable; empty if the link has no row."""
     row = link.dh
     if row is None:
         return [""] * 4

@@ -20,7 +20,7 @@ def load_robot(
 ) -> Arm:
     """A shipped robot by name (``"kr180"``), or a robot from a file (``.json``, a toolbox script ``.m``).
 
-    ``name`` picks one of several robots in a script. ``friction_model``: the formula of another toolbox
+    ``name`` selects one of several robots in a script. ``friction_model``: the formula of another toolbox
     release, see :class:`FrictionModel`; by default that of the file. Raises UnknownNameError for a name that
     is not shipped, FormatError for a file that cannot be read.
     """

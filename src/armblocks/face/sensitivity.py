@@ -78,16 +78,16 @@ def sensitivity(
 
     Mask parameters are allowed; parameters that depend on them by formulas are included.
 
-    The traced equations are differentiated and integrated beside the equations themselves, natively, under
-    the same error control. The instants of events, of jumps at known times and of the arrival of delayed
-    jumps are differentiated too, as are implicit equations.
-    ``values``: other values of parameters; ``settings`` those of the run, as in :func:`simulate`.
+    The traced equations are differentiated. The derivatives are integrated together with the equations,
+    natively, with the same error control. The times of events, of jumps at known times and of the arrival of
+    delayed jumps are differentiated too, and so are implicit equations. ``values``: other values of
+    parameters. ``settings``: settings of the run, as in :func:`simulate`.
 
-    Raises ``UnknownNameError`` for names; ``InputError`` for a table that is read by index, for a parameter
-    whose integer part alone has an effect, for one that shifts an event at the start, and for implicit
-    equations together with delays or with a parameter that determines a jump time. Raises ``SimulationError``
-    like a run, and where coinciding events would be separated by a parameter change, because the derivative
-    does not exist then.
+    Raises ``UnknownNameError`` for unknown names. Raises ``InputError`` for a table that is read by index,
+    for a parameter of which only the integer part has an effect, for a parameter that shifts an event at the
+    start, and for implicit equations together with delays or with a parameter that determines a jump time.
+    Raises ``SimulationError`` like a run, and if a parameter change would separate coinciding events, because
+    the derivative does not exist then.
     """
     check_settings(settings, sensitivity)
     described = described_diagram(diagram, values)

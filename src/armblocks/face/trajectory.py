@@ -28,7 +28,7 @@ class JointTrajectory:
         return len(self.t)
 
     def __iter__(self) -> Iterator[NDArray[np.float64]]:
-        """``q``, ``qd``, ``qdd``, as the toolbox returns them: ``q, qd, qdd = jtraj(…)``."""
+        """``q``, ``qd``, ``qdd``, in the order of the toolbox: ``q, qd, qdd = jtraj(…)``."""
         return iter((self.q, self.qd, self.qdd))
 
     def _repr_html_(self) -> str:

@@ -93,7 +93,7 @@ def trim(
 
 
 def _slot_name(layout: Signature, name: str, kind: str, system: HybridSystem) -> str:
-    """The slot itself, or the only one of a block."""
+    """The name of a slot: the given name, or that of the only slot of the named block."""
     if name in layout.ranges:
         return name
     separator = "." if kind == "parameter" else "/"
@@ -104,7 +104,7 @@ def _slot_name(layout: Signature, name: str, kind: str, system: HybridSystem) ->
 
 
 def _places(layout: Signature, name: str, kind: str, system: HybridSystem) -> list[int]:
-    """Of a whole slot, or of one entry of it: ``table.values[3]``."""
+    """The indices of a whole slot, or of one entry of it: ``table.values[3]``."""
     head, bracket, _ = name.partition("[")
     if bracket and head in layout.ranges and name in layout[head].elements:
         return [layout.ranges[head].start + layout[head].elements.index(name)]
@@ -173,7 +173,7 @@ def _targets(system: HybridSystem, outputs: Values) -> tuple[list[int], list[flo
 def _bounds(
     system: HybridSystem, bounds: Mapping[str, tuple[float, float]]
 ) -> dict[str, tuple[float, float]]:
-    """By the name of every scalar."""
+    """The bounds by the name of every scalar."""
     found: dict[str, tuple[float, float]] = {}
     for name, (low, high) in bounds.items():
         place = _state_or_parameter(system, name)

@@ -1,7 +1,7 @@
 """Canonical JSON: the same bytes for the same content, and small differences for small changes.
 
-Keys sorted, two blanks per level, every member on a separate line, rows of numbers on one line, floats
-with the fewest digits that read back to the same bits, a newline at the end.
+Keys are sorted, every level is indented by two spaces, every member has a line, and rows of numbers are on
+one line. Floats have the fewest digits that read back to the same bits. The text ends with a newline.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ def canonical_bytes(
 ) -> bytes:
     """The canonical text of a document of dicts, lists, texts, numbers, booleans and ``None``.
 
-    ``one_line`` says of the path of an object or array whether it is kept on one line; ``deepest`` caps how
-    deep they lie in each other. Raises ``FormatError``
-    for numbers that are not finite, texts that are no Unicode, keys that are no texts, and foreign types.
+    ``one_line`` returns for the path of an object or array whether it is written on one line. ``deepest`` is
+    the maximum nesting. Raises ``FormatError`` for numbers that are not finite, texts that are not valid
+    Unicode, keys that are not texts, and unsupported types.
     """
     pieces: list[str] = []
     _check_depth(value, deepest)
@@ -121,7 +121,7 @@ def _scalar(value: object, path: KeyPath) -> str:
                     allowed="finite numbers",
                     fix="replace it by a finite number",
                 )
-            # 10.0 as 10, which is how JavaScript writes it; the sign of -0.0 would be lost so.
+            # 10.0 is written as 10, as in JavaScript, but not -0.0, whose sign would be lost.
             whole = (
                 value.is_integer() and abs(value) < 1e15 and math.copysign(1.0, value) * (value or 1.0) > 0
             )

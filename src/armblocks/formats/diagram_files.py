@@ -50,9 +50,9 @@ def load_diagram(
     """A shipped diagram by its name, ``"kr180model"``, or a diagram file by its path.
 
     A text with a path separator or the suffix ``.json`` is a path, any other text a name. Raises
-    ``UnknownNameError`` for a name that is not shipped, else as :func:`read_diagram`. With ``trust`` the
-    files of Python functions that the diagram names are run; without it, such a diagram is an error. With
-    ``draft`` the diagram is not checked or traced, which is sufficient for drawing.
+    ``UnknownNameError`` for a name that is not shipped, and the errors of :func:`read_diagram`. With
+    ``trust`` the files of the diagram's Python functions are run; without it, such a diagram is an error.
+    With ``draft`` the diagram is not checked or traced, which is sufficient for drawing.
     """
     check_type(
         name_or_path,
@@ -96,9 +96,9 @@ def write_diagram(
 ) -> Path:
     """Write the canonical file of a diagram atomically, and return its path.
 
-    Reading it gives an equal diagram. Robots are written as references, the whole robot only where it is
-    neither shipped nor from a file. Raises ``FormatError`` where the folder cannot be written or a value has
-    no place in JSON.
+    Reading the file gives an equal diagram. Robots are written as references; a robot that is neither shipped
+    nor from a file is written completely. Raises ``FormatError`` if the folder cannot be written or JSON
+    cannot represent a value.
     """
     target = Path(fspath(path))
     write_atomically(target, diagram_to_bytes(diagram, resolve_robot, folder=target.parent))
@@ -114,7 +114,7 @@ def load_library(
 ) -> Mapping[str, Diagram]:
     """The diagrams of a library by name, each linked to it: a shipped library's name, or a path.
 
-    Raises as :func:`read_diagram`.
+    Raises the errors of :func:`read_diagram`.
     """
     path = Path(name_or_path) if isinstance(name_or_path, PathLike) else library_path(name_or_path, None)
     return read_library(path.resolve(), library, resolve_robot, trust=trust)

@@ -20,16 +20,16 @@ A diagram may declare parameters, its ``mask``; a block's ``formulas`` of them a
 their values are not written. The values of mask parameters are among the parameters of the subsystem block,
 for the outermost diagram under ``parameters`` of the document.
 
-A block that is linked to an entry of a library has ``library`` in the place of ``diagram``: see
+A block that is linked to an entry of a library has ``library`` instead of ``diagram``: see
 :mod:`armblocks.formats.subsystem_libraries`.
 
 A subsystem block has its inner diagram under ``diagram``, with the same keys, except ``format`` and
 ``robots``, which occur once, and without empty settings and layout.
 
-Unknown keys (of another program, or a newer armblocks) are kept in ``Diagram.extras`` and written again. A
+Unknown keys (of another program, or a newer armblocks) are stored in ``Diagram.extras`` and written again. A
 key similar to a known one, and an unknown parameter, are errors. Infinite parameters are the texts ``"inf"``
-and ``"-inf"``; NaN has no place in a file. References to robots: see
-:mod:`armblocks.formats.robot_references`. The JSON Schema is ``formats/schema/diagram.schema.json``.
+and ``"-inf"``; NaN is an error. References to robots: see :mod:`armblocks.formats.robot_references`. The JSON
+Schema is ``formats/schema/diagram.schema.json``.
 """
 
 from __future__ import annotations
@@ -110,14 +110,15 @@ def diagram_from_bytes(
 ) -> Diagram:
     """The checked diagram of a document; ``library`` holds the block types that it may use.
 
-    ``name`` is what messages call the file; a robot's path is relative to ``folder``, and ``resolve_robot``
-    turns a shipped name or a path into a robot. Python functions that the diagram names are only loaded,
-    which runs their file, with ``trust``. With ``draft`` the diagram may be one that cannot run yet: open
-    inputs, shapes that do not fit. ``read_library`` opens the libraries that blocks are linked to.
+    ``name`` is the name of the file in messages. The path of a robot is relative to ``folder``, and
+    ``resolve_robot`` returns the robot of a shipped name or a path. The diagram's Python functions are
+    loaded, which runs their files, only with ``trust``. With ``draft`` the diagram need not be able to run:
+    inputs may be unconnected and shapes may not fit. ``read_library`` opens the libraries that blocks are
+    linked to.
 
-    Raises ``FormatError`` for what the format forbids, ``UnknownNameError`` for unknown types, parameters,
+    Raises ``FormatError`` for violations of the format, ``UnknownNameError`` for unknown types, parameters,
     blocks, ports and robots, and ``DiagramError`` for a diagram that cannot be built. All name the file, and
-    the line where the fault has one.
+    the line if known.
     """
     root = read_document(data, name, MOST_BYTES, DEEPEST)
     members, _ = split_members(root, _DOCUMENT_KEYS)
@@ -131,8 +132,8 @@ def diagram_from_bytes(
 def diagram_to_bytes(diagram: Diagram, resolve_robot: ResolveRobot, *, folder: Path | None = None) -> bytes:
     """The canonical document of a diagram. Reading it gives an equal diagram.
 
-    A robot is written as the shortest reference that gives an equal one, its path relative to ``folder``.
-    Raises ``FormatError`` where a value has no place in JSON.
+    A robot is written as the shortest reference that gives an equal robot; paths are relative to ``folder``.
+    Raises ``FormatError`` if JSON cannot represent a value.
     """
     writer = _Writer(RobotWriter(folder, resolve_robot), folder)
     document = {"format": FORMAT_VERSION, **writer.diagram(diagram)}
@@ -150,7 +151,7 @@ def read_library(
     *,
     trust: bool = False,
 ) -> Mapping[str, Diagram]:
-    """All diagrams of a library file, each linked to it; raises as :func:`diagram_from_bytes`."""
+    """All diagrams of a library file, each linked to it. Raises the errors of :func:`diagram_from_bytes`."""
     return Libraries(None, _entry_reader(library, resolve_robot, trust=trust)).entries(path)
 
 
@@ -176,7 +177,7 @@ class _Writer:
         self.folder = folder
 
     def diagram(self, diagram: Diagram) -> dict[str, object]:
-        """A diagram, and those inside it."""
+        """A diagram with all diagrams inside it."""
         extras = cast("Mapping[str, Mapping[str, object]]", diagram.extras)
         block_extras, layout_extras = extras.get("blocks", {}), extras.get("layout", {})
         layout = dict(layout_extras)
@@ -234,7 +235,7 @@ class _Writer:
         return {"type": block.type_name(), "parameters": plain, **stated, **inside}
 
     def values(self, diagram: Diagram) -> dict[str, object]:
-        """What the parameters of the outermost diagram's own mask are."""
+        """The values of the mask parameters of the outermost diagram."""
         return {rule.name: self._value(rule, diagram.mask_values[rule.name]) for rule in diagram.mask}
 
     def inside(self, diagram: Diagram) -> dict[str, object]:
@@ -285,7 +286,7 @@ def _with_texts_for_infinities(value: object) -> object:
 
 @contextmanager
 def _located(node: Node) -> Generator[None]:
-    """Give the errors of what a node describes the node's file and line; kinds and texts stay."""
+    """Add the file and line of a node to errors that are raised inside the ``with`` block."""
     try:
         yield
     except AlgebraicLoopError as error:
@@ -305,7 +306,7 @@ def _located(node: Node) -> Generator[None]:
 
 
 def _joined(node: Node, error: ArmblocksError) -> str:
-    if error.where.startswith(node.where):  # said by a node inside
+    if error.where.startswith(node.where):  # an inner node has added its position
         return error.where
     return f"{node.where}: {error.where}" if error.where else node.where
 
@@ -322,13 +323,13 @@ class _Reader:
         self.draft = draft
 
     def diagram(self, node: Node, known: tuple[str, ...], name: str) -> Diagram:
-        """The diagram of an object, checked unless it is a draft; ``name`` where it says none."""
+        """The diagram of an object, checked unless it is a draft; ``name`` is used if the object has none."""
         extras: Extras = {}
         members = _split(node, known, extras, "")
         settings = _settings(members["settings"], extras) if "settings" in members else SimulationOptions()
         block_nodes = members["blocks"].members() if "blocks" in members else {}
         with _located(node):
-            check_block_count(len(block_nodes), "")  # before time is spent on reading them
+            check_block_count(len(block_nodes), "")  # checked first, because reading many blocks takes long
         blocks = {key: self._block(key, entry, extras) for key, entry in block_nodes.items()}
         layout = _Layout()
         for key, entry in (members["layout"].members() if "layout" in members else {}).items():
@@ -416,7 +417,7 @@ class _Reader:
         return _parameter(rule, node, self.robots)
 
     def _declare(self, builder: DiagramBuilder, mask: Sequence[Node], given: Mapping[str, Node]) -> None:
-        """The parameters of a diagram, and what they are of the outermost one."""
+        """The declared parameters of a diagram, and for the outermost diagram their values."""
         rules: list[Parameter] = []
         for node in mask:
             with _located(node):
@@ -432,7 +433,7 @@ class _Reader:
 
 
 def _entry_reader(library: BlockLibrary, resolve_robot: ResolveRobot, *, trust: bool) -> ReadEntry:
-    """Makes diagrams of the entries of libraries as of any document."""
+    """Builds the diagrams of library entries, as for any document."""
 
     def read(root: Node, entry: Node, name: str, folder: Path, libraries: Libraries) -> Diagram:
         members, _ = split_members(root, _LIBRARY_KEYS)
@@ -444,7 +445,7 @@ def _entry_reader(library: BlockLibrary, resolve_robot: ResolveRobot, *, trust: 
 
 
 def _split(node: Node, known: tuple[str, ...], extras: Extras, place: str, key: str = "") -> dict[str, Node]:
-    """The known members; the others go to ``extras[place]``, under ``key`` where there is one."""
+    """The known members; the others are stored in ``extras[place]``, under ``key`` if it is given."""
     members, unknown = split_members(node, known)
     if unknown:
         extras.setdefault(place, {}).update({key: unknown} if key else unknown)
@@ -478,7 +479,7 @@ def _settings(node: Node, extras: Extras) -> SimulationOptions:
 
 
 def _parameter(rule: Parameter, node: Node, robots: RobotReader) -> object:
-    """The checked value of one parameter, so that what is wrong is said at its own line."""
+    """The checked value of one parameter; errors have its line."""
     if rule.kind is ParameterKind.ROBOT:
         return robots.robot(node)
     if rule.kind is ParameterKind.FUNCTION:
@@ -516,7 +517,7 @@ def _members_if_any(node: Node) -> Mapping[str, Node]:
 
 
 class _Layout:
-    """What an object's layout says of blocks, wires and notes."""
+    """The layout of an object: positions of blocks, routes of wires, and notes."""
 
     def __init__(self) -> None:
         self.places: dict[str, Placement] = {}
@@ -524,7 +525,8 @@ class _Layout:
         self.notes: dict[str, Note] = {}
 
     def read(self, key: str, node: Node, blocks: set[str], extras: Extras) -> None:
-        """Take in one entry. What is no block, wire or note belongs to another program and is kept."""
+        """Add one entry. An entry that is not a block, wire or note belongs to another program and is
+        preserved."""
         stated = _members_if_any(node)
         if key in blocks:
             self.places[key] = _placement(key, node, extras)

@@ -51,8 +51,8 @@ _WITHOUT_FRICTION = {
 def diagram_to_python(diagram: Diagram) -> str:
     """Lines that build the diagram as ``diagram`` and run it as ``result``.
 
-    Robots must be shipped ones, or those of a file. Raises ``FormatError`` for another robot. Layout,
-    description and unknown keys of a file are not written.
+    Robots must be shipped or from a file. Raises ``FormatError`` for another robot. Layout, description and
+    unknown keys of a file are not written.
     """
     diagrams = list(_own_diagrams(diagram))
     blocks = [block for level in diagrams for block in level.blocks.values()]
@@ -68,14 +68,14 @@ def diagram_to_python(diagram: Diagram) -> str:
 
 
 class _Listing:
-    """Writes diagrams, those inside blocks before the blocks; every name means one thing."""
+    """Writes diagrams, inner diagrams before their blocks. Every name in the program is unique."""
 
     def __init__(self, robots: Mapping[Robot, str]) -> None:
         self._robots = robots
         self._taken = {*_PACKAGE_NAMES, *robots.values()}
 
     def lines(self, diagram: Diagram, builder: str, *, inside: bool = False) -> list[str]:
-        """The lines that fill a builder of this name."""
+        """The lines that add the blocks and connections to a builder of this name."""
         order = _reading_order(diagram)
         names = _identifiers({name: name for name in order}, self._taken)
         self._taken |= set(names.values())
@@ -101,7 +101,8 @@ class _Listing:
         return [*before, *written]
 
     def _construction(self, block: Block, name: str, before: list[str]) -> str:
-        """What makes a block; the lines that build a diagram inside it go ``before``."""
+        """The expression that creates a block; lines that build its inner diagram are appended to
+        ``before``."""
         formulas = dict(block.formulas)
 
         def written(rule: Parameter) -> str:
@@ -151,19 +152,19 @@ class _Listing:
 
 
 def _needed(rule: Parameter) -> dict[str, Any]:
-    """What has to be said for the kind to be what it is."""
+    """The fields of a declared parameter that its kind requires: the choices of a choice."""
     return {"choices": rule.choices} if rule.choices else {}
 
 
 def _is_stated(block: Block, rule: Parameter) -> bool:
-    """Whether a parameter has to be written: it has a formula, or is not at its default."""
+    """Whether a parameter must be written: it has a formula, or differs from its default."""
     if rule.required or rule.name in dict(block.formulas):
         return True
     return rule.check(rule.default, "") != block.parameter_value(rule.name)
 
 
 def _is_whole_link(block: Block) -> bool:
-    """Whether a block is what a library has: a plain subsystem that is linked."""
+    """Whether a block can be loaded from a library: a plain, linked subsystem."""
     return isinstance(block, Subsystem) and bool(block.diagram.link)
 
 
@@ -173,7 +174,7 @@ def _library_block(link: str) -> str:
 
 
 def _own_diagrams(diagram: Diagram) -> Iterator[Diagram]:
-    """A diagram and those inside its blocks, libraries' left out."""
+    """A diagram and the diagrams inside its blocks, without those of libraries."""
     yield diagram
     for block in diagram.blocks.values():
         if isinstance(block, DiagramBlock) and not block.diagram.link:
@@ -181,7 +182,7 @@ def _own_diagrams(diagram: Diagram) -> Iterator[Diagram]:
 
 
 def _reading_order(diagram: Diagram) -> list[str]:
-    """Sources first: depth first from the inputs, loops broken where they are met."""
+    """The blocks sorted with sources first, by a depth-first search that breaks loops."""
     order: dict[str, None] = {}
     begun: set[str] = set()
     inputs = {name: [port.name for port in block.input_ports()] for name, block in diagram.blocks.items()}
@@ -205,13 +206,14 @@ def _reading_order(diagram: Diagram) -> list[str]:
 
 
 def _late(diagram: Diagram, order: list[str]) -> list[Connection]:
-    """The wires that lead to a block that stands before their source."""
+    """The connections to a block that precedes their source."""
     place = {name: number for number, name in enumerate(order)}
     return [wire for wire in diagram.connections if place[wire.source.block] >= place[wire.target.block]]
 
 
 def _sources(diagram: Diagram, name: str, added: set[str], names: Mapping[str, str]) -> list[str]:
-    """What feeds the block, as arguments: in order as long as that tells the port, then by port name."""
+    """The sources of a block's inputs as arguments: positional as long as the order is that of the ports,
+    then by port name."""
     arguments: list[str] = []
     in_order = True
     for port in diagram.blocks[name].input_ports():
@@ -230,7 +232,7 @@ def _end(diagram: Diagram, source: PortRef, names: Mapping[str, str]) -> str:
 
 
 def _robots(diagrams: Iterable[Diagram]) -> dict[Robot, tuple[str, str]]:
-    """A name for every robot that a block has, and the expression that gives it."""
+    """A name for every robot of the blocks, and the expression that loads it."""
     found: dict[Robot, tuple[str, str]] = {}
     for name, block in ((name, block) for diagram in diagrams for name, block in diagram.blocks.items()):
         for rule in block.own_parameters():
@@ -241,7 +243,7 @@ def _robots(diagrams: Iterable[Diagram]) -> dict[Robot, tuple[str, str]]:
 
 
 def _loading(robot: Robot, where: str) -> tuple[str, str]:
-    """The name of a shipped robot or of a robot's file, and the expression that gives the robot."""
+    """The name of a shipped robot or of a robot's file, and the expression that loads the robot."""
     entry = shortest_reference(robot, None, load_robot)
     stated: Mapping[str, object] = {"robot": entry} if isinstance(entry, str) else entry
     if "robot" not in stated:
@@ -258,7 +260,7 @@ def _loading(robot: Robot, where: str) -> tuple[str, str]:
 
 
 def _identifiers(names: Mapping[_Named, str], others: Iterable[str]) -> dict[_Named, str]:
-    """A Python name for each block or robot, near to its own and unlike the ``others``."""
+    """A unique Python name for each block or robot, similar to its name and different from the ``others``."""
     taken = set(others)
     found: dict[_Named, str] = {}
     for key, name in names.items():
@@ -297,7 +299,7 @@ def _nested(table: TimeTable) -> tuple[object, ...]:
 
 
 def _text(text: str) -> str:
-    """A string as people quote it."""
+    """A string literal in double quotes if possible."""
     return f'"{text}"' if text.isprintable() and not set(text) & {'"', "\\"} else repr(text)
 
 

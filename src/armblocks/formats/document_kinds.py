@@ -13,7 +13,7 @@ from armblocks.formats.shipped import list_examples, list_libraries, list_robots
 
 
 class DocumentKind(Enum):
-    """What a file describes."""
+    """The kind of a file's content."""
 
     ROBOT = "robot"
     DIAGRAM = "diagram"
@@ -21,7 +21,7 @@ class DocumentKind(Enum):
 
 
 def kind_of_document(name_or_path: str) -> DocumentKind:
-    """What something shipped, or a file, holds; files that are no JSON are robots.
+    """The kind of a shipped item or of a file; files other than JSON are robots.
 
     Raises ``UnknownNameError`` for a name that is not shipped, ``FormatError`` for a file that cannot be
     read.
@@ -39,9 +39,9 @@ def kind_of_document(name_or_path: str) -> DocumentKind:
 
 
 def kind_of_data(data: bytes, name: str) -> DocumentKind:
-    """What the bytes of a file hold, by the members of a document, whatever is wrong elsewhere in it.
+    """The kind of a file's bytes, from the members of the document; other errors in it are ignored.
 
-    Raises ``FormatError`` where a file that is named as JSON is none.
+    Raises ``FormatError`` if a file with the suffix of JSON is not JSON.
     """
     if not name.lower().endswith(".json"):
         return DocumentKind.ROBOT

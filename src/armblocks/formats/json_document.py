@@ -17,9 +17,9 @@ from typing import cast
 from armblocks.errors import FormatError
 
 DEEPEST = 64
-"""Objects and arrays inside each other, where a format says nothing else."""
+"""Default maximum nesting of objects and arrays."""
 LONGEST_INTEGER = 18
-"""Digits of an integer: they fit into 64 bits."""
+"""Maximum number of digits of an integer, so that it fits into 64 bits."""
 
 KeyPath = tuple[str | int, ...]
 
@@ -40,7 +40,7 @@ class Document:
 
 @dataclass(frozen=True)
 class Node:
-    """One value of a document and its place in it. All readers raise ``FormatError`` with file and line."""
+    """One value of a document and its path in it. All readers raise ``FormatError`` with file and line."""
 
     document: Document
     path: KeyPath
@@ -52,7 +52,7 @@ class Node:
         return self.document.where(self.path)
 
     def error(self, what: str, *, allowed: str = "", fix: str = "") -> FormatError:
-        """The refusal of this value, to be raised by the caller."""
+        """The error for this value, which the caller raises."""
         return FormatError(what, where=self.where, allowed=allowed, fix=fix)
 
     def members(self) -> dict[str, Node]:
@@ -78,7 +78,7 @@ class Node:
         return self.value
 
     def number(self) -> float:
-        """A number; it is finite, as the reader lets no other through."""
+        """A number, which is finite because the reader rejects other numbers."""
         if isinstance(self.value, bool) or not isinstance(self.value, int | float):
             raise self._wrong("a number")
         return float(self.value)
@@ -97,7 +97,7 @@ class Node:
         return tuple(element.number() for element in elements)
 
     def choice(self, choices: Iterable[str]) -> str:
-        """One of some texts."""
+        """A text out of a list of allowed texts."""
         word, known = self.text(), list(choices)
         if word not in known:
             raise self.error(
@@ -110,11 +110,11 @@ class Node:
 
 
 def read_document(data: bytes, name: str, most_bytes: int, deepest: int = DEEPEST) -> Node:
-    """The root of a JSON document. ``name`` is what messages call the file.
+    """The root of a JSON document. ``name`` is the name of the file in messages.
 
-    ``most_bytes`` and ``deepest`` cap its size and how deep objects and arrays lie in each other.
+    ``most_bytes`` and ``deepest`` limit its size and the nesting of objects and arrays.
 
-    Raises ``FormatError`` for anything that is not strict JSON, and for what passes the caps.
+    Raises ``FormatError`` for a text that is not strict JSON or exceeds the limits.
     """
     if len(data) > most_bytes:
         raise FormatError(
@@ -285,7 +285,7 @@ def _check_depth(document: Document, deepest: int) -> None:
 
 
 def _check_text(root: Node) -> None:
-    """Refuse halves of surrogate pairs, which ``"\\ud800"`` makes and no file can hold."""
+    """Reject halves of surrogate pairs, which ``"\\ud800"`` creates and a file cannot contain."""
     waiting = [root]
     while waiting:
         node = waiting.pop()
@@ -304,13 +304,13 @@ def _check_text(root: Node) -> None:
 
 
 def _line_with(text: str, needle: str) -> int:
-    """The line of the last occurrence of a needle (of a duplicate key this is the second one, mostly)."""
+    """The line of the last occurrence of a text; for a duplicate key this is usually the second key."""
     return text.count("\n", 0, max(text.rfind(needle), 0)) + 1
 
 
 @dataclass
 class _Level:
-    """One open object or array on the way; ``step`` is the key or index of its value at hand."""
+    """An open object or array during the search; ``step`` is the key or index of its present value."""
 
     bracket: str
     step: str | int | None

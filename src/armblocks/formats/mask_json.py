@@ -16,20 +16,20 @@ _BOUNDS = ("minimum", "above", "maximum")
 _SAID = (*_TEXTS, *_BOUNDS, "choices", "dimensions")
 _KEYS = ("name", "kind", "default", *_SAID)
 _PLAIN = Parameter(name="", kind=ParameterKind.NUMBER, doc="", default=0.0)
-"""A parameter that says no more than it has to."""
+"""A parameter with only the required fields; the others have their defaults."""
 
 WriteValue = Callable[[Parameter, object], object]
 ReadValue = Callable[[Parameter, Node], object]
 
 
 def mask_parameter_to(rule: Parameter, write: WriteValue) -> dict[str, object]:
-    """A parameter as plain values; what it does not say is left out."""
+    """A parameter as plain values, without fields that have their defaults."""
     said = {key: value for key in _SAID if (value := getattr(rule, key)) != getattr(_PLAIN, key)}
     return {"name": rule.name, "kind": rule.kind.value, "default": write(rule, rule.default), **said}
 
 
 def mask_parameter_from(node: Node, read: ReadValue) -> Parameter:
-    """The parameter that an object declares. Raises ``FormatError`` and ``InputError``."""
+    """The parameter declared by an object. Raises ``FormatError`` and ``InputError``."""
     members = closed_members(node, _KEYS, required=("name", "kind", "default"))
     kind = ParameterKind(members["kind"].choice([kind.value for kind in ParameterKind]))
     rules: dict[str, Any] = {"kind": kind, "doc": ""}

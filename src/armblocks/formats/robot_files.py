@@ -1,4 +1,4 @@
-"""Robots by name or path: the formats, the shipped robots, and what loading a user's file adds."""
+"""Robots by name or path: file formats, shipped robots, and the checks for files of users."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ def load_robot(
 ) -> Robot:
     """A shipped robot by its name, ``"kr180"``, or a robot file by its path.
 
-    What holds a path separator or ends in the suffix of a robot format is a path, everything else a name.
-    ``name`` picks one of several robots of a script, by the script's variable or by the robot's own name.
+    A text with a path separator or with the suffix of a robot format is a path, any other text is a name.
+    ``name`` selects one of several robots of a script, by the script's variable or by the robot's name.
     ``friction_model`` replaces that of the file; scripts have none and get that of releases 9.5 to 10. The
     robot's ``source`` is the shipped name or the path.
 
-    Raises ``UnknownNameError`` for a name that is not shipped and for a ``name`` that the file does not hold,
-    ``FormatError`` for a file that is missing, of no known format or not understood. Warns
-    (``InertiaWarning``) of inertias in a user's file that no body can have, and of numbers that look like
-    another unit or sign; those of the shipped robots are told by ``armblocks show``.
+    Raises ``UnknownNameError`` for a name that is not shipped and for a ``name`` that is not in the file,
+    ``FormatError`` for a file that is missing, has no known format or cannot be read. Issues warnings for
+    physically impossible inertias (``InertiaWarning``) and for numbers with a probably wrong unit or sign in
+    a file of the user. For shipped robots, ``armblocks show`` prints them.
     """
     check_type(
         name_or_path,
@@ -62,7 +62,7 @@ def shipped_robot(name: str) -> Robot:
 
 
 def is_path(name_or_path: str) -> bool:
-    """Whether a path is meant, and not the name of something shipped."""
+    """Whether a text is a path and not the name of a shipped item."""
     return "/" in name_or_path or "\\" in name_or_path or name_or_path.lower().endswith(ROBOT_SUFFIXES)
 
 
@@ -79,10 +79,9 @@ def _read_file(path: Path) -> Mapping[str, Robot]:
 
 
 def read_robots(data: bytes, name: str) -> Mapping[str, Robot]:
-    """The robots of a file's bytes, by the names that the file gives them; the suffix of ``name`` says the
-    format.
+    """The robots of a file's bytes, by their names in the file.
 
-    ``name`` is what messages call the file. Raises ``FormatError``.
+    ``name`` is the name of the file in messages; its suffix determines the format. Raises ``FormatError``.
     """
     format = _format(name)
     if len(data) > format.most_bytes:
@@ -109,7 +108,7 @@ def _format(name: str) -> RobotFormat:
 
 
 def _pick(robots: Mapping[str, Robot], where: str, name: str | None) -> Robot:
-    """The robot that is meant among those of one file."""
+    """The selected robot of a file."""
     if not robots:
         raise FormatError(
             "the file defines no robot",

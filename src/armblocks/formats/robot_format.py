@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 class RobotFormat:
     """One file format of robots.
 
-    ``suffixes`` in lower case with the dot; ``most_bytes`` the largest file that is read; ``read`` gets a
-    file's bytes and the name under which messages speak of it, and returns its robots by the names that the
-    file gives them. It raises ``FormatError``.
+    ``suffixes``: in lower case with the dot. ``most_bytes``: the maximum size of a file. ``read``: a function
+    of a file's bytes and its name for messages, which returns the robots by their names in the file and
+    raises ``FormatError``.
     """
 
     name: str

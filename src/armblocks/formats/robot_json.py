@@ -2,8 +2,8 @@
 
 Angles may be written ``"90 deg"`` and angular speeds ``"105 deg/s"``; they are written in degrees if these
 have few digits and read back exactly. A link with a ``dh`` row takes its joint and transforms from it.
-Unknown keys are errors with the nearest known key, because an ignored typing error would give a wrong robot.
-``notes`` is a comment and not preserved.
+Unknown keys are errors that suggest the nearest known key, because ignoring a misspelt key would give a wrong
+robot. ``notes`` is a comment and not preserved.
 
 The JSON Schema is ``formats/schema/robot.schema.json``.
 """
@@ -101,7 +101,7 @@ def write_robot(robot: Robot) -> bytes:
 
 
 def robot_to(robot: Robot) -> dict[str, object]:
-    """The JSON object that describes a robot; what is empty or identity is left out."""
+    """The JSON object that describes a robot, without empty members and identity transforms."""
     document: dict[str, object] = {
         "format": FORMAT_VERSION,
         "name": robot.name,
@@ -312,7 +312,7 @@ def _link_to(link: Link) -> dict[str, object]:
 
 
 def _without_signed_zeros(value: object) -> object:
-    """The same with 0.0 for -0.0: equal robots have equal files."""
+    """The value with 0.0 instead of -0.0, so that equal robots have equal files."""
     match value:
         case float():
             return value + 0.0
@@ -356,7 +356,7 @@ def _transform_to(transform: Transform) -> dict[str, object]:
 
 
 def _angle_to(angle: float, unit: str = "deg") -> float | str:
-    """Degrees in words where they have few digits and lose nothing, else rad."""
+    """An angle as text in degrees if these have few digits and read back exactly, else in rad."""
     degrees = round(math.degrees(angle), 6)
     text = f"{degrees:.6f}".rstrip("0").rstrip(".")
     if angle == 0 or len(text) > 8 or math.radians(float(text)) != angle:

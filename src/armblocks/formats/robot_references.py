@@ -1,20 +1,20 @@
 """References of a diagram file to robots, tables of values and Python functions.
 
-A block's parameter names a robot: ``"kr180"`` a shipped one; ``"arms/mine.m"`` a robot file, relative to the
-diagram's folder; or a robot of the diagram's own table ``robots``, so that what several blocks share is said
-once::
+A block's parameter refers to a robot: ``"kr180"`` is a shipped robot, ``"arms/mine.m"`` a robot file,
+relative to the diagram's folder. It may also be a key of the diagram's table ``robots``, so that a robot of
+several blocks is written once::
 
     "robots": {
       "arm": {"robot": "puma560", "friction": "none"},
       "Pendulum": {"format": 1, "name": "Pendulum", "links": […]}
     }
 
-An entry is a whole robot document, or a variant: ``robot`` a shipped name or a path; ``friction`` ``"none"``,
-``"viscous"`` (only viscous friction is kept) or ``"coulomb"`` (only Coulomb friction is kept);
-``friction_model`` the name of the formula.
+An entry is a whole robot document, or a variant. In a variant, ``robot`` is a shipped name or a path,
+``friction`` is ``"none"``, ``"viscous"`` (without Coulomb friction) or ``"coulomb"`` (without viscous
+friction), and ``friction_model`` is the name of the formula.
 
-A table of values at instants is the path of its file, relative to the diagram's folder, or its rows.
-A Python function is ``file.py:name``, and is loaded for those who trust the diagram only.
+A table of values over time is the path of its file, relative to the diagram's folder, or its rows. A Python
+function is ``file.py:name``; it is loaded only if the user trusts the diagram.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ from armblocks.formats.table_files import load_table
 from armblocks.robot import FrictionModel, Robot
 
 ResolveRobot = Callable[[str], Robot]
-"""From a shipped name or a path to a robot: ``load_robot``."""
+"""A function that returns the robot of a shipped name or a path: ``load_robot``."""
 
 MOST_INLINE = 10_000
-"""Numbers of a table that a diagram may hold itself."""
+"""Maximum size of a table whose numbers are written into the diagram file."""
 
 OWN = "#"
-"""What the ``source`` of a robot of the diagram's own table starts with; the rest is its key there."""
+"""Prefix of the ``source`` of a robot from the diagram's table; its key in the table follows."""
 
 _FRICTION: dict[str, Callable[[Robot], Robot]] = {
     "none": lambda robot: robot.nofriction(),
@@ -52,7 +52,7 @@ _FRICTION: dict[str, Callable[[Robot], Robot]] = {
 
 
 class RobotReader:
-    """Finds the robots and tables of one document. Errors have file and line."""
+    """Loads the robots and tables of one document. Errors have file and line."""
 
     def __init__(
         self, table: Node | None, folder: Path | None, resolve_robot: ResolveRobot, *, trust: bool = False
@@ -65,7 +65,7 @@ class RobotReader:
             self._own[key] = replace(self._entry(node), source=OWN + key)
 
     def robot(self, node: Node) -> Robot:
-        """The robot that a block's parameter means."""
+        """The robot of a block's parameter."""
         name = node.text()
         return self._own[name] if name in self._own else self._resolved(node)
 
@@ -119,7 +119,7 @@ class RobotReader:
 
 
 class RobotWriter:
-    """Says which robots the blocks of one document mean, and collects its ``table``."""
+    """Writes references to the robots of one document, and collects its ``table``."""
 
     def __init__(self, folder: Path | None, resolve_robot: ResolveRobot) -> None:
         self._folder = folder
@@ -128,7 +128,7 @@ class RobotWriter:
         self.table: dict[str, object] = {}
 
     def reference(self, robot: Robot) -> str:
-        """A shipped name or a path that gives an equal robot, else a key of the table."""
+        """A shipped name or a path of an equal robot, else a key of the table."""
         if robot not in self._known:
             entry = shortest_reference(robot, self._folder, self._resolve_robot)
             if isinstance(entry, str):
@@ -151,7 +151,7 @@ class RobotWriter:
         return f"{relative_to_folder(file, self._folder)}:{name}"
 
     def table_reference(self, table: TimeTable) -> object:
-        """The path of the table's file where it still gives the same, else its rows."""
+        """The path of the table's file if the file still has the same numbers, else its rows."""
         if table.source and Path(table.source).is_file():
             try:
                 same = load_table(table.source) == table
@@ -170,7 +170,7 @@ class RobotWriter:
         return rows.tolist()
 
     def _new_key(self, robot: Robot) -> str:
-        """The key that the robot had, or its name, made unlike every other robot that can be meant."""
+        """A unique key: the previous key of the robot or its name, changed if another robot has it."""
         wish = robot.source.removeprefix(OWN) if robot.source.startswith(OWN) else robot.name
         taken = {*self.table, *list_robots()}
         stem = "robot" if is_path(wish) or not wish else wish
@@ -181,7 +181,8 @@ class RobotWriter:
 def shortest_reference(
     robot: Robot, folder: Path | None, resolve_robot: ResolveRobot
 ) -> str | Mapping[str, object]:
-    """The shortest way to say a robot. A path is tried where the robot's file still gives the same."""
+    """The shortest reference to a robot. A path is used only if the robot's file still gives an equal
+    robot."""
     for reference, base in _candidates(robot, folder, resolve_robot):
         modelled = base.with_friction_model(robot.friction_model)
         model: dict[str, object] = {}
@@ -198,7 +199,7 @@ def shortest_reference(
 def _candidates(
     robot: Robot, folder: Path | None, resolve_robot: ResolveRobot
 ) -> Iterator[tuple[str, Robot]]:
-    """References that may mean this robot, with the robots that they give."""
+    """Possible references to this robot, with the robots that they give."""
     for name in list_robots():
         base = shipped_robot(name)
         if base.name == robot.name:
@@ -207,12 +208,12 @@ def _candidates(
         try:
             base = resolve_robot(robot.source)
         except ArmblocksError:
-            return  # the file has changed: the robot itself is written
+            return  # the file has changed: the whole robot is written
         yield relative_to_folder(robot.source, folder), base
 
 
 def relative_to_folder(source: str, folder: Path | None) -> str:
-    """A path as seen from the diagram's folder where it lies inside, with ``/`` on every system."""
+    """A path relative to the diagram's folder if it is inside, with ``/`` on all systems."""
     if folder is None:
         return Path(source).as_posix()
     try:

@@ -1,4 +1,4 @@
-"""The solid shapes that a link is drawn with, as JSON objects."""
+"""The solid shapes of links for drawings, as JSON objects."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ _KINDS: dict[str, type[Shape]] = {
 
 
 def shape_from(node: Node) -> Shape:
-    """The shape that a JSON object describes. Raises ``FormatError`` with file, line and path."""
+    """The shape of a JSON object. Raises ``FormatError`` with file, line and path."""
     every_key = ["shape", *_READERS]
     word = closed_members(node, every_key, required=("shape",))["shape"].choice(_KINDS)
     kind = _KINDS[word]

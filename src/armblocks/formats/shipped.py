@@ -1,4 +1,4 @@
-"""What comes with armblocks, by name: where it lies and what there is, without reading any of it."""
+"""Names and folders of the shipped robots, diagrams and libraries; no files are read."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from pathlib import Path
 from armblocks.errors import FormatError
 
 SUFFIX = ".json"
-"""Of diagrams and libraries."""
+"""Suffix of diagrams and libraries."""
 ROBOT_FILE = "robot.json"
-"""In the folder that is named as the robot."""
+"""Name of the robot's file in the folder with the robot's name."""
 
 
 def list_robots() -> tuple[str, ...]:
@@ -31,7 +31,7 @@ def list_libraries() -> tuple[str, ...]:
 def shipped_folder(kind: str) -> Path:
     """The folder of the shipped ``robots`` or ``examples``: in the installed package, or in a checkout.
 
-    Raises ``FormatError`` where the installation is incomplete.
+    Raises ``FormatError`` if the installation is incomplete.
     """
     package = Path(__file__).resolve().parent.parent
     for folder in (package / "shipped" / kind, package.parent.parent / kind):

@@ -1,10 +1,10 @@
 """Libraries of subsystems: files of named, masked diagrams that blocks of other files are linked to.
 
-A library file holds diagrams by name, as they stand inside blocks::
+A library file contains diagrams by name, in the form of inner diagrams of blocks::
 
     {"format": 1, "library": {"JointServo": {"mask": […], "blocks": {…}, "connections": […]}, …}}
 
-and a block of a diagram, or of a library, says which one it holds and what its parameters are::
+A block of a diagram or of a library refers to an entry and has its parameters::
 
     "hip": {"type": "Subsystem", "library": "servos.json#JointServo", "parameters": {"kp": 40}}
 
@@ -29,31 +29,33 @@ from armblocks.formats.shipped import SUFFIX, list_libraries, shipped_folder
 
 MOST_BYTES = 16 * 2**20
 DEEPEST = 320
-"""Objects and arrays inside each other, as in diagrams."""
+"""Maximum nesting of objects and arrays, as in diagrams."""
 DEEPEST_CHAIN = 40
 """Maximum nesting of library blocks."""
 
 ReadFile = Callable[[Path], bytes]
-"""From the resolved path of a library file to its bytes; raises ``FormatError`` for a forbidden one."""
+"""A function that returns the bytes of a library file from its resolved path. It raises ``FormatError`` for a
+forbidden path."""
 
 
 class ReadEntry(Protocol):
-    """Makes the diagram of one entry of a library document."""
+    """Builds the diagram of one entry of a library document."""
 
     def __call__(self, root: Node, entry: Node, name: str, folder: Path, libraries: Libraries) -> Diagram:
-        """``folder`` is that of the library, ``libraries`` finds what the entry is linked to itself."""
+        """``folder`` is the folder of the library; ``libraries`` loads the entries that the entry is linked
+        to."""
         ...
 
 
 def read_library_file(path: Path) -> bytes:
-    """The bytes of a library file, wherever it lies."""
+    """The bytes of a library file in any folder."""
     return read_bounded(path, MOST_BYTES)
 
 
 def library_path(reference: str, folder: Path | None) -> Path:
-    """The file that a reference without its ``#name`` means: a shipped library, or a path from a folder.
+    """The file of a reference without its ``#name``: a shipped library, or a path relative to a folder.
 
-    Raises ``UnknownNameError`` for a name that is not shipped, ``FormatError`` for another kind of file.
+    Raises ``UnknownNameError`` for a name that is not shipped, ``FormatError`` for a file that is not JSON.
     """
     if not is_path(reference):
         known = list_libraries()
@@ -71,23 +73,25 @@ def library_path(reference: str, folder: Path | None) -> Path:
 
 
 def is_path(reference: str) -> bool:
-    """Whether a path is meant, and not the name of a shipped library."""
+    """Whether a text is a path and not the name of a shipped library."""
     return "/" in reference or "\\" in reference or reference.lower().endswith(SUFFIX)
 
 
 def shortest_link(link: str, folder: Path | None) -> str:
-    """A link as a file in ``folder`` says it: by shipped name, by relative path where it lies below."""
+    """A link in the form for a file in ``folder``: a shipped name, or a path, relative if it is below the
+    folder."""
     file, _, entry = link.partition("#")
     return f"{relative_to_folder(file, folder) if is_path(file) else file}#{entry}"
 
 
 def _named(path: Path) -> str:
-    """A shipped library by its name, so that it is the same in every installation; others by their path."""
+    """The name of a shipped library, which is the same in every installation, or the path of another
+    library."""
     return path.stem if path.parent == shipped_folder("libraries").resolve() else str(path)
 
 
 class Libraries:
-    """Finds entries of libraries for one document; each is made once. Errors have file and line."""
+    """Loads entries of libraries for one document, each only once. Errors have file and line."""
 
     def __init__(
         self,
@@ -105,7 +109,7 @@ class Libraries:
         self._chain: list[tuple[Path, str]] = [] if around is None else around._chain
 
     def linked(self, node: Node) -> Diagram:
-        """The diagram that ``"file#name"`` means."""
+        """The diagram of a reference ``"file#name"``."""
         file, sharp, name = node.text().partition("#")
         if not (file and sharp and name):
             raise node.error(

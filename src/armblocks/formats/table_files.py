@@ -1,4 +1,4 @@
-"""Tables of values at instants, read from files: CSV, NPZ, MAT, Parquet. Nothing in them is ever executed."""
+"""Tables of values over time, read from files: CSV, NPZ, MAT, Parquet. No code in files is executed."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from armblocks.extras import from_extra, installed
 from armblocks.files import read_bounded
 
 MOST_BYTES = 1 << 28
-"""256 MiB: a million rows of thirty columns."""
+"""Maximum size of a file, 256 MiB: a million rows of thirty columns."""
 
 Columns = Mapping[str, NDArray[np.float64]]
 
@@ -26,9 +26,9 @@ Columns = Mapping[str, NDArray[np.float64]]
 def load_table(path: str | PathLike[str]) -> TimeTable:
     """The table of a file, by its suffix: ``.csv``, ``.npz``, ``.mat``, ``.parquet``.
 
-    The column or variable ``time`` (else ``t``, else the first) holds the instants in s; all others that are
-    as long are values, matrices column by column. What ``result.save`` writes is read so. Raises
-    ``FormatError`` for a file that cannot be read, and ``InputError`` where it holds no table.
+    The column or variable ``time`` (else ``t``, else the first one) contains the times in s. All others of
+    the same length are values; matrices are read by columns. Files of ``result.save`` have this form. Raises
+    ``FormatError`` for a file that cannot be read, and ``InputError`` if it contains no table.
     """
     check_type(path, (str, PathLike), "the path of a file", where="load_table")
     place = Path(fspath(path))
@@ -107,7 +107,7 @@ def _read_parquet(data: bytes) -> Columns:
     with from_extra("data", "Parquet files"):
         import pandas as pd
 
-    if not installed("pyarrow"):  # by which pandas reads Parquet
+    if not installed("pyarrow"):  # pandas needs it to read Parquet
         raise MissingLibraryError("pyarrow", "data", "Parquet files")
     pandas: Any = pd
     frame = pandas.read_parquet(io.BytesIO(data)).reset_index()
@@ -115,7 +115,7 @@ def _read_parquet(data: bytes) -> Columns:
 
 
 def _columns(arrays: Mapping[str, Any]) -> Columns:
-    """Numeric arrays as columns: the first axis counts the instants."""
+    """Numeric arrays as columns; the first axis is time."""
     found: dict[str, NDArray[np.float64]] = {}
     for name, given in arrays.items():
         array = np.asarray(given)

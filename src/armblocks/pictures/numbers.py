@@ -10,7 +10,7 @@ _PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"
 
 
 def nice_step(rough: float) -> float:
-    """The step of 1, 2 or 5 times a power of ten that is nearest above ``rough``."""
+    """The smallest step of 1, 2 or 5 times a power of ten that is not below ``rough``."""
     if not (rough > 0 and math.isfinite(rough)):
         return 1.0
     power = 10.0 ** math.floor(math.log10(rough))
@@ -21,7 +21,8 @@ def nice_step(rough: float) -> float:
 
 
 def nice_ticks(low: float, high: float, count: int, *, degrees: bool = False) -> list[float]:
-    """Round values within ``low`` .. ``high``, about ``count`` steps; wide angles in parts of a turn."""
+    """Round values within ``low`` .. ``high`` in about ``count`` steps; large angles in fractions of a
+    turn."""
     rough = (high - low) / max(count, 1)
     below = nice_step(rough / 2.5)
     steps = [nice_step(below * factor) for factor in (1.0, 1.5, 3.0, 6.0)]
@@ -34,8 +35,8 @@ def nice_ticks(low: float, high: float, count: int, *, degrees: bool = False) ->
 
 
 def log_ticks(low: float, high: float) -> tuple[list[float], list[float]]:
-    """Places on a logarithmic axis: those with a number (powers of ten; 1, 2 and 5 times on a short axis),
-    and finer ones without."""
+    """Positions on a logarithmic axis: those with a number (powers of ten; on a short axis also 2 and 5
+    times), and finer ones without a number."""
     first, last = math.floor(math.log10(low) + 1e-9), math.ceil(math.log10(high) - 1e-9)
     inside = [
         factor * 10.0**power
@@ -57,7 +58,7 @@ def log_ticks(low: float, high: float) -> tuple[list[float], list[float]]:
 
 
 def power_of_ten(value: float) -> str:
-    """``0.01``, ``100``, and ``1e5`` written with a raised exponent where plain digits would be long."""
+    """``0.01``, ``100``; numbers with many digits, such as ``1e5``, with a raised exponent."""
     power = math.log10(value)
     if abs(power - round(power)) < 1e-9 and not -3 <= round(power) <= 4:
         return "10" + str(round(power)).translate(_RAISED)
@@ -68,7 +69,7 @@ def axis_number(value: float, digits: int = 6) -> str:
     """A tick label: up to ``digits`` significant digits, no trailing zeros, thin groups for long numbers."""
     if not math.isfinite(value):
         return "not a number" if math.isnan(value) else ("∞" if value > 0 else MINUS + "∞")
-    text = f"{value + 0.0:.{digits}g}"  # of -0.0 the sign is dropped
+    text = f"{value + 0.0:.{digits}g}"  # removes the sign of -0.0
     if "e" in text:
         mantissa, exponent = text.split("e")
         return f"{mantissa}e{int(exponent)}".replace("-", MINUS)
@@ -84,14 +85,14 @@ def axis_number(value: float, digits: int = 6) -> str:
 
 
 def table_number(value: float, digits: int = 4) -> str:
-    """A number for a table: ``digits`` significant digits, trailing zeros kept off, zero as 0."""
+    """A number for a table: ``digits`` significant digits without trailing zeros, zero as 0."""
     if value == 0 or not math.isfinite(value):
         return axis_number(value)
     return axis_number(value, digits)
 
 
 def si_prefix(largest: float) -> tuple[float, str]:
-    """Factor and prefix that bring magnitudes up to ``largest`` into 1 .. 1000: ``(1e-3, "k")`` for 5000."""
+    """Factor and SI prefix with which ``largest`` is between 1 and 1000: ``(1e-3, "k")`` for 5000."""
     if not (largest > 0 and math.isfinite(largest)):
         return 1.0, ""
     power = 3 * math.floor(math.log10(largest * (1 + 1e-12)) / 3)

@@ -1,8 +1,8 @@
-"""A picture painted by one of matplotlib's renderers: pixels (:mod:`.png`) or pages (:mod:`.pdf`).
+"""Painting of a picture by a renderer of matplotlib: pixels (:mod:`.png`) or pages (:mod:`.pdf`).
 
-Only the renderers are used, not matplotlib's figures: the marks are already laid out, and starting without
-pyplot and axes saves more time than all the painting takes. Text is in DejaVu Sans, which comes with
-matplotlib and whose widths :mod:`.text_width` knows.
+Only the renderers of matplotlib are used, not its figures, because the marks already have their positions,
+and importing pyplot and axes takes longer than the painting. Text is in DejaVu Sans, which is part of
+matplotlib and whose widths are in :mod:`.text_width`.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _KAPPA = 0.5522847498  # control points of a quarter circle as a cubic Bezier cu
 
 @dataclass(frozen=True, eq=False)
 class Painter:
-    """Paints marks with a ``renderer`` of 72 dpi and ``height`` units, ``scale`` of them a px."""
+    """Paints marks with a ``renderer`` of 72 dpi and ``height`` units; a px has ``scale`` units."""
 
     renderer: Any  # a matplotlib RendererBase, whose stubs leave its methods untyped
     height: float
@@ -35,15 +35,16 @@ class Painter:
     scale: float
 
     def picture(self, picture: Picture) -> None:
-        """The whole picture on its ground."""
+        """Paint the whole picture on its ground."""
         self.paint([Rectangle(0, 0, picture.width, picture.height, fill=Tone.SURFACE)])
         with warnings.catch_warnings():
-            # A name in a script that the font lacks becomes boxes; the SVG has it right, and the run is fine.
+            # Characters that the font lacks are painted as boxes, without a warning; the SVG shows them
+            # correctly.
             warnings.filterwarnings("ignore", message="(?s)Glyph .* missing from font")
             self.paint(picture.marks)
 
     def paint(self, marks: Iterable[Mark]) -> None:
-        """Marks, in their order."""
+        """Paint marks in their order."""
         for mark in marks:
             match mark:
                 case Polyline():
@@ -112,7 +113,7 @@ class Painter:
         gc.set_joinstyle("miter" if sharp else "round")
         gc.set_capstyle("butt" if sharp or dash else "round")
         gc.set_snap(None if not sharp else False)
-        # Paths have y upwards, whatever the renderer.
+        # In paths y is upwards for all renderers.
         flip = Affine2D.from_values(self.scale, 0.0, 0.0, -self.scale, 0.0, float(self.height))
         self.renderer.draw_path(gc, path, flip, self._colour(fill, opacity) if fill is not None else None)
         gc.restore()
@@ -130,13 +131,13 @@ class Painter:
             style="oblique" if mark.italic else "normal",
         )
         back = 0.0
-        if mark.anchor != "start":  # laying out a text takes as long as drawing it
+        if mark.anchor != "start":  # measuring a text takes as long as drawing it
             width, _, _ = self.renderer.get_text_width_height_descent(text, font, False)
             back = {"middle": 0.5, "end": 1.0}[mark.anchor] * width
         x, y = mark.x * self.scale, mark.y * self.scale
         x, y = (x, y + back) if mark.turn else (x - back, y)
         if not self.renderer.flipy():
-            y = self.height - y  # texts have y downwards on pixels, and upwards on pages
+            y = self.height - y  # in texts y is downwards for pixels and upwards for pages
         gc = self.renderer.new_gc()
         gc.set_foreground(self._colour(mark.tone, 1.0), isRGBA=True)
         self.renderer.draw_text(gc, x, y, text, font, float(mark.turn), ismath=False)
@@ -152,7 +153,7 @@ class Painter:
 
 
 def resampled(pixels: NDArray[np.uint8], rows: int, columns: int) -> NDArray[np.uint8]:
-    """The nearest pixels on another grid; the same array where the grid is the same."""
+    """The nearest pixels on another grid; the same array if the grid is the same."""
     if pixels.shape[:2] == (rows, columns):
         return pixels
     row = ((np.arange(rows) + 0.5) * pixels.shape[0] / rows).astype(np.intp)

@@ -1,4 +1,4 @@
-"""Pictures as PDF: one page of the picture's size, lines and text as such, fonts inside."""
+"""Pictures as PDF: one page of the picture's size, with vector lines, text and embedded fonts."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _POINTS_PER_PX = 0.75
 
 
 def picture_pdf(picture: Picture, *, theme: Theme = "light") -> bytes:
-    """The picture as a PDF file; the same picture gives the same bytes, whatever the date."""
+    """The picture as a PDF file; the same picture always gives the same bytes, because no date is written."""
     with from_extra("figures", "PDF drawings"):
         from matplotlib.backends.backend_pdf import PdfFile, RendererPdf
 

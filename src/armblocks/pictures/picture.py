@@ -1,7 +1,7 @@
 """A picture as a list of marks: made once, then written as SVG (:mod:`.svg`) or as PNG (:mod:`.png`).
 
-Coordinates are px, x to the right, y down; marks lie in painting order. Colours are tones, so that one
-picture serves the light and the dark theme.
+Coordinates are px, x to the right, y down; marks are in painting order. Colours are tones, so that one
+picture is valid for the light and the dark theme.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Anchor: TypeAlias = Literal["start", "middle", "end"]
 
 @dataclass(frozen=True, eq=False)
 class Polyline:
-    """Straight strokes through points (N, 2); a NaN point interrupts the line. ``fill`` fills the inside."""
+    """Straight lines through points (N, 2); a NaN point interrupts the line. ``fill`` fills the inside."""
 
     points: Points
     stroke: Tone | None = Tone.INK
@@ -31,7 +31,7 @@ class Polyline:
     closed: bool = False
     opacity: float = 1.0
     sharp: bool = False
-    """True: mitred corners and butt ends (frames, ticks); False: round ones (data)."""
+    """True: mitred corners and butt ends (frames, ticks); False: round corners and ends (data)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +103,7 @@ class Raster:
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """Marks that belong together; ``title`` shows as a tooltip where the viewer has them."""
+    """Marks that belong together; ``title`` is a tooltip, if the viewer supports it."""
 
     marks: tuple[Mark, ...]
     title: str = ""
@@ -123,11 +123,11 @@ class Picture:
     marks: list[Mark] = field(default_factory=list[Mark])
 
     def add(self, *marks: Mark) -> None:
-        """Paint marks on top of what is there."""
+        """Paint marks on top of the present ones."""
         self.marks.extend(marks)
 
     def extend(self, marks: Iterable[Mark]) -> None:
-        """Paint many marks on top of what is there."""
+        """Paint many marks on top of the present ones."""
         self.marks.extend(marks)
 
     def place(self, other: Picture, x: float, y: float) -> None:
@@ -153,7 +153,7 @@ def moved(mark: Mark, dx: float, dy: float) -> Mark:
 
 
 def turned(mark: Mark, height: float) -> Mark:
-    """The mark turned a quarter clockwise with a sheet of this height; texts move and stay upright."""
+    """The mark rotated clockwise by 90 degrees with a sheet of this height; texts move but stay upright."""
     match mark:
         case Polyline():
             points = np.asarray(mark.points, dtype=np.float64)
@@ -175,7 +175,7 @@ def turned(mark: Mark, height: float) -> Mark:
 
 
 def text_marks(picture: Picture) -> list[Text]:
-    """All texts of a picture, in painting order: what the checks of overlap read."""
+    """All texts of a picture, in painting order, for checks of overlaps."""
 
     def walk(marks: Iterable[Mark]) -> Iterable[Text]:
         for mark in marks:

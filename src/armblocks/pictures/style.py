@@ -1,9 +1,9 @@
 """Colours, fonts and sizes of all figures.
 
-A figure never names a colour, it names a :class:`Tone`; each tone has a light and a dark value. Text tones
-keep a contrast of at least 4.5:1 on page and surface, trace tones at least 3:1 (WCAG 2.2, 1.4.3 and 1.4.11).
-Trace colours are the set of Okabe and Ito (2008), light members darkened on white and blue lightened on
-black as far as that contrast needs, never changing hue; every joint keeps its colour in every view.
+Figures use tones (:class:`Tone`) instead of colours; each tone has a light and a dark value. Text tones have
+a contrast of at least 4.5:1 on page and surface, trace tones of at least 3:1 (WCAG 2.2, 1.4.3 and 1.4.11).
+Trace colours are the set of Okabe and Ito (2008). As far as this contrast requires, light colours are darker
+on white and blue is lighter on black, with the same hue. Every joint has the same colour in all views.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ SMALL_SIZE = 10.5
 TITLE_SIZE = 13.5
 """px: titles inside figures."""
 FIGURE_WIDTH = 960.0
-"""px: the width that every full-width figure is drawn at."""
+"""Width of every full-width figure, px."""
 
 
 class Tone(Enum):
@@ -96,7 +96,8 @@ PALETTE: dict[Tone, Shade] = {
 }
 
 TRACES: tuple[Tone, ...] = tuple(tone for tone in Tone if tone.value.startswith("trace-"))
-"""The tones of joints and channels, in order; the ninth starts again, dashed (see :func:`trace_dash`)."""
+"""The tones of joints and channels, in order; from the ninth on they repeat, dashed (see
+:func:`trace_dash`)."""
 
 
 def trace_tone(index: int) -> Tone:
@@ -105,7 +106,7 @@ def trace_tone(index: int) -> Tone:
 
 
 def trace_dash(index: int) -> tuple[float, ...]:
-    """Dash pattern (px) that keeps the channels beyond the eighth apart."""
+    """Dash pattern (px) that distinguishes the channels after the eighth."""
     return ((), (6.0, 3.0), (2.0, 2.5), (8.0, 3.0, 2.0, 3.0))[(index // len(TRACES)) % 4]
 
 

@@ -1,7 +1,7 @@
 """Pictures as SVG text.
 
-Written alone, a file carries plain light colours that every viewer knows, and a dark set for viewers that
-tell the reader's preference. Written for a page, it takes its colours from the page's custom properties.
+A separate file has light colours for all viewers, and dark colours for viewers that support the reader's
+colour preference. SVG for a page has its colours from the page's custom properties.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _MANY = 24
 
 
 def escape(text: str) -> str:
-    """Text for XML content and attributes: markup escaped, characters that XML forbids dropped."""
+    """Text for XML content and attributes: markup is escaped, characters that XML forbids are removed."""
     return (
         printable(text)
         .replace("&", "&amp;")
@@ -44,13 +44,14 @@ def escape(text: str) -> str:
 
 
 def number(value: float) -> str:
-    """A coordinate with at most two decimals and nothing superfluous."""
+    """A coordinate with at most two decimals and no trailing zeros."""
     text = f"{value:.2f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text
 
 
 def svg_marks(picture: Picture) -> str:
-    """The marks alone: what :func:`svg_file` and :func:`svg_inline` wrap, for those who write both."""
+    """Only the marks, without the element around them, for callers of both :func:`svg_file` and
+    :func:`svg_inline`."""
     return _marks(picture.marks)
 
 
@@ -131,7 +132,7 @@ def _dash(dash: Sequence[float]) -> str:
 def _path_data(points: Points, closed: bool) -> str:
     array = np.asarray(points, dtype=np.float64)
     if len(array) > _MANY and np.isfinite(array).all():
-        # One format call for the whole line: an order faster, and a tenth of a px is finer than any screen.
+        # One format call for the whole line is ten times as fast; a tenth of a px is finer than any screen.
         data = ("M%.1f %.1f" + "L%.1f %.1f" * (len(array) - 1)) % tuple(array.ravel().tolist())
         return data.replace(".0", "") + ("Z" if closed else "")
     pieces: list[str] = []

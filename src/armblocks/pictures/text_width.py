@@ -1,8 +1,7 @@
 """Widths of texts, without a font library.
 
-The advance widths are those of DejaVu Sans (Bitstream Vera licence), in thousandths of the type size. It is
-one of the widest sans serifs, so a layout made with these widths never overlaps in the font that a reader's
-system puts in its place.
+The advance widths are those of DejaVu Sans (Bitstream Vera licence), in thousandths of the font size. It is
+one of the widest sans-serif fonts, so texts in the fonts of other systems do not overlap either.
 """
 
 from __future__ import annotations
@@ -37,13 +36,14 @@ def text_width(text: str, size: float, *, bold: bool = False, mono: bool = False
         if 0 <= code < len(table):
             total += table[code]
         else:
-            # Far-eastern and other wide characters take a whole em; the rest of Latin and Greek less.
+            # East Asian and other wide characters have the width of an em; other Latin and Greek characters
+            # less.
             total += _OTHERS.get(character, 838 if ord(character) < 0x2E80 else _WIDEST)
     return total * size / 1000
 
 
 def shorten(text: str, size: float, room: float, *, bold: bool = False) -> str:
-    """The text, cut with an ellipsis where it would be wider than ``room``."""
+    """The text, shortened with an ellipsis if it would be wider than ``room``."""
     if text_width(text, size, bold=bold) <= room:
         return text
     kept = text
@@ -53,7 +53,7 @@ def shorten(text: str, size: float, room: float, *, bold: bool = False) -> str:
 
 
 def printable(text: str) -> str:
-    """The text without characters that XML 1.0 (section 2.2) and fonts lack: controls, surrogates."""
+    """The text without characters that XML 1.0 (section 2.2) and fonts do not have: controls, surrogates."""
     return "".join(c for c in text if _allowed(ord(c)))
 
 

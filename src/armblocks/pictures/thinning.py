@@ -1,4 +1,4 @@
-"""Fewer points of a curve, with the same picture."""
+"""Reduction of the points of a curve without a visible change."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ _Array = NDArray[np.float64]
 
 
 def thin_out(time: _Array, values: _Array, columns: int) -> tuple[_Array, _Array]:
-    """At most four points a column of px: first, least, greatest and last, so that no peak is lost."""
+    """At most four points for each column of px: first, minimum, maximum and last, so that peaks stay
+    visible."""
     if len(time) <= 4 * columns:
         return time, values
     bounds = np.linspace(0, len(time), columns + 1).astype(np.intp)

@@ -1,4 +1,4 @@
-"""Pictures of arms: their meshes under a camera, rasterised."""
+"""Pictures of arms: their meshes, projected by a camera and rasterised."""
 
 from typing import TYPE_CHECKING
 

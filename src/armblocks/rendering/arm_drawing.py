@@ -25,21 +25,21 @@ from armblocks.robot.triangles import TriangleMesh, triangles
 _Array = NDArray[np.float64]
 
 RASTER_SCALE = 2.0
-"""Pixels of the shaded bodies per px of the figure."""
+"""Rendered pixels of the bodies per px of the figure."""
 GHOST = 0.26
 """Opacity of the start pose."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Stage:
-    """What all panels of one figure share: the bodies, the floor, the camera and the panel's size in px."""
+    """The common data of all panels of a figure: bodies, floor, camera and the panel's size in px."""
 
     bodies: tuple[Body, ...]
     pedestal: tuple[TriangleMesh, ...]
     camera: Camera
     floor: float
     grid: tuple[float, float, float, float, float]
-    """Spacing, then lowest x, highest x, lowest y, highest y of the floor grid, m."""
+    """Spacing, then minimum x, maximum x, minimum y, maximum y of the floor grid, m."""
     width: float
     height: float
 
@@ -47,7 +47,7 @@ class Stage:
     def framing(
         cls, robot: Robot, poses: _Array, path: _Array, width: float, height: float, *, margin: float = 10.0
     ) -> Stage:
-        """The stage on which all ``poses`` (K, L+2, 4, 4) and the ``path`` (N, 3) m can be seen."""
+        """A stage with a camera that shows all ``poses`` (K, L+2, 4, 4) and the ``path`` (N, 3) m."""
         bodies = robot_bodies(robot)
         clouds = [
             body.mesh.corners.reshape(-1, 3) @ pose[body.row, :3, :3].T + pose[body.row, :3, 3]
@@ -59,14 +59,14 @@ class Stage:
         spacing = nice_step(float((high - low).max()) / 8)
         feet = [c for c, body in zip(clouds, bodies) if body.row == 0]
         foot = float(np.concatenate(feet)[:, 2].min()) if feet else float(low[2])
-        # The arm stands on the floor; where it reaches below its own foot, it stands on a pedestal.
+        # The arm is on the floor, or on a pedestal if a pose reaches below its base.
         floor = foot
         if low[2] < foot - 0.02 * reach(robot):
             floor = math.floor(float(low[2]) / (spacing / 2)) * (spacing / 2)
         x0, y0 = ((math.floor(float(v) / spacing) - 8) * spacing for v in low[:2])
         x1, y1 = ((math.ceil(float(v) / spacing) + 8) * spacing for v in high[:2])
         under = np.array([(x, y, floor) for x in (low[0], high[0]) for y in (low[1], high[1])])
-        # The corners of the floor below the arm may touch the edge, the arm may not.
+        # The corners of the floor may touch the edge of the panel, the arm must not.
         camera = Camera.framing(np.concatenate([points, under]), width, height, margin=margin)
         return cls(
             bodies=bodies,
@@ -90,7 +90,8 @@ class Stage:
 def moments_picture(
     robot: Robot, time: _Array, poses: _Array, *, moments: int = 6, columns: int = 3
 ) -> Picture:
-    """The robot at moments spread evenly over a run, with the tool's path so far; the start as a ghost.
+    """The robot at equally spaced times of a run with the tool's path up to each time; the start is
+    transparent.
 
     ``time`` (N,) s, ``poses`` (N, L+2, 4, 4): base, links and tool in the world.
     """
@@ -170,7 +171,7 @@ def arm_picture_svg(
 
 
 def _raster(stage: Stage, meshes: Sequence[TriangleMesh], body: Rendering, ghost: Rendering | None) -> Raster:
-    """Shadow of the meshes, ghost and body as one image over the panel, without its empty margin."""
+    """Shadow, start pose and body as one image in the panel, without its empty margin."""
     rows, columns = round(stage.height * RASTER_SCALE), round(stage.width * RASTER_SCALE)
     canvas = np.zeros((rows, columns, 4), dtype=np.uint8)
     half = RASTER_SCALE / 2
@@ -194,7 +195,7 @@ def _raster(stage: Stage, meshes: Sequence[TriangleMesh], body: Rendering, ghost
 
 
 def _floor(stage: Stage) -> list[Polyline]:
-    """The floor grid, one line each spacing, out to the panel's edge."""
+    """The floor grid up to the panel's edge."""
     spacing, x0, x1, y0, y1 = stage.grid
     xs = [x0 + k * spacing for k in range(round((x1 - x0) / spacing) + 1)]
     ys = [y0 + k * spacing for k in range(round((y1 - y0) / spacing) + 1)]
@@ -224,7 +225,7 @@ def _clipped(line: _Array, width: float, height: float) -> _Array | None:
 
 
 def _path_marks(stage: Stage, body: Rendering, path: _Array, now: int) -> list[Polyline | Disc]:
-    """The path to come as a dotted line, the path so far fading with age, dim behind bodies."""
+    """The future path as a dotted line; the past path fades with age and is dim behind bodies."""
     x, y, nearness = stage.camera.project(path)
     points = np.column_stack([x, y])
     hidden = body.nearness_at(x, y) > nearness * 1.01
@@ -249,7 +250,8 @@ def _path_marks(stage: Stage, body: Rendering, path: _Array, now: int) -> list[P
 
 
 def _runs(flags: NDArray[np.bool_], first: int, last: int) -> list[tuple[int, int, bool]]:
-    """Maximal stretches ``a..b`` of equal flags within ``first..last``, sharing their end points."""
+    """Maximal ranges ``a..b`` of equal flags within ``first..last``; neighbouring ranges share an end
+    point."""
     runs: list[tuple[int, int, bool]] = []
     start = first
     for k in range(first, last):
@@ -260,7 +262,7 @@ def _runs(flags: NDArray[np.bool_], first: int, last: int) -> list[tuple[int, in
 
 
 def _thinned(points: _Array, tolerance: float = 0.6) -> _Array:
-    """The points at least ``tolerance`` px apart along the line, first and last kept."""
+    """Points that are at least ``tolerance`` px apart along the line, including the first and the last."""
     if len(points) < 3:
         return points
     walked = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
@@ -269,7 +271,7 @@ def _thinned(points: _Array, tolerance: float = 0.6) -> _Array:
 
 
 def _pedestal(robot: Robot, foot: float, floor: float) -> tuple[TriangleMesh, ...]:
-    """A column from the robot's foot down to the floor, where there is a gap and the base stands upright."""
+    """A column from the robot's base down to the floor, if there is a gap and the base is upright."""
     gap = foot - floor
     if gap < 0.01 * reach(robot) or robot.base.rotation[2][2] < 0.7:
         return ()

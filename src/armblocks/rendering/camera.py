@@ -1,4 +1,4 @@
-"""A pinhole camera with a shifted lens, framed so that given points fill a panel."""
+"""A pinhole camera with a lens shift, placed so that given points fill a panel."""
 
 from __future__ import annotations
 
@@ -11,14 +11,15 @@ from numpy.typing import NDArray
 _Array = NDArray[np.float64]
 
 AZIMUTH = -58.0
-"""Degrees: the camera stands between +x and -y, as in textbooks' drawings of arms."""
+"""Azimuth, degrees: the camera is between +x and -y, as in textbook drawings of arms."""
 ELEVATION = 20.0
-"""Degrees above the horizon."""
+"""Elevation above the horizon, degrees."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Camera:
-    """``axes`` rows: right, up, towards the viewer, world frame; ``eye`` m; px = scale X / depth + shift."""
+    """A camera: rows of ``axes`` are right, up and towards the viewer in the world frame; ``eye`` is in m; px
+    = scale X / depth + shift."""
 
     axes: _Array
     eye: _Array
@@ -37,9 +38,10 @@ class Camera:
         elevation: float = ELEVATION,
         distance: float = 4.2,
     ) -> Camera:
-        """The camera that shows ``points`` (N, 3) m as large as a panel of px less a margin allows.
+        """The camera that shows ``points`` (N, 3) m as large as possible in a panel with a margin, px.
 
-        It stands ``distance`` times the points' extent away: the perspective of a long lens.
+        Its distance is ``distance`` times the extent of the points, which gives the perspective of a long
+        lens.
         """
         a, e = math.radians(azimuth), math.radians(elevation)
         back = np.array([math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)])
@@ -61,7 +63,8 @@ class Camera:
         return cls(axes=axes, eye=eye, scale=scale, shift=shift)
 
     def project(self, points: _Array) -> tuple[_Array, _Array, _Array]:
-        """Px to the right, px downwards, and 1/depth (1/m, larger is nearer) of points (..., 3)."""
+        """Position in px to the right and downwards, and 1/depth (1/m, larger is nearer), of points (...,
+        3)."""
         local = (points - self.eye) @ self.axes.T
         nearness = -1.0 / local[..., 2]
         return (
@@ -71,6 +74,6 @@ class Camera:
         )
 
     def flat(self, points: _Array) -> _Array:
-        """Px (..., 2) of points (..., 3)."""
+        """Position in px (..., 2) of points (..., 3)."""
         x, y, _ = self.project(points)
         return np.stack([x, y], axis=-1)

@@ -1,7 +1,7 @@
-"""A small software renderer: triangles with normals to shaded pixels with transparency and depth.
+"""A small software renderer: converts triangles with normals to shaded pixels with transparency and depth.
 
-All triangles are rasterised at once with array operations: every triangle becomes rows, every row becomes
-pixels, and the nearest fragment of each pixel is shaded. Passes are numbered in :func:`render`.
+All triangles are rasterised together with array operations. Every triangle is divided into rows and every row
+into pixels, and the nearest fragment of each pixel is shaded. :func:`render` numbers the passes.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _Array = NDArray[np.float64]
 _Index = NDArray[np.intp]
 
 SUPERSAMPLES = 2
-"""Rendered pixels per output pixel, each way."""
+"""Rendered pixels per output pixel in each direction."""
 
 # Colour (sRGB), strength and sharpness of the highlight.
 _FINISH: dict[Material, tuple[str, float, float]] = {
@@ -42,8 +42,8 @@ _SKY, _GROUND = 0.40, 0.17
 class Rendering:
     """The pixels that a set of bodies covers, as a window of the panel.
 
-    ``pixels`` (rows, columns, 4) uint8, straight alpha; ``nearness`` (rows, columns) 1/depth of what is seen
-    there, or 0; ``left`` and ``top``: the window's first column and row; ``scale``: pixels per px.
+    ``pixels``: (rows, columns, 4) uint8, straight alpha. ``nearness``: (rows, columns), 1/depth of the
+    visible surface, or 0. ``left`` and ``top``: the window's first column and row. ``scale``: pixels per px.
     """
 
     pixels: NDArray[np.uint8]
@@ -53,7 +53,7 @@ class Rendering:
     scale: float
 
     def nearness_at(self, x: _Array, y: _Array) -> _Array:
-        """1/depth of the bodies at points of the panel (px), 0 where there is none."""
+        """1/depth of the bodies at points of the panel (px), 0 without a body."""
         column = np.floor(x * self.scale).astype(np.intp) - self.left
         row = np.floor(y * self.scale).astype(np.intp) - self.top
         rows, columns = self.nearness.shape
@@ -65,17 +65,17 @@ class Rendering:
 def render(
     meshes: Sequence[TriangleMesh], camera: Camera, width: float, height: float, scale: float
 ) -> Rendering:
-    """Shaded pixels of world-frame meshes over ``width`` x ``height`` px, ``scale`` pixels each px.
+    """Shaded pixels of world-frame meshes over ``width`` x ``height`` px, with ``scale`` pixels per px.
 
-    Lambert shading with a key and a fill light and a sky dome, a Blinn highlight, dark lines where a body
-    ends before another; after Foley et al., *Computer Graphics*, chapter 16.
+    The shading is Lambert's with a key light, a fill light and a sky dome, and a Blinn highlight. Dark lines
+    separate a body from a body behind it. Source: Foley et al., *Computer Graphics*, chapter 16.
     """
     corners = np.concatenate([mesh.corners for mesh in meshes])
     normals = np.concatenate([mesh.normals for mesh in meshes]) @ camera.axes.T
     counts = [len(mesh.corners) for mesh in meshes]
     material = np.repeat([_MATERIALS.index(mesh.material) for mesh in meshes], counts)
 
-    # Pass 1: project, drop what faces away, and keep to the window that the bodies cover.
+    # Pass 1: project, remove back faces, and determine the window that the bodies cover.
     x, y, nearness = camera.project(corners)
     x, y = x * scale, y * scale
     left, right = _extent(x, round(width * scale))
@@ -130,7 +130,8 @@ def _block_means(planes: _Array, n: int) -> _Array:
 
 
 def _extent(values: _Array, limit: int) -> tuple[int, int]:
-    """First pixel and the one after the last of what is seen along one side of the panel; at least one."""
+    """The visible range of pixels along one side of the panel: the first, and one after the last; at least
+    one."""
     low = min(max(int(np.floor(values.min())) - 1, 0), limit - 1)
     return low, max(min(int(np.ceil(values.max())) + 1, limit), low + 1)
 
@@ -145,9 +146,10 @@ def shadow(
     *,
     blur: int = 3,
 ) -> NDArray[np.uint8]:
-    """A soft black shadow on the floor ``z = floor`` (m), pixels (rows, columns, 4), at ``scale`` a px.
+    """A soft black shadow on the floor ``z = floor`` (m), pixels (rows, columns, 4), ``scale`` per px.
 
-    The sun stands high over the left shoulder of the viewer: the shadow lies behind and right of the arm.
+    The light comes from above and behind the viewer's left shoulder, so the shadow is behind and right of the
+    arm.
     """
     columns, rows = round(width * scale), round(height * scale)
     right, up = camera.axes[0], np.array([0.0, 0.0, 1.0])
@@ -161,7 +163,7 @@ def shadow(
     _, column, row = _fragments(x, y, columns, rows)
     mask[row * columns + column] = 1.0
     soft = mask.reshape(rows, columns)
-    for _ in range(3):  # three box filters make a smooth bell (central limit theorem)
+    for _ in range(3):  # three box filters approximate a Gaussian filter (central limit theorem)
         soft = _box_filter(_box_filter(soft, blur).T, blur).T
     pixels = np.zeros((rows, columns, 4), dtype=np.uint8)
     pixels[..., 3] = np.rint(soft * 72)
@@ -169,10 +171,10 @@ def shadow(
 
 
 def over(front: NDArray[np.uint8], back: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """``front`` laid over ``back``, both straight alpha (Porter and Duff 1984)."""
+    """``front`` composited over ``back``, both with straight alpha (Porter and Duff 1984)."""
     result = back.copy()
     result[back[..., 3] == 0] = 0
-    covered = front[..., 3] > 0  # elsewhere the back stays as it is
+    covered = front[..., 3] > 0  # elsewhere the back is unchanged
     f, b = front[covered] / 255, back[covered] / 255
     alpha = f[:, 3:] + b[:, 3:] * (1 - f[:, 3:])
     colour = (f[:, :3] * f[:, 3:] + b[:, :3] * b[:, 3:] * (1 - f[:, 3:])) / np.maximum(alpha, 1e-9)
@@ -220,7 +222,8 @@ def _fragments(x: _Array, y: _Array, columns: int, rows: int) -> tuple[_Index, _
 
 
 def _ranges(first: _Index, counts: _Index) -> tuple[_Index, _Index]:
-    """For ranges ``first[k] .. first[k] + counts[k] - 1`` laid end to end: which range, and the number."""
+    """For the concatenated ranges ``first[k] .. first[k] + counts[k] - 1``: the range index and the
+    number."""
     owner = np.repeat(np.arange(len(first)), counts)
     begin = np.cumsum(counts) - counts
     return owner, np.arange(len(owner)) - begin[owner] + first[owner]
@@ -249,14 +252,14 @@ def _shade(normal: _Array, material: _Index) -> _Array:
     light = _GROUND + (_SKY - _GROUND) * (0.5 + 0.5 * normal[1])
     light += _KEY_STRENGTH * np.maximum(key @ normal, 0.0)
     light += _FILL_STRENGTH * np.maximum(fill @ normal, 0.0)
-    # Dark bodies keep a rim of light, so that graphite stands off a dark ground.
+    # Dark bodies have a light rim, so that graphite is visible on a dark ground.
     white = 0.10 * (1.0 - np.clip(normal[2], 0.0, 1.0)) ** 3
     white += _GLOSS[material] * np.exp(_SHARPNESS[material] * np.log(np.maximum(halfway @ normal, 1e-6)))
     return np.clip(_BASE[:, material] * light + white, 0.0, 1.0)
 
 
 def _outlines(nearness: _Array, facing: _Array) -> _Array:
-    """A factor (rows, columns) below 1 where depth or direction jumps between neighbouring pixels."""
+    """A factor (rows, columns) that is below 1 where depth or normal jumps between neighbouring pixels."""
     factor = np.ones_like(nearness)
     views = (
         (factor[:-1], nearness[:-1], nearness[1:], facing[:, :-1], facing[:, 1:]),

@@ -35,23 +35,24 @@ _FIRST_ENTRIES = 12
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Figure:
-    """One picture of the report: ``name`` of its files, ``section`` of the report, and a caption."""
+    """One picture of the report, with the ``name`` of its files, the ``section`` of the report, and a
+    caption."""
 
     name: str
     section: str
     caption: str
     picture: Picture
     narrow: bool = False
-    """Whether such pictures are placed side by side instead of each across the page."""
+    """Whether these pictures are placed side by side instead of one below the other."""
 
     @cached_property
     def svg_marks(self) -> str:
-        """The marks as SVG, the same for the file and for the page."""
+        """The marks as SVG, for the file and for the page."""
         return svg_marks(self.picture)
 
 
 def motion_figures(motion: Motion, prefix: str) -> Iterator[Figure]:
-    """The arm at six instants, the three projections of the tool's path, and the joints over time."""
+    """The arm at six times, three projections of the tool's path, and the joints over time."""
     robot = motion.robot
     yield Figure(
         name=f"{prefix}moments",
@@ -113,7 +114,7 @@ def for_people(values: _Array, unit: str) -> tuple[_Array, str]:
         return values * _DEGREES, _SPELLED.get(unit, unit)
     finite = np.abs(values[np.isfinite(values)])
     factor, prefix = si_prefix(float(finite.max(initial=0.0)))
-    # A prefix on a bare number or on a unit with powers would mislead; usual numbers need no prefix.
+    # A prefix on a number without unit or on a unit with powers would mislead; usual numbers need no prefix.
     if not unit or unit.startswith("kg") or unit == "s" or 1e-3 < factor < 1e3:
         return values, _SPELLED.get(unit, unit)
     return values * factor, prefix + _SPELLED.get(unit, unit)
@@ -322,7 +323,7 @@ def _xy_graph(block: str, view: View, result: SimulationResult) -> Picture:
     paths = [result.resolve(f"{block}/{signal}") for signal in view.signals[:2]]
     flats = [result[path].reshape(len(result.time), -1)[:, 0] for path in paths]
     units = [result.units[path] for path in paths]
-    if units[0] == units[1]:  # one prefix for both axes, so that a unit has the same length on both
+    if units[0] == units[1]:  # one prefix for both axes, so that a unit has the same length on both axes
         both, x_unit = for_people(np.stack(flats), units[0])
         (x, y), y_unit = both, x_unit
     else:

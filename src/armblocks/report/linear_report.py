@@ -1,4 +1,4 @@
-"""All figures of a linear system in a folder."""
+"""Writes all figures of a linear system to a folder."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from armblocks.report.writing import check_figure_formats, make_folder, usable_f
 def linear_figures(
     system: LinearSystem, *, loop: bool = False, hertz: bool = False
 ) -> dict[str, Callable[[], Picture]]:
-    """What there is to draw, by file name. ``loop``: the system is the open loop of ``1 + L``, whose margins,
-    Nyquist diagram and root locus mean something."""
+    """The figures of a system, by file name. ``loop``: the system is the open loop of ``1 + L``, for which
+    margins, Nyquist diagram and root locus are defined."""
     if not system.inputs or not system.outputs:
         return {"poles-and-zeros": lambda: pole_zero_picture(system)} if system.order else {}
     figures: dict[str, Callable[[], Picture]] = {
@@ -46,10 +46,10 @@ def write_linear_report(
     hertz: bool = False,
     formats: Sequence[str] | None = None,
 ) -> tuple[Path, ...]:
-    """Write each figure, and ``linear-system.json``, into a folder, made if absent.
+    """Write each figure, and ``linear-system.json``, into a folder, created if absent.
 
-    By default svg, and png where matplotlib is installed. Raises ``UnknownNameError`` for a format that is
-    not svg or png, ``MissingLibraryError`` for png without matplotlib, ``FormatError`` where the folder
+    The default format is svg, also png if matplotlib is installed. Raises ``UnknownNameError`` for a format
+    that is not svg or png, ``MissingLibraryError`` for png without matplotlib, ``FormatError`` if the folder
     cannot be written.
     """
     formats = usable_figure_formats() if formats is None else formats

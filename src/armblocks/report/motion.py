@@ -1,7 +1,7 @@
-"""Which signals of a run are the motion of which robot.
+"""Finds the signals of a run that are the motion of each robot.
 
-A block that takes a robot names its ends by the field's letters (q, qd, qdd, tau, poses). This module joins
-the ends that belong to one arm; it knows no block by its class.
+The ports of a block with a robot have the usual names (q, qd, qdd, tau, poses). This module groups the ports
+that belong to one arm. It does not depend on the classes of blocks.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _Array = NDArray[np.float64]
 class Motion:
     """One arm's motion: ``q``, ``qd``, ``qdd``, ``tau`` (N, n), ``poses`` (N, L+2, 4, 4) in the world.
 
-    ``notes`` say which of them were not in the diagram and come from differences between samples.
+    ``notes`` list the quantities that are not in the diagram and come from differences between samples.
     """
 
     robot: Robot
@@ -44,7 +44,7 @@ class Motion:
 
 @dataclass(frozen=True, kw_only=True)
 class MovingArm:
-    """Where one arm's motion stands in the results of a diagram: paths of signals, ``None`` if absent."""
+    """The paths of the signals of one arm's motion in the results of a diagram; ``None`` if absent."""
 
     robot: Robot
     blocks: tuple[str, ...]
@@ -56,7 +56,7 @@ class MovingArm:
 
 
 def robot_of(block: Block) -> Robot | None:
-    """The robot that a block works with, if it has one."""
+    """The robot of a block, if it has one."""
     for rule in type(block).parameters():
         if rule.kind is ParameterKind.ROBOT:
             value: object = getattr(block, rule.name)
@@ -66,12 +66,12 @@ def robot_of(block: Block) -> Robot | None:
 
 
 def motions(diagram: Diagram, result: SimulationResult) -> tuple[Motion, ...]:
-    """The motion of every robot of a diagram, one for each different signal of joint coordinates."""
+    """The motions of the robots of a diagram, one for each different signal of joint coordinates."""
     return tuple(_motion(arm, result) for arm in moving_arms(diagram, result))
 
 
 def moving_arms(diagram: Diagram, result: SimulationResult) -> tuple[MovingArm, ...]:
-    """The arms of a diagram and their signals: the same for every run of it."""
+    """The arms of a diagram and their signals, which are the same for every run."""
     diagram = flat_diagram(diagram)
     groups: dict[tuple[Robot, str], list[str]] = {}
     for name, block in diagram.blocks.items():
@@ -82,7 +82,7 @@ def moving_arms(diagram: Diagram, result: SimulationResult) -> tuple[MovingArm, 
     found: list[MovingArm] = []
     shown = {robot for (robot, _), names in groups.items() if any(_plots(diagram, n) for n in names)}
     for (robot, path), names in groups.items():
-        # A controller works out torques for several q of one arm; the arm that is drawn is the real one.
+        # A controller computes torques for several q of one arm; the drawn arm is the simulated one.
         if robot in shown and not any(_plots(diagram, n) for n in names):
             continue
         found.append(_moving_arm(robot, path, _sources_first(diagram, names), result))
@@ -94,13 +94,14 @@ def _plots(diagram: Diagram, name: str) -> bool:
 
 
 def _path(result: SimulationResult, block: str, port: str) -> str | None:
-    """The signal behind ``block/port``, an output, an input or a record; None if there is none."""
+    """The signal of ``block/port``: an output, an input or a recorded value; None if there is none."""
     name = f"{block}/{port}"
     return result.resolve(name) if name in result else None
 
 
 def _sources_first(diagram: Diagram, names: list[str]) -> list[str]:
-    """Blocks that give q out (forward dynamics) know the real rates; those that take q may be fed plans."""
+    """Sort key of blocks: first those that output q (forward dynamics), because their speeds are the
+    simulated ones; the inputs of other blocks may be planned values."""
     return sorted(names, key=lambda n: "q" not in [port.name for port in diagram.blocks[n].output_ports()])
 
 
@@ -108,10 +109,10 @@ def _moving_arm(robot: Robot, path: str, names: list[str], result: SimulationRes
     owner, shape = path.rpartition("/")[0], result[path].shape
 
     def look(port: str) -> str | None:
-        # The block that drives q (a trajectory, an integrator) is asked before those that q drives.
+        # The source of q (a trajectory, an integrator) precedes the blocks that q is connected to.
         for name in (owner, *names):
             if port == "tau" and f"{name}/qd" not in result:
-                continue  # the torque of gravity alone is not what drives the arm
+                continue  # the gravity torque alone does not drive the arm
             signal = _path(result, name, port)
             if signal is not None and result[signal].shape == shape:
                 return signal

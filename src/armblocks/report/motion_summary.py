@@ -1,7 +1,7 @@
 """Summary of an arm's motion: ranges, peaks, loads, work, and exceeded limits.
 
-Signals are taken as straight between their samples, and integrals of that are exact: a linear power that
-changes sign, for instance, gives its positive and its negative work without error.
+Signals are interpolated linearly between their samples, and the integrals of this interpolation are exact.
+For example, the positive and the negative work of a linear power that changes its sign have no error.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from armblocks.robot import Robot
 _Array = NDArray[np.float64]
 
 _TOLERANCE = 1e-9
-"""Share of a limit that rounding may exceed: a trajectory planned to the limit itself does not break it."""
+"""Relative tolerance of a limit, so that a trajectory planned exactly to the limit does not exceed it."""
 
 
 class LimitKind(Enum):
-    """Which limit of a joint."""
+    """The limits of a joint."""
 
     POSITION = "position"
     SPEED = "speed"
@@ -36,27 +36,27 @@ class LimitKind(Enum):
 
 @dataclass(frozen=True, kw_only=True)
 class LimitFinding:
-    """One limit that a motion breaks. Values are SI: rad, rad/s, N m, or m, m/s, N."""
+    """One limit that a motion exceeds. Values are in SI units: rad, rad/s, N m, or m, m/s, N."""
 
     joint: str
     kind: LimitKind
     limit: float
     first_time: float
-    """s: where the straight line between two samples crosses the limit; the start if it is beyond there."""
+    """Time (s) at which the line between two samples crosses the limit; the start if it is exceeded there."""
     worst_time: float
     worst: float
     text: str
-    """One sentence for people with joint, limit, first time and worst value."""
+    """One sentence with joint, limit, first time and worst value."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class JointSummary:
-    """One joint over a run, SI units, ``None`` where the run does not tell (no torque, no limit, no motor).
+    """One joint over a run, in SI units; ``None`` for unknown values (no torque, no limit, no motor).
 
-    ``position_margin`` least distance to the nearer end of the range, negative beyond it; ``speed_share``
-    peak speed over its limit; ``*_rms`` root mean square over time; ``motor_*`` at the motor's side of the
-    gear: ``tau / G`` and ``G qd``; ``work_done`` and ``work_taken`` J: the time integrals of the positive
-    and of the negative part of ``tau qd``, both as positive numbers.
+    ``position_margin``: minimum distance to the nearer end of the range, negative beyond it. ``speed_share``:
+    peak speed divided by its limit. ``*_rms``: root mean square over time. ``motor_*``: at the motor's side
+    of the gear, ``tau / G`` and ``G qd``. ``work_done`` and ``work_taken`` (J): the time integrals of the
+    positive and of the negative part of ``tau qd``, both as positive numbers.
     """
 
     name: str
@@ -81,15 +81,16 @@ class JointSummary:
 
     @property
     def speed_share(self) -> float | None:
-        """Peak speed as a share of its limit."""
+        """Peak speed divided by its limit."""
         return None if self.speed_limit is None else self.speed_peak / self.speed_limit
 
 
 @dataclass(frozen=True, kw_only=True)
 class MotionSummary:
-    """All joints, the arm as a whole, its tool, and the limits that are broken.
+    """All joints, the whole arm, its tool, and the exceeded limits.
 
-    ``power_peak`` W of the sum over joints; ``tool_path_length`` m; positions (x, y, z) m in the world.
+    ``power_peak``: of the sum over all joints, W. ``tool_path_length``: m. Positions: (x, y, z) m in the
+    world.
     """
 
     joints: tuple[JointSummary, ...]
@@ -155,7 +156,7 @@ def summarise(
 
 
 SHOWN_AS_ZERO = 64.0 * float(np.finfo(np.float64).eps)
-"""Share of the largest joint's value below which a value of another joint is rounding."""
+"""Values of a joint below this fraction of the largest joint's value are rounding errors."""
 _COMPARED = (
     ("position_min", "position_max"),
     ("position_margin",),
@@ -167,15 +168,15 @@ _COMPARED = (
     ("power_peak",),
     ("work_done", "work_taken"),
 )
-"""Quantities of joints that are computed from those of all joints alike."""
+"""Joint quantities that are computed from the motion of all joints."""
 
 
 def shown_summary(summary: MotionSummary) -> MotionSummary:
-    """The same summary as it is shown: 0 for what is a rounding error beside the same quantity of the joint,
-    of those with its unit, where it is largest.
+    """The summary for display: values that are rounding errors relative to the largest value of the same
+    quantity and unit are 0.
 
-    The torque of a joint is a sum over forces that act on the whole arm: where they cancel, what is left has
-    the rounding errors of the largest.
+    The torque of a joint is a sum of forces on the whole arm. If they cancel, the result has the rounding
+    error of the largest force.
     """
     joints: list[JointSummary] = []
     for joint in summary.joints:
@@ -183,7 +184,7 @@ def shown_summary(summary: MotionSummary) -> MotionSummary:
         changes: dict[str, float] = {}
         for names in _COMPARED:
             sizes = [abs(getattr(other, name) or 0.0) for other in alike for name in names]
-            if names == ("position_margin",):  # the difference of a position and its limit
+            if names == ("position_margin",):  # a difference of a position and a limit
                 sizes += [abs(end) for other in alike for end in other.position_limits or ()]
             for name in names:
                 value: float | None = getattr(joint, name)
@@ -196,7 +197,7 @@ def shown_summary(summary: MotionSummary) -> MotionSummary:
 def limit_findings(
     robot: Robot, time: _Array, q: _Array, qd: _Array | None = None, tau: _Array | None = None
 ) -> tuple[LimitFinding, ...]:
-    """Every limit of a joint that a motion breaks, in the order of joints; arrays as in :func:`summarise`."""
+    """Every limit that a motion exceeds, in the order of joints; arrays as in :func:`summarise`."""
     findings: list[LimitFinding] = []
     for j, (name, joint) in enumerate(zip(robot.joint_names, robot.joints)):
         limits = joint.limits
@@ -261,7 +262,7 @@ def _beyond(
 
 
 def people_unit(kind: LimitKind, unit: str) -> tuple[float, str]:
-    """Factor and unit in which people read a joint's quantity: degrees for rad, N m or N for torques."""
+    """Factor and unit for the display of a joint's quantity: degrees for rad, N m or N for torques."""
     factor, base = (180 / math.pi, "deg") if unit == "rad" else (1.0, unit)
     if kind is LimitKind.POSITION:
         return factor, base
@@ -275,7 +276,7 @@ def signed_integrals(time: _Array, values: _Array) -> tuple[float, float]:
     a, b, h = values[:-1], values[1:], np.diff(time)
     crossing = a * b < 0
     span = np.where(crossing, np.abs(a) + np.abs(b), 1.0)
-    # Where the sign changes, each side is a triangle of height a or b over its share of the interval.
+    # If the sign changes, both parts are triangles of height a or b over their parts of the interval.
     positive = np.where(
         crossing, np.maximum(a, b) ** 2 / (2 * span), np.maximum(a, 0) / 2 + np.maximum(b, 0) / 2
     )

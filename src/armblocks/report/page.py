@@ -19,11 +19,11 @@ from armblocks.report.page_tables import html_table, limits_table, loads_table, 
 from armblocks.robot import inertia_findings
 from armblocks.simulation.result import SimulationResult
 
-# Nothing may be loaded or run; styles stand in the page, pictures in data: addresses.
+# Nothing may be loaded or run. Styles are in the page, pictures in data: addresses.
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'"
 
 _OPEN_SHEETS = 6
-"""Up to so many subsystems are shown at once; of more, the reader opens one by one."""
+"""Up to this number of subsystems their drawings are open; with more, all are closed at first."""
 
 _ICONS = {
     "error": '<path d="M7.9 2.5h4.2L17.5 7.9v4.2L12.1 17.5H7.9L2.5 12.1V7.9z" fill="none" '
@@ -35,7 +35,7 @@ _ICONS = {
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Sheet:
-    """The drawing of a subsystem, and the paths of those that are the same inside."""
+    """The drawing of a subsystem, and the paths of all subsystems with the same content."""
 
     path: str
     same: tuple[str, ...]
@@ -44,7 +44,7 @@ class Sheet:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ReportContents:
-    """Everything that the page shows; ``summaries`` go with ``motions``, ``files`` are relative paths."""
+    """The contents of the page; ``summaries`` belong to ``motions``, ``files`` are relative paths."""
 
     diagram: Diagram
     result: SimulationResult
@@ -122,7 +122,7 @@ def _facts(contents: ReportContents) -> str:
 
 
 def _notices(contents: ReportContents) -> str:
-    """What deserves a look, the worst first: a run that stopped early, limits, inertias, differences."""
+    """The notes of the report, most severe first: a run that ended early, limits, inertias, differences."""
     notices: list[tuple[str, str]] = []
     run = contents.result.run
     if not run.complete:
@@ -212,7 +212,7 @@ def _displays(contents: ReportContents) -> str:
 
 
 def _diagram(contents: ReportContents) -> str:
-    """The top, then each subsystem in a part that opens and closes, open where there are few."""
+    """The top level, then each subsystem in a part that can be opened and closed; open if there are few."""
     state = " open" if len(contents.sheets) <= _OPEN_SHEETS else ""
     inner = "".join(
         f'<details class="sheet"{state}><summary>{escape(sheet.path)}</summary>'

@@ -14,7 +14,7 @@ from armblocks.report.motion import Motion
 from armblocks.report.motion_summary import LimitFinding, LimitKind, MotionSummary, people_unit
 
 MOST_NUMBERS = 64
-"""Of a longer array a report gives the range."""
+"""Longest array whose numbers are listed; of longer arrays only the range is given."""
 
 
 def limits_table(summary: MotionSummary) -> str:
@@ -90,7 +90,7 @@ def loads_table(motion: Motion, summary: MotionSummary) -> str:
 
 
 def tool_table(summary: MotionSummary) -> str:
-    """Where the tool starts and ends (m, world frame), how far it goes and how fast."""
+    """Start and end position of the tool (m, world frame), its path length and maximum speed."""
     heads = [("", ""), ("x", "m"), ("y", "m"), ("z", "m")]
     rows = [
         f'<tr><th scope="row">{word}</th>{"".join(_cell(_fixed(v)) for v in place)}</tr>'
@@ -149,7 +149,7 @@ def _span(low: float, high: float) -> str:
 
 
 def value_cell(value: NDArray[np.float64]) -> str:
-    """A scalar with nine digits, a vector as a row, matrices as rows; of many numbers the range."""
+    """A scalar with nine digits, a vector as a row, a matrix as rows; for many numbers their range."""
     if value.ndim == 0:
         return table_number(float(value), 9)
     if value.size > MOST_NUMBERS:

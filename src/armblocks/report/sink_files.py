@@ -14,12 +14,12 @@ from armblocks.simulation.result import SimulationResult
 
 DATA_FORMATS = ("csv", "parquet", "npz", "mat")
 REPORT_DATA = tuple(f"data.{kind}" for kind in DATA_FORMATS)
-"""Names of a report's files with all signals, which no To File block may have."""
+"""File names of a report's data, which To File blocks must not use."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SinkFile:
-    """A file that a block asks for: its path in the folder, the signal and its name in the file."""
+    """A file of a To File block: its path in the folder, the signal and its name in the file."""
 
     block: str
     signal: str
@@ -28,10 +28,10 @@ class SinkFile:
 
 
 def sink_files(diagram: Diagram, taken: Sequence[str] = ()) -> tuple[SinkFile, ...]:
-    """All files that the diagram's blocks ask for; nothing is written.
+    """All files of the diagram's To File blocks; nothing is written.
 
-    Raises ``DiagramError`` where two blocks ask for the same one, or for one of those ``taken``, and
-    ``MissingLibraryError`` where the library of a format is not installed.
+    Raises ``DiagramError`` if two blocks have the same file, or if a file is in ``taken``, and
+    ``MissingLibraryError`` if the library of a format is not installed.
     """
     owners = {name.lower(): "the report" for name in taken}
     found: list[SinkFile] = []
@@ -40,7 +40,7 @@ def sink_files(diagram: Diagram, taken: Sequence[str] = ()) -> tuple[SinkFile, .
             continue
         settings = view.subject
         assert isinstance(settings, FileSettings)
-        other = owners.setdefault(settings.file.lower(), f"'{block}'")  # many file systems fold cases
+        other = owners.setdefault(settings.file.lower(), f"'{block}'")  # many file systems ignore case
         if other != f"'{block}'":
             raise DiagramError(
                 f"{other} and '{block}' write the same file '{settings.file}'",
@@ -58,11 +58,11 @@ def sink_files(diagram: Diagram, taken: Sequence[str] = ()) -> tuple[SinkFile, .
 def write_files(
     folder: str | os.PathLike[str], diagram: Diagram, result: SimulationResult, *, taken: Sequence[str] = ()
 ) -> tuple[Path, ...]:
-    """Write what the To File blocks of a diagram keep into ``folder``, each file all or nothing.
+    """Write the files of the To File blocks of a diagram into ``folder``, each atomically.
 
-    Subfolders are made; nothing is written outside of the folder, also not through links. ``taken``: names in
-    it that are not to be replaced. Returns the paths. Raises ``DiagramError`` where two blocks ask for one
-    file and ``FormatError`` where one cannot be written or its path leads out of the folder.
+    Subfolders are created. Nothing is written outside the folder, also not through links. ``taken``: names in
+    the folder that must not be replaced. Returns the paths. Raises ``DiagramError`` if two blocks write the
+    same file, and ``FormatError`` if a file cannot be written or its path leaves the folder.
     """
     place = Path(folder)
     written: list[Path] = []

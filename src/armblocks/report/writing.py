@@ -26,12 +26,12 @@ from armblocks.simulation.result import SimulationResult
 
 FIGURE_FORMATS = ("svg", "png")
 MOST_SHEETS = 60
-"""How many subsystems the page draws; ``armblocks diagram --sheet`` draws any."""
+"""Maximum number of subsystems that the page draws; ``armblocks diagram --sheet`` draws any subsystem."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ReportFiles:
-    """Where everything of a report lies."""
+    """The paths of the files of a report."""
 
     folder: Path
     page: Path
@@ -50,11 +50,11 @@ def write_report(
 ) -> ReportFiles:
     """Write ``report.html``, ``diagram.svg``, ``figures/*``, ``data.*`` and the files of To File blocks.
 
-    All lie in the folder, which is made if absent. ``formats`` of the figures: svg, png. ``data``: csv,
-    parquet, npz, mat. By default svg and csv, with png where matplotlib is installed and parquet where
-    pyarrow is. Each file is there completely or not at all; the page comes last. Raises UnknownNameError for
-    another format, MissingLibraryError for one whose library is not installed, DiagramError where two blocks
-    ask for one file, and FormatError where the folder cannot be written.
+    The folder is created if absent. ``formats`` of the figures: svg, png. ``data``: csv, parquet, npz, mat.
+    The default is svg and csv, also png if matplotlib is installed and parquet if pyarrow is. Each file is
+    written atomically, the page as the last one. Raises UnknownNameError for another format,
+    MissingLibraryError for a format whose library is not installed, DiagramError if two blocks write the same
+    file, and FormatError if the folder cannot be written.
     """
     formats = usable_figure_formats() if formats is None else formats
     data = usable_data_formats() if data is None else data
@@ -63,7 +63,7 @@ def write_report(
         if name not in DATA_FORMATS:
             raise UnknownNameError("data format", name, DATA_FORMATS, where="write_report")
         check_format(Path(f"data.{name}"))
-    sink_files(diagram, REPORT_DATA)  # refused before anything is written
+    sink_files(diagram, REPORT_DATA)  # raises errors before anything is written
     place = Path(folder)
     make_folder(place / "figures")
     found = motions(diagram, result) if result.time.size > 1 else ()
@@ -99,12 +99,12 @@ def write_report(
 
 
 def usable_figure_formats() -> tuple[str, ...]:
-    """SVG, and PNG where matplotlib is installed."""
+    """SVG, and PNG if matplotlib is installed."""
     return FIGURE_FORMATS if installed("matplotlib") else ("svg",)
 
 
 def usable_data_formats() -> tuple[str, ...]:
-    """CSV, and Parquet where pyarrow is installed: the formats that a report has unasked."""
+    """CSV, and Parquet if pyarrow is installed: the default data formats of a report."""
     return ("csv", "parquet") if installed("pyarrow") else ("csv",)
 
 
@@ -138,14 +138,14 @@ def _figures(diagram: Diagram, result: SimulationResult, found: Sequence[Motion]
     figures += view_figures(diagram, result)
     taken: dict[str, int] = {}
     named: list[Figure] = []
-    for figure in figures:  # names of blocks that differ, but not as names of files
+    for figure in figures:  # different block names may give the same file name
         count = taken[figure.name] = taken.get(figure.name, 0) + 1
         named.append(figure if count == 1 else replace(figure, name=f"{figure.name}-{count}"))
     return named
 
 
 def _encoding(figure: Figure, kind: str) -> Callable[[], bytes]:
-    """What gives the bytes of a figure's file. Its slow part, if any, lets other threads run."""
+    """A function that returns the bytes of a figure's file. Slow encoders release the interpreter lock."""
     if kind == "svg":
         return svg_file(figure.picture, marks=figure.svg_marks).encode
     from armblocks.pictures.png import picture_pixels
@@ -155,9 +155,10 @@ def _encoding(figure: Figure, kind: str) -> Callable[[], bytes]:
 
 
 class _Writer:
-    """Encodes and writes files in a thread of its own, for compression and the disk leave Python to others.
+    """Encodes and writes files in a separate thread, because compression and file access release the
+    interpreter lock.
 
-    After the ``with`` block all files are written. It raises what kept one from being written.
+    After the ``with`` block all files are written. It raises the error of a file that could not be written.
     """
 
     def __init__(self) -> None:
@@ -165,7 +166,7 @@ class _Writer:
         self._files: list[Future[object]] = []
 
     def write(self, path: Path, encode: Callable[[], bytes]) -> None:
-        """Write what ``encode`` gives, soon."""
+        """Queue a file for writing; ``encode`` returns its bytes."""
         self._files.append(self._thread.submit(lambda: write_atomically(path, encode())))
 
     def __enter__(self) -> _Writer:
@@ -179,7 +180,7 @@ class _Writer:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder if absent. Raises ``FormatError`` where that cannot be."""
+    """Create a folder if absent. Raises ``FormatError`` if this fails."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

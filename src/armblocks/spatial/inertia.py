@@ -23,8 +23,10 @@ NO_INERTIA = Symmetric(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class RigidInertia(NamedTuple):
-    """``mass`` kg; ``first`` moment m c, kg m; ``second`` moment, the inertia matrix about the frame's
-    origin, kg m2: all in the axes of one frame. Inertias about one origin and in the same axes add up.
+    """The inertial parameters of a body in the axes of one frame.
+
+    ``mass``, kg; ``first`` moment m c, kg m; ``second`` moment, the inertia matrix about the frame's origin,
+    kg m2. Inertias in the same frame can be added.
     """
 
     mass: Scalar = 0.0
@@ -33,17 +35,17 @@ class RigidInertia(NamedTuple):
 
     @classmethod
     def about_centre(cls, mass: float, centre: Vector3, inertia: Matrix3) -> RigidInertia:
-        """From the inertia matrix about the centre of mass."""
+        """The parameters from the inertia matrix about the centre of mass."""
         (xx, xy, xz), (_, yy, yz), (_, _, zz) = inertia
         return cls.at_centre(mass, Symmetric(xx, yy, zz, xy, yz, xz)).shifted(centre)
 
     @classmethod
     def at_centre(cls, mass: Scalar, inertia: Symmetric) -> RigidInertia:
-        """A body whose centre of mass is the origin."""
+        """The parameters of a body whose centre of mass is the origin."""
         return cls(mass, ZERO, inertia)
 
     def plus(self, other: RigidInertia) -> RigidInertia:
-        """Both bodies as one."""
+        """The parameters of both bodies together."""
         return RigidInertia(
             self.mass + other.mass,
             add(self.first, other.first),
@@ -54,10 +56,10 @@ class RigidInertia(NamedTuple):
         """The same body in a frame with the same axes, in which this frame's origin is at ``p`` m.
 
         With ``x = y + p``: first ``h + m p``, second ``I + (2 p.h + m p.p) 1 - p h' - h p' - m p p'``
-        (Steiner's theorem with the centre of mass elsewhere than at either origin).
+        (parallel-axis theorem for two origins that are not the centre of mass).
         """
         mass, h, S = self
-        # k p with k = h + m p / 2 gathers the first-moment and the mass terms of the correction.
+        # k = h + m p / 2 combines the first-moment and the mass terms of the correction.
         k = add(h, scale(0.5 * mass, p))
         isotropic = 2.0 * dot(p, k)
         return RigidInertia(
@@ -74,7 +76,7 @@ class RigidInertia(NamedTuple):
         )
 
     def moved(self, T_ab: Transform) -> RigidInertia:
-        """A body known in frame b, in frame a."""
+        """The parameters in frame a of a body given in frame b."""
         R = T_ab.rotation
         rotated = RigidInertia(self.mass, rotate(R, self.first), rotate_symmetric(R, self.second))
         return rotated.shifted(T_ab.translation)

@@ -1,9 +1,9 @@
-"""Rotations by angles, quaternions and axes over symbols, both ways.
+"""Conversions between rotation matrices and angles, quaternions or axes, for symbols.
 
-A rotation R = R_ab (3, 3) turns coordinates of frame b into those of frame a. Quaternions are (s, x, y, z),
-the scalar first, as in the toolbox. Singular cases are described below. Otherwise the inverse conversions are
-exact to rounding, also close to singular orientations, because the last angle is computed after removing the
-others.
+A rotation R = R_ab (3, 3) transforms coordinates of frame b to those of frame a. Quaternions are (s, x, y,
+z), the scalar first, as in the toolbox. Singular cases are described below. Otherwise the inverse conversions
+are exact to rounding, also close to singular orientations, because the last angle is computed after removing
+the others.
 
 Sources: Siciliano et al., Robotics, 2009, 2.4 to 2.6; Shepperd, Quaternion from rotation matrix, J. Guidance
 and Control 1(3), 1978; Corke, Robotics Toolbox, releases 7 to 10 (rpy2tr, eul2tr, Quaternion).
@@ -52,7 +52,7 @@ def from_rpy(roll: SX, pitch: SX, yaw: SX, convention: str) -> SX:
 
 
 def to_rpy(R: SX, convention: str) -> tuple[SX, SX, SX]:
-    """Roll, pitch, yaw (rad) with abs(pitch) <= pi/2; where that is reached, roll is 0 as in the toolbox."""
+    """Roll, pitch, yaw (rad) with abs(pitch) <= pi/2; at abs(pitch) = pi/2 roll is 0, as in the toolbox."""
     order, roll_last = RPY_CONVENTIONS[convention]
     if not roll_last:  # the transpose has the order and the signs of all angles reversed
         third, second, first = _three_angles(R.T, order[::-1])
@@ -68,7 +68,7 @@ def from_euler(phi: SX, theta: SX, psi: SX) -> SX:
 
 
 def to_euler(R: SX) -> tuple[SX, SX, SX]:
-    """phi, theta, psi (rad) with 0 <= theta <= pi; phi is 0 where theta is 0 or pi, as in the toolbox."""
+    """phi, theta, psi (rad) with 0 <= theta <= pi; phi is 0 if theta is 0 or pi, as in the toolbox."""
     singular = hypot(R[0, 2], R[1, 2]) < SINGULAR
     phi = if_else(singular, 0.0, atan2(R[1, 2], R[0, 2]))
     c, s = cos(phi), sin(phi)
@@ -78,7 +78,7 @@ def to_euler(R: SX) -> tuple[SX, SX, SX]:
 
 
 def from_quaternion(quaternion: SX) -> SX:
-    """The rotation of a quaternion (4, 1), whose length does not matter; not a number for zero."""
+    """The rotation of a quaternion (4, 1) of any length; NaN for zero."""
     s, x, y, z = (quaternion[k] for k in range(4))
     twice = 2.0 / dot(quaternion, quaternion)
     rows = (
@@ -90,9 +90,9 @@ def from_quaternion(quaternion: SX) -> SX:
 
 
 def to_quaternion(R: SX) -> SX:
-    """The unit quaternion (4, 1) with s >= 0: Shepperd's method, which divides by its largest part.
+    """The unit quaternion (4, 1) with s >= 0, by Shepperd's method, which divides by the largest element.
 
-    Of the two quaternions of a half turn (s = 0) one is taken; a rotation that passes there makes it jump.
+    A half turn (s = 0) has two such quaternions; the quaternion jumps when the rotation passes a half turn.
     """
     trace = R[0, 0] + R[1, 1] + R[2, 2]
     antisymmetric = (R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1])
@@ -110,13 +110,13 @@ def to_quaternion(R: SX) -> SX:
 
 
 def from_angle_axis(angle: SX, axis: SX) -> SX:
-    """The turn by ``angle`` rad about ``axis`` (3, 1) of any length but zero: Rodrigues."""
+    """The rotation by ``angle`` rad about ``axis`` (3, 1) of any nonzero length: Rodrigues' formula."""
     half = angle / 2.0
     return from_quaternion(vertcat(cos(half), sin(half) * axis / sqrt(dot(axis, axis))))
 
 
 def to_angle_axis(R: SX) -> tuple[SX, SX]:
-    """The angle, 0 to pi rad, and the unit axis (3, 1); for no turn at all the axis is (0, 0, 0)."""
+    """The angle, 0 to pi rad, and the unit axis (3, 1); for the identity the axis is (0, 0, 0)."""
     quaternion = to_quaternion(R)
     vector = quaternion[1:]
     length = sqrt(dot(vector, vector))
@@ -125,9 +125,11 @@ def to_angle_axis(R: SX) -> tuple[SX, SX]:
 
 
 def part_of_turn(quaternion: SX, s: SX) -> SX:
-    """The quaternion (4, 1) of ``s`` times the turn of a unit quaternion, about the same axis.
+    """The quaternion (4, 1) of the rotation by ``s`` times the angle of a unit quaternion, about the same
+    axis.
 
-    Smooth also where there is no turn and so no axis: its vector grows by ``s`` there.
+    The result is smooth also at the identity, which has no axis: the vector part is multiplied by ``s``
+    there.
     """
     vector = quaternion[1:]
     square = dot(vector, vector)
@@ -159,7 +161,7 @@ def matrix(rows: Sequence[Sequence[SX | float]]) -> SX:
 
 
 def _three_angles(R: SX, order: str) -> tuple[SX, SX, SX]:
-    """a, b, c with R = Ri(a) Rj(b) Rk(c) for three different axes; c is 0 where cos(b) vanishes."""
+    """a, b, c with R = Ri(a) Rj(b) Rk(c) for three different axes; c is 0 if cos(b) is 0."""
     i, j, k = ("xyz".index(axis) for axis in order)
     e = 1.0 if (j - i) % 3 == 1 else -1.0
     cosine = hypot(R[i, i], R[i, j])

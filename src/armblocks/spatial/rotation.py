@@ -1,7 +1,7 @@
-"""Three-vectors and rotation matrices as plain tuples of floats, so that descriptions are values.
+"""Three-vectors and rotation matrices as tuples of floats, so that descriptions can be compared and hashed.
 
-A quarter turn is exact here: ``cos(pi/2)`` is 0 and not 6e-17, so that an arm whose axes stand at right
-angles has true zeros in its matrices and the traced equations lose every term that they multiply.
+Quarter turns are exact: ``cos(pi/2)`` is 0 and not 6e-17. The matrices of an arm with perpendicular axes then
+have exact zeros, and the traced equations omit the terms that these multiply.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ Matrix3: TypeAlias = tuple[Vector3, Vector3, Vector3]
 IDENTITY3: Matrix3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 SINGULAR = 2.2e-15
-"""Below this cosine of the middle of three angles (ten roundings) only the sum or difference of the others is
-known."""
+"""If the cosine of the middle one of three angles is below this value (ten roundings), only the sum or the
+difference of the other two is determined."""
 
 
 def vector3(value: ArrayLike, *, where: str = "") -> Vector3:
@@ -64,19 +64,22 @@ def _numbers(value: ArrayLike, where: str) -> NDArray[np.float64]:
 
 
 def cos_exact(angle: float) -> float:
-    """cos of an angle in rad; exactly 1, 0 or -1 where the angle is a quarter turn to rounding."""
+    """cos of an angle in rad; exactly 1, 0 or -1 if the angle is, up to rounding, a multiple of a quarter
+    turn."""
     quarter = _quarter_turn(angle)
     return cos(angle) if quarter is None else (1.0, 0.0, -1.0, 0.0)[quarter]
 
 
 def sin_exact(angle: float) -> float:
-    """sin of an angle in rad; exactly 1, 0 or -1 where the angle is a quarter turn to rounding."""
+    """sin of an angle in rad; exactly 1, 0 or -1 if the angle is, up to rounding, a multiple of a quarter
+    turn."""
     quarter = _quarter_turn(angle)
     return sin(angle) if quarter is None else (0.0, 1.0, 0.0, -1.0)[quarter]
 
 
 def _quarter_turn(angle: float) -> int | None:
-    """0, 1, 2, 3 where ``angle`` is that many quarter turns (modulo four) within four roundings."""
+    """The number of quarter turns (modulo four) of ``angle``, within four roundings; None for other
+    angles."""
     if not math.isfinite(angle):
         return None
     turns = round(angle / (math.pi / 2))
@@ -103,7 +106,8 @@ def rotation_z(angle: float) -> Matrix3:
 
 
 def rotation_about(axis: Vector3, angle: float) -> Matrix3:
-    """Rotation by ``angle`` rad about the unit vector ``axis``: Rodrigues, ``c I + s [k] + (1 - c) k k'``."""
+    """Rotation by ``angle`` rad about the unit vector ``axis``: ``c I + s [k] + (1 - c) k k'``
+    (Rodrigues)."""
     x, y, z = axis
     c, s = cos_exact(angle), sin_exact(angle)
     v = 1.0 - c

@@ -23,16 +23,16 @@ from armblocks.spatial.rotation import (
 )
 
 ORTHONORMALITY = 1e-8
-"""How far ``R' R`` may be from the identity: eight printed digits are taken, four are not."""
+"""Maximum deviation of ``R' R`` from the identity: matrices with eight printed digits pass, with four do
+not."""
 
 
 @dataclass(frozen=True, init=False)
 class Transform:
     """The pose of frame b in frame a: ``p_a = rotation p_b + translation`` (m).
 
-    A value: tuples inside, equal and hashable by content. ``T_ac = T_ab @ T_bc``. Raises InputError where
-    ``rotation`` is not a rotation or is a reflection. NaN passes here, so that the robot that holds the
-    transform can name the link.
+    A value, equal and hashable by its content. ``T_ac = T_ab @ T_bc``. Raises InputError if ``rotation`` is
+    not a rotation matrix. NaN is accepted, because the check of the robot can name the link.
     """
 
     rotation: Matrix3
@@ -59,7 +59,7 @@ class Transform:
 
     @classmethod
     def from_matrix(cls, matrix: ArrayLike) -> Transform:
-        """From a homogeneous (4, 4) matrix; raises InputError where its last row is not 0 0 0 1."""
+        """From a homogeneous (4, 4) matrix; raises InputError if its last row is not 0 0 0 1."""
         T = np.asarray(matrix, dtype=np.float64)
         if T.shape != (4, 4):
             raise InputError(
@@ -97,14 +97,14 @@ class Transform:
 
     @property
     def rpy(self) -> Vector3:
-        """Roll, pitch, yaw (rad) with R = Rz(yaw) Ry(pitch) Rx(roll); roll is 0 where abs(pitch) is pi/2.
+        """Roll, pitch, yaw (rad) with R = Rz(yaw) Ry(pitch) Rx(roll); roll is 0 if abs(pitch) is pi/2.
 
-        For numbers what :func:`armblocks.spatial.orientation.to_rpy` is for symbols, convention ``zyx``.
+        For symbols there is :func:`armblocks.spatial.orientation.to_rpy` with the convention ``zyx``.
         """
         (_, xy, xz), (_, yy, yz), (zx, zy, zz) = self.rotation
         cosine = hypot(zz, zy)
         roll = 0.0 if cosine < SINGULAR else atan2(zy, zz)
-        # The y axis once the roll is undone: it does not depend on the pitch.
+        # The y axis without the roll does not depend on the pitch.
         c, s = cos(roll), sin(roll)
         return roll, atan2(-zx, cosine), atan2(s * xz - c * xy, c * yy - s * yz)
 
@@ -117,7 +117,7 @@ class Transform:
         """Composition: ``T_ac = T_ab @ T_bc``."""
         R_ab, R_bc = self.rotation, other.rotation
         columns = tuple(zip(*R_bc))
-        # Sums of three products in a fixed order: products of quarter turns stay exact.
+        # Sums of three products in a fixed order, so that products of quarter turns are exact.
         rotation = tuple(tuple(_dot(row, column) for column in columns) for row in R_ab)
         return Transform(rotation=rotation, translation=self.apply(other.translation))
 

@@ -1,7 +1,7 @@
 """Three-vectors and 3x3 matrices of scalars that may be numbers or symbols.
 
-The algorithms are written once over these. A term that a known zero multiplies vanishes while it is traced
-(CasADi folds ``0 * x``, ``1 * x`` and ``0 + x``), so that a sparse arm gives short equations.
+The algorithms use these types for both. Terms with a known zero factor are omitted during tracing (CasADi
+folds ``0 * x``, ``1 * x`` and ``0 + x``), so arms with many zeros in their tables have short equations.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ def add_symmetric(A: Symmetric, B: Symmetric) -> Symmetric:
 
 
 class Turn(NamedTuple):
-    """A rotation about z by its cosine and sine: four products a vector instead of nine."""
+    """A rotation about z by its cosine and sine: four products for a vector instead of nine."""
 
     c: Scalar
     s: Scalar
@@ -117,7 +117,7 @@ class Turn(NamedTuple):
         return self.c * a[0] + self.s * a[1], self.c * a[1] - self.s * a[0], a[2]
 
     def rotate_symmetric(self, S: Symmetric) -> Symmetric:
-        """Rz S Rz', with six products for the block that turns by twice the angle."""
+        """Rz S Rz', with six products for the 2x2 block, which rotates by twice the angle."""
         c, s = self
         difference = S.yy - S.xx
         twice = S.xy + S.xy

@@ -1,4 +1,4 @@
-"""Laws of motion in joint space, for numbers and symbols alike."""
+"""Joint trajectories, for numbers and for symbols."""
 
 from armblocks.trajectories.quintic import Motion, Quintic
 

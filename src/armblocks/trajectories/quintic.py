@@ -1,4 +1,5 @@
-"""The toolbox's joint trajectory ``jtraj``: a quintic with given rates and no acceleration at both ends."""
+"""The toolbox's joint trajectory ``jtraj``: a quintic with given speeds and zero acceleration at both
+ends."""
 
 from __future__ import annotations
 
@@ -10,11 +11,11 @@ from casadi import SX, fmax, fmin, if_else
 from numpy.typing import NDArray
 
 Quantity = TypeVar("Quantity", SX, NDArray[np.float64])
-"""Symbols or numbers: the same equations serve both."""
+"""Symbols or numbers, for which the equations are the same."""
 
 
 class Motion(NamedTuple, Generic[Quantity]):
-    """Positions, rates and accelerations at one instant, or at many."""
+    """Positions, speeds and accelerations at one time or at several."""
 
     q: Quantity
     qd: Quantity
@@ -23,20 +24,21 @@ class Motion(NamedTuple, Generic[Quantity]):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Quintic(Generic[Quantity]):
-    """From ``q0`` at t = 0 to ``qf`` at t = ``tmax``, with rates ``qd0`` and ``qd1`` there (None: at rest).
+    """A motion from ``q0`` at t = 0 to ``qf`` at t = ``tmax`` with the speeds ``qd0`` and ``qd1`` (None: at
+    rest).
 
     With ``s = t / tmax`` the motion is ``q0 + (qf - q0) h(s) + qd0 tmax f(s) + qd1 tmax g(s)``,
 
     ``h = s^3 (10 - 15 s + 6 s^2)``,  ``f = s (1 - s)^3 (1 + 3 s)``,  ``g = -s^3 (1 - s) (4 - 3 s)``.
 
-    These are the toolbox's coefficients, in a form whose rates at both ends are exact: the joint is at rest
-    there to the last bit, and Coulomb friction does not see a speed of 1e-17.
+    These are the toolbox's coefficients, in a form with exact speeds at both ends. A joint at rest has the
+    speed 0 and not 1e-17, which would cause Coulomb friction.
 
-    Before 0 and after ``tmax`` the joints stand still at ``q0`` and ``qf``: rates and accelerations are zero
-    (at 0 and ``tmax`` themselves the rates are ``qd0`` and ``qd1``).
+    Before 0 and after ``tmax`` the joints are at rest at ``q0`` and ``qf``: speeds and accelerations are
+    zero. At the times 0 and ``tmax`` the speeds are ``qd0`` and ``qd1``.
 
-    Symbols: ``q0, qf, qd0, qd1`` columns (n, 1), ``tmax`` a scalar. Numbers: arrays (n,) and a scalar array.
-    ``tmax`` must be above zero, which is checked by whoever reads it from a person.
+    Symbols: ``q0, qf, qd0, qd1`` are columns (n, 1), ``tmax`` is a scalar. Numbers: arrays (n,) and a scalar
+    array. ``tmax`` must be above zero; callers check user input.
     """
 
     q0: Quantity
@@ -48,8 +50,8 @@ class Quintic(Generic[Quantity]):
     def at(self, t: Quantity) -> Motion[Quantity]:
         """The motion at time ``t`` (s).
 
-        Symbols: ``t`` a scalar, columns (n, 1) come back. Numbers: ``t`` of shape () or (N,), arrays of shape
-        (n,) or (N, n) come back.
+        Symbols: ``t`` is a scalar, the results are columns (n, 1). Numbers: ``t`` has shape () or (N,), the
+        results have shape (n,) or (N, n).
         """
         T = self.tmax
         fraction = _as_column(t) / T
@@ -75,12 +77,12 @@ def _as_column(t: Quantity) -> Quantity:
 
 
 def _limited(s: SX | NDArray[np.float64]) -> Any:
-    """``s`` held between 0 and 1, of the same kind."""
+    """``s`` limited to 0 … 1, of the same type."""
     return fmin(fmax(s, 0.0), 1.0) if isinstance(s, SX) else np.clip(s, 0.0, 1.0)
 
 
 def _while_moving(s: SX | NDArray[np.float64], value: Any) -> Any:
-    """``value`` for s in [0, 1] and 0 outside, of the same kind."""
+    """``value`` for s in [0, 1] and 0 outside, of the same type."""
     if isinstance(s, SX):
         return if_else(s < 0.0, 0.0, if_else(s > 1.0, 0.0, value))
     return np.where((s < 0.0) | (s > 1.0), 0.0, value)

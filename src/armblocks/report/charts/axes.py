@@ -1,4 +1,4 @@
-"""A framed field with a grid, numbers and names of axes: what the charts of linear systems are drawn in."""
+"""A framed field with a grid, numbers and names of axes, for the charts of linear systems."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from armblocks.report.charts.scale import LogScale, Scale
 _Array = NDArray[np.float64]
 
 LEFT, RIGHT, TOP, BOTTOM = 64.0, 20.0, 28.0, 46.0
-"""Room around the field, px."""
+"""Margins around the field, px."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Field:
-    """The inside of a chart: two scales, and the places of their lines and numbers."""
+    """The inside of a chart: two scales, and the positions of their grid lines and numbers."""
 
     across: Scale | LogScale
     up: Scale
@@ -37,7 +37,8 @@ class Field:
         return self.across.start, self.up.end, self.across.end, self.up.start
 
     def points(self, x: _Array, y: _Array) -> _Array:
-        """Places (N, 2) in px; what is far outside is brought near: no renderer likes huge numbers."""
+        """Positions (N, 2) in px. Points far outside are moved closer, because renderers fail at huge
+        numbers."""
         left, top, right, bottom = self.box
         width, height = right - left, bottom - top
         px = np.clip(self.across.array(x), left - 20 * width, right + 20 * width)
@@ -45,7 +46,7 @@ class Field:
         return np.column_stack([px, py])
 
     def frame(self, *, x_label: str, y_label: str, numbers: bool = True) -> list[Mark]:
-        """Grid, frame, numbers and names; ``numbers`` false leaves those of the x axis to another chart."""
+        """Draw grid, frame, numbers and names; with ``numbers`` false those of the x axis are omitted."""
         left, top, right, bottom = self.box
         marks: list[Mark] = []
         for value in (*self.x_finer, *self.x_ticks):
@@ -71,7 +72,7 @@ class Field:
 def straight_field(
     x: tuple[float, float], y: tuple[float, float], box: tuple[float, float, float, float], *, count: int = 6
 ) -> Field:
-    """A field with straight axes over ranges; ``box`` left, top, right, bottom in px."""
+    """A field with linear axes for two ranges; ``box``: left, top, right, bottom in px."""
     left, top, right, bottom = box
     return Field(
         across=Scale(*x, left, right),
@@ -100,7 +101,7 @@ def log_field(
 def equal_box(
     x: tuple[float, float], y: tuple[float, float], box: tuple[float, float, float, float]
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Ranges widened about their middles so that one unit is as long both ways."""
+    """Ranges widened about their middles so that a unit has the same length on both axes."""
     left, top, right, bottom = box
     per_px = max((x[1] - x[0]) / (right - left), (y[1] - y[0]) / (bottom - top))
 
@@ -112,7 +113,7 @@ def equal_box(
 
 
 def within(points: _Array, box: tuple[float, float, float, float]) -> _Array:
-    """A line cut at the edges of a box: pieces outside become gaps, edges are met exactly (Liang-Barsky)."""
+    """A line clipped exactly at the edges of a box (Liang-Barsky); pieces outside become gaps."""
     left, top, right, bottom = box
     kept: list[tuple[float, float]] = []
     gap = (np.nan, np.nan)
@@ -137,7 +138,7 @@ def within(points: _Array, box: tuple[float, float, float, float]) -> _Array:
 
 
 def legend(names: Sequence[str], x: float, y: float, room: float) -> tuple[list[Mark], float]:
-    """A row of names with their lines from (x, y), wrapped within ``room``, and how high it is (px)."""
+    """A legend row from (x, y), wrapped to the width ``room``; returns its height (px)."""
     marks: list[Mark] = []
     at, line = x, y
     for index, name in enumerate(names):
@@ -152,7 +153,7 @@ def legend(names: Sequence[str], x: float, y: float, room: float) -> tuple[list[
 
 
 def headed(picture: Picture, names: Sequence[str]) -> Picture:
-    """The picture with a legend above it where there is more than one line."""
+    """The picture, with a legend above it if there is more than one line."""
     if len(names) < 2:
         return picture
     marks, height = legend(names, LEFT, 14.0, picture.width - LEFT - RIGHT)

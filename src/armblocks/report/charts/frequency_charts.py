@@ -41,11 +41,11 @@ _Complex = NDArray[np.complex128]
 _PANEL = 210.0
 _MOST_CHANNELS = 8
 _FLOOR = 1e-12
-"""Gains below this beside the largest are shown as this: a zero on the axis has no decibels."""
+"""Lower limit of displayed gains relative to the largest, because a gain of 0 has no value in decibels."""
 
 
 def channels(system: LinearSystem) -> list[tuple[int, int, str]]:
-    """Row, column and name of what is drawn: every output from every input, the first ones."""
+    """Row, column and name of the displayed channels: the first ones of all pairs of output and input."""
     several_in, several_out = len(system.inputs) > 1, len(system.outputs) > 1
     found: list[tuple[int, int, str]] = []
     for row, output in enumerate(system.outputs):
@@ -58,9 +58,9 @@ def channels(system: LinearSystem) -> list[tuple[int, int, str]]:
 def bode_picture(
     system: LinearSystem, *, margins: bool = False, hertz: bool = False, width: float = FIGURE_WIDTH
 ) -> Picture:
-    """Gain in dB and phase in degrees over the frequency; ``margins``: with those of the loop ``1 + L``.
+    """Gain in dB and phase in degrees over frequency; ``margins``: with the margins of the loop ``1 + L``.
 
-    The phase is continuous; for a sampled system up to the Nyquist frequency, which is marked.
+    The phase is continuous. For a sampled system the curves end at the Nyquist frequency, which is marked.
     """
     low, high = frequency_range(system)
     found = shown_margins(system) if margins else None
@@ -102,7 +102,7 @@ def bode_picture(
 
 
 def margins_text(found: Margins) -> str:
-    """Both margins in one line."""
+    """Both margins as one line of text."""
     parts: list[str] = []
     if math.isfinite(found.gain):
         parts.append(f"Gain margin {table_number(found.gain_decibels, 3)} dB")
@@ -132,7 +132,7 @@ def _phase_range(phase: _Array, shown: list[tuple[int, int, str]]) -> tuple[floa
 def _margin_marks(
     found: Margins, above: Field, below: Field, unit: float, grid: _Array, phase: _Array
 ) -> list[Mark]:
-    """Strokes from the curves to 0 dB and to the nearest odd multiple of 180 degrees, with their numbers."""
+    """Draw the margins: lines from the curves to 0 dB and to the nearest odd multiple of 180 degrees."""
     marks: list[Mark] = []
     left, _, right, _ = above.box
     if 0.0 < found.gain_frequency < math.inf:
@@ -146,7 +146,7 @@ def _margin_marks(
         ends = (below.up(value - found.phase), below.up(value))
         word = f"phase margin {table_number(found.phase, 3)} deg"
         level = below.up(value - found.phase)
-        # The curve falls: what is below it to the left is free.
+        # The curve falls, so the area below it on the left is free.
         base = level + (15 if found.phase > 0.0 else -7)
         marks += _margin_stroke(x, ends, base, word, (left, right), to_the_left=True)
         marks.append(Polyline([(left, level), (right, level)], Tone.ACCENT, 1.0, (5.0, 4.0)))
@@ -191,8 +191,8 @@ def _margin_stroke(
 def nyquist_picture(system: LinearSystem, *, width: float = 620.0) -> Picture:
     """The response in the complex plane, for positive frequencies and mirrored (dashed), with -1 marked.
 
-    Poles on the edge of stability are passed at a distance, on the outside; what would be a half circle at
-    infinity leaves the picture.
+    The path of frequencies passes poles on the stability boundary at a distance, on their right. The
+    corresponding half circle at infinity is clipped.
     """
     height = width * 0.86
     box = (LEFT, TOP, width - RIGHT, height - BOTTOM)
@@ -230,7 +230,7 @@ def nyquist_picture(system: LinearSystem, *, width: float = 620.0) -> Picture:
 
 
 def _nyquist_line(system: LinearSystem, row: int, column: int) -> _Complex:
-    """The response along the edge of stability, with detours to the right of the poles upon it."""
+    """The response along the stability boundary, with detours to the right of the poles on it."""
     part = system.select([system.outputs[row]], [system.inputs[column]]).minimal()
     low, high = frequency_range(part)
     high = high if part.is_discrete else 100.0 * high
@@ -253,7 +253,8 @@ def _nyquist_line(system: LinearSystem, row: int, column: int) -> _Complex:
 
 
 def _plane_range(values: _Complex) -> tuple[tuple[float, float], tuple[float, float]]:
-    """The part of the plane to show: all of a bounded curve, else what is around -1 and the bounded part."""
+    """The displayed part of the plane: a bounded curve completely, else the bounded part and the area around
+    -1."""
     size = np.abs(values)
     typical = float(np.quantile(size[np.isfinite(size)], 0.5))
     limit = max(8.0, 3.0 * typical) if float(size.max()) > max(20.0, 12.0 * typical) else math.inf
@@ -271,7 +272,7 @@ def _cross(x: float, y: float, tone: Tone, size: float = 4.5) -> list[Mark]:
 
 
 def _heads(points: _Array, box: tuple[float, float, float, float], tone: Tone) -> list[Mark]:
-    """Arrow heads in the direction of rising frequency, on what is inside the box."""
+    """Draw arrow heads in the direction of increasing frequency, on the part of the curve inside the box."""
     left, top, right, bottom = box
     x, y = points[:, 0], points[:, 1]
     inside = (x > left) & (x < right) & (y > top) & (y < bottom)

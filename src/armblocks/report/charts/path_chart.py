@@ -30,9 +30,10 @@ def path_chart(
     span: float | None = None,
     index: int = 0,
 ) -> Picture:
-    """One quantity over another, with start, end and direction; ``equal``: one unit is as long both ways.
+    """One quantity over another, with start, end and direction. ``equal``: a unit has the same length on both
+    axes.
 
-    ``span`` makes the longer side of the data at least so long, for charts that should share one scale.
+    ``span`` is the minimum length of the longer side of the data range, for charts that share one scale.
     """
     picture = Picture(width=width, height=height, title=f"{y_label} over {x_label}")
     room_left, room_right, room_top, room_bottom = 58.0, 14.0, 26.0, 44.0
@@ -68,7 +69,7 @@ def path_chart(
 
 
 def side_by_side(pictures: Sequence[Picture], *, title: str, description: str, gap: float = 12.0) -> Picture:
-    """Pictures of equal height in one row."""
+    """One picture with several pictures of equal height in a row."""
     width = sum(p.width for p in pictures) + gap * (len(pictures) - 1)
     whole = Picture(width=width, height=max(p.height for p in pictures), title=title, description=description)
     left = 0.0
@@ -119,7 +120,8 @@ def _path_with_direction(points: _Array, tone: Tone, frame: _Frame) -> list[Mark
 
 
 def _beside(points: _Array, x: float, y: float, word: str, frame: _Frame) -> tuple[Mark, Mark]:
-    """The word next to a point within the frame, where it keeps farthest from the line, on a pale ground."""
+    """Draw a word next to a point, inside the frame and at the greatest distance from the line, on a pale
+    ground."""
     width = text_width(word, SMALL_SIZE)
     places = [
         (x - width / 2, y - 10),
@@ -143,7 +145,7 @@ def _beside(points: _Array, x: float, y: float, word: str, frame: _Frame) -> tup
         dy = np.maximum(np.maximum(base - SMALL_SIZE - points[:, 1], points[:, 1] - base), 0.0)
         return float(np.nanmin(np.hypot(dx, dy)))
 
-    # Ahead of the others stands above; a clearance beyond a few px makes no difference.
+    # The position above is preferred; a clearance of more than a few px makes no difference.
     left, base = max(places, key=lambda place: (inside(place), min(clearance(place), 7.0)))
     ground = Rectangle(
         left - 2, base - SMALL_SIZE + 1, width + 4, SMALL_SIZE + 2, 2, fill=Tone.SURFACE, opacity=0.8

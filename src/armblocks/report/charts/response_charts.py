@@ -1,4 +1,4 @@
-"""Step and impulse responses of linear systems, with what they are judged by."""
+"""Step and impulse responses of linear systems, with their characteristics."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _HEIGHT = 300.0
 def step_picture(
     system: LinearSystem, stop_time: float | None = None, *, width: float = FIGURE_WIDTH
 ) -> Picture:
-    """Outputs after unit steps of the inputs; of a single one with rise, settling, overshoot, final value."""
+    """Outputs after unit steps of the inputs; a single response has its characteristics marked."""
     response = system.step_response(stop_time)
     picture, field = _response_picture(response, "Step response", width)
     if system.is_siso:
@@ -44,7 +44,7 @@ def impulse_picture(
 
 
 def measures_text(measures: StepMeasures) -> str:
-    """In one line: what there is of rise and settling time, overshoot and final value."""
+    """Rise time, settling time, overshoot and final value, as far as defined, as one line of text."""
     parts = [
         f"{word} {table_number(value, 3)}{unit}"
         for word, value, unit in (
@@ -83,7 +83,7 @@ def _response_picture(response: TimeResponse[LinearSystem], what: str, width: fl
     for index, (row, column, _) in enumerate(shown):
         x, y = time, response.values[:, row, column]
         if system.is_discrete:
-            # Held until the next sample.
+            # The value is held until the next sample.
             x, y = np.repeat(x, 2)[1:], np.repeat(y, 2)[:-1]
         points = within(field.points(x, y), box)
         picture.add(Polyline(points, trace_tone(index), 1.8, trace_dash(index)))

@@ -23,7 +23,7 @@ _DAMPINGS = (0.2, 0.4, 0.6, 0.8)
 
 
 def pole_zero_picture(system: LinearSystem, *, width: float = 560.0) -> Picture:
-    """Poles as crosses, zeros as rings, over lines of equal damping and equal frequency."""
+    """Poles as crosses and zeros as rings, with lines of constant damping and constant frequency."""
     poles, zeros = shown_poles(system), shown_zeros(system)
     field, box = _plane(np.concatenate([poles, zeros]), system, width)
     picture = _framed(system, field, box, width, "Poles and zeros")
@@ -33,7 +33,8 @@ def pole_zero_picture(system: LinearSystem, *, width: float = 560.0) -> Picture:
 
 
 def root_locus_picture(system: LinearSystem, *, gains: _Array | None = None, width: float = 620.0) -> Picture:
-    """The poles of the loop ``1 + gain L`` from gain 0 on, one colour a branch; arrows to higher gains."""
+    """The poles of the loop ``1 + gain L`` from gain 0 on; each branch has a colour and an arrow to higher
+    gains."""
     locus = root_locus(system, gains)
     loop, poles = locus.system, locus.roots[0]
     reach = extent(loop, locus.zeros)
@@ -86,7 +87,7 @@ def _framed(
 
 
 def _edge(system: LinearSystem, field: Field, box: tuple[float, float, float, float]) -> list[Mark]:
-    """The edge of stability: the imaginary axis, or the unit circle."""
+    """Draw the stability boundary: the imaginary axis, or the unit circle."""
     if system.is_discrete:
         turn = np.linspace(0.0, 2.0 * math.pi, 361, dtype=np.float64)
         return [Polyline(within(field.points(np.cos(turn), np.sin(turn)), box), Tone.MUTED, 1.2)]
@@ -95,11 +96,11 @@ def _edge(system: LinearSystem, field: Field, box: tuple[float, float, float, fl
 
 
 def _damping_grid(system: LinearSystem, field: Field, box: tuple[float, float, float, float]) -> list[Mark]:
-    """Dotted lines of equal damping ratio with their numbers where they leave the picture."""
+    """Draw dotted lines of constant damping ratio, with their numbers at the edge of the figure."""
     marks: list[Mark] = []
     for damping in _DAMPINGS:
         if system.is_discrete:
-            # s dt from 0 to where the frequency is that of Nyquist.
+            # s dt from 0 to the Nyquist frequency.
             turn = np.linspace(0.0, math.pi, 121)
             line: _Complex = np.exp(turn * complex(-damping / math.sqrt(1.0 - damping**2), 1.0))
         else:
@@ -133,7 +134,7 @@ def _roots(field: Field, poles: _Complex, zeros: _Complex) -> list[Mark]:
 
 
 def _head(points: _Array, box: tuple[float, float, float, float], branch: int) -> list[Mark]:
-    """An arrow half way along what is seen of a branch."""
+    """Draw an arrow in the middle of the visible part of a branch."""
     left, top, right, bottom = box
     x, y = points[:, 0], points[:, 1]
     inside = (x > left) & (x < right) & (y > top) & (y < bottom)
@@ -160,7 +161,7 @@ def _crossings(
     field: Field,
     box: tuple[float, float, float, float],
 ) -> list[Mark]:
-    """Where branches cross the edge of stability, with the gain."""
+    """Mark the points at which branches cross the stability boundary, with the gain."""
     beyond = np.abs(roots) - 1.0 if loop.is_discrete else roots.real
     marks: list[Mark] = []
     named: list[tuple[float, float]] = []

@@ -1,4 +1,4 @@
-"""Straight maps from numbers to px."""
+"""Linear and logarithmic maps from numbers to px."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Scale:
-    """Straight map from a range of numbers to a range of px."""
+    """Linear map from a range of numbers to a range of px."""
 
     low: float
     high: float
@@ -56,12 +56,13 @@ class LogScale:
 
 
 def padded(values: _Array, share: float) -> tuple[float, float]:
-    """The range of the finite values, widened by ``share`` of itself at both ends; never empty."""
+    """The range of the finite values, extended by the fraction ``share`` of its length at both ends; never
+    empty."""
     finite = values[np.isfinite(values)]
     if len(finite) == 0:
         return -1.0, 1.0
     low, high = float(finite.min()), float(finite.max())
-    # Rounding noise about a constant is no signal.
+    # Rounding noise around a constant is not magnified.
     if high - low <= 1e-9 * max(abs(low), abs(high)) or high == low:
         half = max(abs(low), abs(high)) * 0.5 or 1.0
         return low - half, high + half

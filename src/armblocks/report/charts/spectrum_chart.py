@@ -1,4 +1,4 @@
-"""Spectra of signals: amplitudes or power densities over the frequency in Hz."""
+"""Spectra of signals: amplitudes or power densities over frequency in Hz."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _Array = NDArray[np.float64]
 
 _PANEL = 230.0
 _DEEPEST = 140.0
-"""dB below the highest line that are shown: further down is the rounding of the numbers."""
+"""Displayed range below the highest line, dB. Lower values are rounding errors."""
 
 
 def spectrum_chart(
@@ -29,9 +29,9 @@ def spectrum_chart(
     logarithmic: bool = False,
     width: float = FIGURE_WIDTH,
 ) -> Picture:
-    """One line for each (label, unit, spectrum of one signal), named in a legend where there are several.
+    """One line for each (label, unit, spectrum of one signal), with a legend if there are several.
 
-    With ``decibels`` 0 dB is an amplitude of 1, or a density of 1, in the signal's own SI unit.
+    With ``decibels`` 0 dB is an amplitude of 1, or a density of 1, in the signal's SI unit.
     """
     units = {unit for _, unit, _ in spectra}
     density = spectra[0][2].quantity == "power density"

@@ -1,4 +1,4 @@
-"""Quantities over time, in panels under one another over one time axis."""
+"""Quantities over time, in panels one below the other with a common time axis."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ _LABEL_ROOM = 132.0
 _HEAD = 26.0
 _GAP = 18.0
 _WITHIN_REACH = 0.6
-"""A limit is drawn where the signal comes at least this near to it (share of the limit)."""
+"""A limit is drawn if the signal comes closer to it than this fraction of the limit."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Trace:
-    """One line: ``values`` (N,) in the panel's unit, ``index`` of its colour, ``limits`` to stay in."""
+    """One line: ``values`` (N,) in the panel's unit, ``index`` of its colour, ``limits`` of the quantity."""
 
     label: str
     values: _Array
@@ -38,7 +38,7 @@ class Trace:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Panel:
-    """Lines that share one quantity and unit."""
+    """Lines of one quantity and unit."""
 
     quantity: str
     unit: str
@@ -59,7 +59,7 @@ def time_chart(
     height: float = PANEL_HEIGHT,
     width: float = FIGURE_WIDTH,
 ) -> Picture:
-    """Panels under one another over one time axis (s), each line named at its right end."""
+    """Panels one below the other with a common time axis (s); each line is named at its right end."""
     spans = [_value_range(panel) for panel in panels]
     ticks = [
         nice_ticks(low, high, 4, degrees=panel.unit == "deg") for panel, (low, high) in zip(panels, spans)
@@ -83,7 +83,7 @@ def time_chart(
 
 
 def fits_beside(label: str) -> bool:
-    """Whether there is room for the label at the right end of a line."""
+    """Whether there is space for the label at the right end of a line."""
     return text_width(label, SMALL_SIZE) <= _LABEL_ROOM - 31
 
 
@@ -98,7 +98,7 @@ def _value_range(panel: Panel) -> tuple[float, float]:
 
 
 def _drawn_limits(trace: Trace) -> list[float]:
-    """Those of the trace's limits that it comes near or breaks."""
+    """The limits that the trace comes near to or exceeds."""
     if trace.limits is None:
         return []
     finite = trace.values[np.isfinite(trace.values)]
@@ -155,7 +155,7 @@ def _traces(time: _Array, panel: Panel, across: Scale, up: Scale) -> list[Mark]:
         )
         beyond = _beyond(trace, v)
         if beyond.any():
-            # Neighbours stay in, so that a single sample beyond the limit shows as a stroke.
+            # Neighbouring samples are included, so that a single sample beyond the limit is a visible line.
             wide = beyond | np.roll(beyond, 1) | np.roll(beyond, -1)
             wide[0], wide[-1] = beyond[:2].any(), beyond[-2:].any()
             over.append(Polyline(np.where(wide[:, None], points, np.nan), stroke=Tone.ERROR, width=4.2))
@@ -170,7 +170,8 @@ def _beyond(trace: Trace, values: _Array) -> NDArray[np.bool_]:
 
 
 def _end_labels(panel: Panel, up: Scale, right: float) -> list[Mark]:
-    """Names at the lines' right ends, moved apart where they would overlap, with a short line as key."""
+    """Draw names at the right ends of the lines, moved apart if they would overlap, with a short line as
+    key."""
     step = SMALL_SIZE + 4.0
     wanted: list[float] = []
     for trace in panel.traces:
@@ -207,11 +208,13 @@ def _end_labels(panel: Panel, up: Scale, right: float) -> list[Mark]:
 
 
 def spread(wanted: Sequence[float], step: float, low: float, high: float) -> list[float]:
-    """Places near ascending ``wanted`` ones, at least ``step`` apart, within ``low`` .. ``high`` if they fit.
+    """Positions close to the ascending positions ``wanted``, at least ``step`` apart, within ``low`` ..
+    ``high`` if they fit.
 
-    Groups that collide are centred on their mean wish (pool adjacent violators, Ayer et al. 1955).
+    Groups that would overlap are centred on the mean of their wanted positions (pool adjacent violators, Ayer
+    et al. 1955).
     """
-    groups: list[tuple[float, int]] = []  # mean of wish less own offset, count
+    groups: list[tuple[float, int]] = []  # mean of (wanted position - offset in the group), count
     for k, wish in enumerate(wanted):
         mean, count = wish - k * step, 1
         while groups and groups[-1][0] > mean:
