@@ -1,4 +1,4 @@
-"""A page for every block: what it does, its ports and parameters, and a worked example with its plot."""
+"""A page for every block: its description, ports and parameters, and a worked example with its plot."""
 
 from __future__ import annotations
 
@@ -30,24 +30,24 @@ from armblocks.report.figures import Figure, motion_figures, view_figures
 from armblocks.report.motion import motions
 
 FIGURE_WIDTH = 736.0
-"""px: what the theme's column holds, so that type in figures is as large as it says."""
+"""Width of the theme's text column, px. Figures of this width have their nominal font size."""
 
 
 def block_pages() -> Iterator[tuple[str, str]]:
-    """Path and text of every page: the index, then one for each block."""
+    """Path and text of every page: the index, then a page for each block."""
     yield "blocks.md", index_page()
     for kind in BLOCKS.values():
         yield f"blocks/{kind.type_name()}.md", block_page(kind)
 
 
 def index_page() -> str:
-    """Every block of the library by family: its symbol and what it does."""
+    """The index: every block of the library by family, with its symbol and its description."""
     lines = [
         "# Blocks",
         "",
         f"The library has {len(BLOCKS)} blocks. Each has a page with its equation, ports, parameters and a",
-        "worked example: a small diagram, the Python that builds it, and what a run of it gives.",
-        "In a terminal, `armblocks blocks NAME` says the same.",
+        "worked example: a small diagram, the Python program that builds it, and the results of a run.",
+        "In a terminal, `armblocks blocks NAME` prints the same.",
         "",
     ]
     for family, kinds in BLOCKS.families.items():
@@ -68,20 +68,20 @@ def index_page() -> str:
 
 
 def other_title(kind: type[Block]) -> str:
-    """The name people know the block by, where its type does not say it already."""
+    """The displayed name of the block, if it differs from its type name."""
     same = kind.title.replace(" ", "").casefold() == kind.type_name().casefold()
     return "" if same else f" ({prose(kind.title)})"
 
 
 def block_page(kind: type[Block]) -> str:
-    """All about one block."""
+    """The page of one block."""
     block = example_block(kind)
     diagram = ab.block_example(kind)
     name = kind.type_name()
     family = BLOCKS.family_of(kind)
     called = f"**{prose(kind.title)}**, of" if other_title(kind) else "Of"
     lines = [
-        # Without a place in the table of contents: the theme would write all blocks beside each of them.
+        # Not in the table of contents, because the theme would list all blocks on the page of each block.
         "---",
         "orphan: true",
         "---",
@@ -114,7 +114,7 @@ def symbol(kind: type[Block], page: str) -> str:
 
 
 def docstring(kind: type[Block]) -> list[str]:
-    """The docstring as Markdown: paragraphs of prose, indented formulas as they are."""
+    """The docstring as Markdown: paragraphs of prose, and indented formulas unchanged."""
     lines: list[str] = []
     for paragraph in inspect.cleandoc(kind.__doc__ or "").split("\n\n"):
         if paragraph.startswith("    "):
@@ -126,7 +126,8 @@ def docstring(kind: type[Block]) -> list[str]:
 
 
 def prose(text: str) -> str:
-    """A docstring's words as Markdown: code stays code, all else, formulas with stars included, is plain."""
+    """The text of a docstring as Markdown: code stays code, and all other text, also formulas with stars, is
+    plain."""
     parts = re.split(r"(?::\w+:)?(`+)(.+?)\1", text)
     found = [
         re.sub(r"([*_\[\]|$<>#\\~])", r"\\\1", plain) + (f"`{code}`" if code else "")
@@ -136,9 +137,9 @@ def prose(text: str) -> str:
 
 
 def table(headings: Iterable[str], rows: Iterable[Iterable[str]]) -> list[str]:
-    """A Markdown table and an empty line."""
+    """A Markdown table, followed by an empty line."""
     heads, cells = list(headings), [[cell.replace("\n", " ") for cell in row] for row in rows]
-    # A column with nothing in it, such as units that no port has, is left out.
+    # An empty column, such as the units of ports without units, is omitted.
     kept = [k for k in range(len(heads)) if any(row[k] for row in cells)]
     heads, cells = [heads[k] for k in kept], [[row[k] for k in kept] for row in cells]
     body = ["| " + " | ".join(row) + " |" for row in cells]
@@ -146,7 +147,7 @@ def table(headings: Iterable[str], rows: Iterable[Iterable[str]]) -> list[str]:
 
 
 def port_table(block: Block) -> list[str]:
-    """What goes in, what comes out, and what a run records beside it."""
+    """The inputs, the outputs, and the additional signals that a run records."""
     sides = (
         ("input", block.input_ports()),
         ("output", block.output_ports()),
@@ -168,7 +169,7 @@ def shape_text(port: Port) -> str:
 
 
 def parameter_table(kind: type[Block]) -> list[str]:
-    """What can be set, what it may be, and which can be given another value without compiling again."""
+    """The parameters, their allowed values, and whether they are tunable."""
     if not kind.parameters():
         return []
     rows = [
@@ -190,7 +191,7 @@ def parameter_table(kind: type[Block]) -> list[str]:
 
 
 def allowed(rule: Parameter) -> str:
-    """The rule in words; choices as code. Numbers are finite unless it is said that they may be infinite."""
+    """The allowed values as text, choices as code. Numbers must be finite unless the text says otherwise."""
     if rule.kind is ParameterKind.CHOICE:
         return ", ".join(f"`{choice}`" for choice in rule.choices)
     words = rule.describe().removesuffix(", finite")
@@ -205,12 +206,12 @@ def allowed(rule: Parameter) -> str:
 
 
 def default_text(rule: Parameter) -> str:
-    """The default as Python, empty where one must be given."""
+    """The default as Python; empty for a required parameter."""
     return "" if rule.required else f"`{rule.default!r}`"
 
 
 def behaviour(diagram: Diagram) -> list[str]:
-    """What the block keeps and where it switches, in the shapes of the example."""
+    """The states and events of the block, with the shapes of the example."""
     block = diagram.blocks[diagram.name]
     shapes = infer_shapes(diagram).inputs[diagram.name]
     kept: list[tuple[str, State]] = [
@@ -225,23 +226,23 @@ def behaviour(diagram: Diagram) -> list[str]:
     ]
     lines: list[str] = []
     if rows:
-        lines = ["## States and events", "", *table(("name", "what it is", "unit", "meaning"), rows)]
+        lines = ["## States and events", "", *table(("name", "kind", "unit", "meaning"), rows)]
     if block.sampled:
-        lines += ["Works at the ticks of its clock only; its outputs are held in between.", ""]
+        lines += ["It is evaluated at the ticks of its clock only; its outputs are held in between.", ""]
     if block.time_derivatives:
         pairs = ", ".join(
-            f"`{out}` is the exact time derivative of what feeds `{into}`"
+            f"`{out}` is the exact time derivative of the signal at `{into}`"
             for out, into in block.time_derivatives.items()
         )
         lines += [f"{pairs}.", ""]
     return lines
 
 
-DIRECTIONS = {1: "at a zero upwards", -1: "at a zero downwards", 0: "at a zero"}
+DIRECTIONS = {1: "at an upward zero crossing", -1: "at a downward zero crossing", 0: "at a zero crossing"}
 
 
 def worked_example(kind: type[Block], diagram: Diagram) -> list[str]:
-    """The example's drawing, what a run of it gives, and both its forms."""
+    """The example: its drawing, the results of a run, and its Python and JSON form."""
     result = ab.simulate(diagram)
     figures = list(view_figures(diagram, result, FIGURE_WIDTH))
     if any(view.kind is ViewKind.ROBOT for _, view in diagram_views(diagram)):
@@ -257,7 +258,7 @@ def worked_example(kind: type[Block], diagram: Diagram) -> list[str]:
     lines += [
         "<details><summary>The same as a file</summary>",
         "",
-        "```text",  # colours would take three times the space
+        "```text",  # syntax colours would triple the size of the page
         data.rstrip(),
         "```",
         "",
@@ -268,14 +269,14 @@ def worked_example(kind: type[Block], diagram: Diagram) -> list[str]:
 
 
 def figure_html(figure: Figure) -> str:
-    """A figure of the report, for these pages."""
+    """A figure of the report in the form for these pages."""
     shape = "narrow" if figure.narrow else "wide"
     drawn = svg_inline(lightened(figure.picture), f"plot-{figure.name}")
     return f'<figure class="{shape}">{drawn}</figure>\n'
 
 
 def style_sheet() -> str:
-    """Colours of the figures by the theme's own switch, and the few rules of the block pages."""
+    """CSS: colours of the figures by the switch of the theme, and the rules of the block pages."""
     light, dark = theme_variables("light"), theme_variables("dark")
     return (
         f"body{{{light}}}body[data-theme=dark]{{{dark}}}"

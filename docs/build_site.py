@@ -1,7 +1,8 @@
 """Build the documentation into ``docs/_build/html``: ``python3 docs/build_site.py``.
 
-Nothing is done where the pages are there and their sources are as they were (a stamp tells). A wheel of
-armblocks brings these pages, and ``armblocks docs`` opens them. Sphinx and its theme are the extra ``docs``.
+Pages whose sources have not changed since the last build are not built again; a file with a hash records the
+sources. Wheels of armblocks contain the pages, and ``armblocks docs`` opens them. Sphinx and its theme are in
+the extra ``docs``.
 """
 
 from __future__ import annotations
@@ -20,21 +21,21 @@ ROOT = DOCS.parent
 SITE = DOCS / "_build" / "html"
 STAMP = DOCS / "_build" / "built-from"
 SOURCES = ("docs", "src/armblocks", "robots", "examples", "libraries")
-"""The blocks, the robots, the examples and the docstrings are on the pages, too."""
+"""Sources of the pages; blocks, robots, examples and docstrings are on the pages, too."""
 NOT_SOURCES = ("docs/_build", "docs/reference", "src/armblocks/studio/web")
-"""Folders that are built themselves."""
+"""Folders with generated files."""
 LEFT_OUT = ("debug.css", "file.png", "plus.png", "minus.png", "skeleton.css")
 """Files of the theme that no page uses."""
 
 
 def needed() -> bool:
-    """Whether there is something to build."""
+    """Whether the pages are missing or outdated."""
     there = STAMP.is_file() and (SITE / "index.html").is_file()
     return not there or STAMP.read_text(encoding="utf-8") != digest()
 
 
 def digest() -> str:
-    """Changes with every source of the pages."""
+    """A hash of all sources of the pages."""
     found = hashlib.sha256()
     for path in _sources():
         found.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
@@ -51,24 +52,25 @@ def _sources() -> Iterator[Path]:
 
 
 def build() -> None:
-    """Build the pages, a warning being an error; raises ``SystemExit`` with the reason where that fails."""
+    """Build the pages with warnings as errors. Raises ``SystemExit`` with the reason if the build fails."""
     print("   build the documentation (about a minute)", flush=True, file=sys.stderr)
     STAMP.unlink(missing_ok=True)
-    shutil.rmtree(SITE, ignore_errors=True)  # Sphinx keeps pages whose documents are gone
+    shutil.rmtree(SITE, ignore_errors=True)  # Sphinx does not remove the pages of removed documents
     before = digest()
     command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html"]
     # In a build of a wheel, armblocks itself is not installed.
     paths = [str(ROOT / "src"), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in paths if path)}
-    # All pages are written anew: what an earlier build has read may come from other versions of the code.
+    # All pages are built completely, because the data of an earlier build may come from other versions of the
+    # code.
     with tempfile.TemporaryDirectory() as doctrees:
         command += ["-d", doctrees, str(DOCS), str(SITE)]
         done = subprocess.run(command, cwd=ROOT, env=environment, stdin=subprocess.DEVNULL, stdout=sys.stderr)
     if done.returncode != 0:
         raise SystemExit(
-            "The documentation could not be built; the reason stands above.\n"
-            "Everything else of armblocks needs no pages: ARMBLOCKS_SKIP_DOCS=1 pip install .\n"
-            f"The tools for the pages: pip install --editable '{ROOT}[docs]'"
+            "The documentation could not be built; the reason is printed above.\n"
+            "To install armblocks without the documentation: ARMBLOCKS_SKIP_DOCS=1 pip install .\n"
+            f"To install the tools for the documentation: pip install --editable '{ROOT}[docs]'"
         )
     for name in LEFT_OUT:
         (SITE / "_static" / name).unlink(missing_ok=True)
@@ -77,7 +79,7 @@ def build() -> None:
 
 
 def main() -> None:
-    """Build the pages if they are not there as they should be."""
+    """Build the pages if they are missing or outdated."""
     if needed():
         build()
 

@@ -1,4 +1,4 @@
-"""How Sphinx builds these pages, and the pages that are written from the code itself."""
+"""Configuration of Sphinx, and the calls that generate pages from the code."""
 
 import os
 import sys
@@ -35,11 +35,11 @@ html_theme_options = {
 }
 html_show_sourcelink = False
 html_copy_source = False
-html_show_search_summary = False  # it would be fetched, which browsers refuse to pages of the disk
+html_show_search_summary = False  # summaries are fetched, which browsers do not allow for pages from the disk
 html_static_path = ["reference/static"]
 html_css_files = ["pictures.css"]
 
-smartquotes = False  # formulas hold straight quotes and double signs
+smartquotes = False  # formulas contain straight quotes and double minus signs
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 
@@ -59,5 +59,5 @@ def setup(app):
     app.connect("source-read", link_names)
 
 
-# Before Sphinx looks for sources and static files.
+# Called before Sphinx searches for sources and static files.
 write_generated_pages(HERE / "reference")

@@ -1,4 +1,4 @@
-"""Pages that are written from the code: the blocks of the library, the shipped robots and examples."""
+"""Pages that are generated from the code: the blocks of the library, the shipped robots and examples."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ from armblocks.simulation.tableaux import TABLEAUX
 
 
 def write_generated_pages(folder: Path) -> None:
-    """Write the pages into ``folder``; a page whose text is unchanged is left alone, others are removed."""
+    """Write the pages into ``folder``. Unchanged pages are not written again; files of other pages are
+    removed."""
     pages = {
         "examples.md": examples_page(),
         "robots.md": robots_page(),
@@ -42,7 +43,7 @@ def write_generated_pages(folder: Path) -> None:
 
 
 def examples_page() -> str:
-    """The shipped examples, each with its drawing and links to the pages of its blocks."""
+    """The page of the shipped examples, each with its drawing and links to the pages of its blocks."""
     lines = [
         "# Shipped examples",
         "",
@@ -70,8 +71,8 @@ def examples_page() -> str:
 
 
 def public_names() -> str:
-    """Every name of ``armblocks`` with a link and the first sentence about it."""
-    lines = ["| name | what it is |", "|---|---|"]
+    """A table of all names of ``armblocks``, with a link and the first sentence of the docstring."""
+    lines = ["| name | description |", "|---|---|"]
     for name in sorted(ab.__all__, key=str.casefold):
         thing = getattr(ab, name)
         if not inspect.ismodule(thing):

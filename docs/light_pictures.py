@@ -1,4 +1,4 @@
-"""Figures with fewer points: the pages show hundreds of them, and travel in the wheel."""
+"""Figures with fewer points, because the pages show hundreds of them and are part of the wheel."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from armblocks.pictures.picture import Group, Mark, Picture, Polyline
 
 TOLERANCE = 0.1
-"""px: no left-out point is farther from the line that is drawn."""
+"""Maximum distance of an omitted point from the drawn line, px."""
 FEWEST = 24
-"""Lines with fewer points stay as they are."""
+"""Lines with fewer points are unchanged."""
 
 
 def lightened(picture: Picture) -> Picture:
-    """The same picture, its long lines with as few points as the tolerance allows."""
+    """The same picture, with as few points in its long lines as the tolerance allows."""
     return replace(picture, marks=[_lighter(mark) for mark in picture.marks])
 
 
@@ -31,7 +31,7 @@ def _lighter(mark: Mark) -> Mark:
 
 
 def kept_points(points: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which points of a line (N, 2) stay (N,): those at its ends, and those where it bends.
+    """A mask (N,) of the points of a line (N, 2) that are kept: its ends, and the points where it bends.
 
     Source: Douglas and Peucker, "Algorithms for the reduction of the number of points", 1973.
     """

@@ -1,4 +1,4 @@
-"""In the tables of names, each armblocks name becomes a link to its page in the reference."""
+"""Replaces the names of armblocks in the tables of names by links to their pages in the reference."""
 
 from __future__ import annotations
 
@@ -15,11 +15,12 @@ CLASSES = {
     "robot": "armblocks.Robot",
     "run": "armblocks.DiagramRun",
 }
-"""What the code in the tables calls objects of these classes."""
+"""The names of objects of these classes in the code of the tables."""
 
 
 def link_names(_app: object, page: str, source: list[str]) -> None:
-    """Rewrite the last column of every table of these pages; Sphinx calls it with the text of each page."""
+    """Rewrite the last column of every table of these pages. Sphinx calls the function with each page's
+    text."""
     if page in PAGES:
         source[0] = re.sub(r"(?m)^(\| .*\| )([^|\n]+)(\|)$", _linked_row, source[0])
 

@@ -1,4 +1,4 @@
-"""How signatures read in the Python reference: short names of types, and the fields of dataclasses."""
+"""Signatures in the Python reference: short names of types, and the fields of dataclasses."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ SHORT = {
     r"\bComplex\b": "ComplexArray",
     r"\bValues\b": "Mapping[str, ArrayLike]",
 }
-"""What stands in annotations, and what the reference shows in its place."""
+"""Names in annotations, each with the name that the reference shows instead."""
 ALIASES = {"Array": "Array", "ArrayLike": "ArrayLike", "ComplexArray": "ComplexArray"}
-"""What stays as it is written: the page says what both mean."""
+"""Names that are not replaced; the page explains them."""
 
 
 def shorten_annotations() -> None:
     """Write ``Array`` for the types of NumPy arrays in all annotations of armblocks that are loaded."""
-    TypeAliasForwardRef.__repr__ = lambda alias: alias.name  # inside of Mapping[...] Sphinx shows this
+    TypeAliasForwardRef.__repr__ = lambda alias: alias.name  # shown by Sphinx inside Mapping[...]
     for function in _functions():
         for name, text in function.__annotations__.items():
             if isinstance(text, str):
@@ -58,10 +58,11 @@ def _functions() -> Iterator[Callable[..., object]]:
 def readable_signature(
     _app: object, what: str, _name: str, thing: Any, _options: object, *written: str | None
 ) -> tuple[str | None, ...]:
-    """Of a dataclass the fields: its ``__new__``, which checks the names of arguments, takes anything."""
+    """The fields of a dataclass, because the signature of its ``__new__``, which checks names, accepts
+    everything."""
     if what == "class" and dataclasses.is_dataclass(thing):
         return _fields(thing), None
-    # Defaults such as <the diagram's> are no Python; Sphinx would show the whole signature as one line.
+    # Defaults such as <the diagram's> are not Python; with them Sphinx would show the signature as one line.
     return tuple(text and re.sub(r"= <[^>]*>", "= ...", text) for text in written)
 
 
@@ -81,13 +82,13 @@ def _fields(thing: Any) -> str:
 
 
 def _default(value: object) -> str:
-    """The default as Python, as far as it is short."""
+    """The default as Python if it is short."""
     text = repr(value)
     return text if len(text) <= 30 and not text.startswith("<") and "object at" not in text else "..."
 
 
 def arm_page() -> str:
-    """The class Arm, whose methods are made when they are first asked for, with their call signatures."""
+    """The class Arm with the call signatures of its methods, which are created at their first access."""
     found: dict[str, list[str]] = {}
     for name, member in vars(ab.Arm).items():
         if isinstance(member, cached_property) and not name.startswith("_"):

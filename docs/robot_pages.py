@@ -1,4 +1,4 @@
-"""A page of the shipped robots: each with its picture, its D-H table and the limits of its joints."""
+"""The page of the shipped robots: each with its picture, its D-H table and the limits of its joints."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ POSES = {
     "puma560": (0.5, 0.9, -2.6, 0.0, 0.6, 0.0),
     "twolink": (0.6, 0.7),
 }
-"""Joint coordinates (rad) at which the arm can be seen well; all 0 for a robot that is not here."""
+"""Joint coordinates (rad) of the pictures; all 0 for robots that are not listed."""
 SIZE = (420.0, 340.0)
 """px."""
 
@@ -31,7 +31,7 @@ def robots_page() -> str:
         "# Shipped robots",
         "",
         '`ab.load_robot("kr180")` loads a robot by its name. In a terminal, `armblocks show kr180` prints',
-        "all its numbers; the robot editor of `armblocks studio` shows it, and makes changed copies.",
+        "all its numbers. The robot editor of `armblocks studio` shows it and edits copies of it.",
         "",
     ]
     with warnings.catch_warnings():

@@ -72,4 +72,4 @@ def test_show_prints_the_tree(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     show(str(tmp_path / "parts.json"))
     assert capsys.readouterr().out.startswith("inner  4 blocks, 3 wires")
     show("joint_servos")
-    assert "how fast it follows" in capsys.readouterr().out
+    assert "bandwidth: the triple pole of the position loop" in capsys.readouterr().out
