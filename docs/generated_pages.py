@@ -95,7 +95,7 @@ def function_tables() -> str:
         for name, function in TABLE.items():
             if function.group == group:
                 call = f"{name}({function.arguments})" if function.most else name
-                lines.append(f"| `{call}` | {function.meaning} |")
+                lines.append(f"| `{call}` | {function.meaning.replace('|', chr(92) + '|')} |")
         lines.append("")
     return "\n".join(lines)
 

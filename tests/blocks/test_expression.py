@@ -111,11 +111,11 @@ def test_other_syntax_is_refused(formula: str) -> None:
 def test_messages_name_the_position_and_a_fix() -> None:
     with pytest.raises(
         InputError,
-        match=r"Expression.formula: '\(' is never closed, in column 4: sin‸\(u. Allowed: brackets in pairs",
+        match=r"Expression.formula: '\(' is never closed, in column 4: sin»\(u. Allowed: brackets in pairs",
     ):
         Expression(formula="sin(u")
     with pytest.raises(
-        InputError, match=r"a value is expected, in column 4: u \+‸. Allowed: numbers.*correct the formula"
+        InputError, match=r"a value is expected, in column 4: u \+». Allowed: numbers.*correct the formula"
     ):
         Expression(formula="u +")
     with pytest.raises(DiagramError, match=r"block 'block' .*there is no name named 'v'"):
@@ -126,7 +126,7 @@ def test_messages_name_the_position_and_a_fix() -> None:
         Formula("gian", "here").trace({"gain": SX(1.0)})
     with pytest.raises(
         DiagramError,
-        match=r"index 4 is not possible here, in column 2: u‸\[4\]. Allowed: u\(1\) to",
+        match=r"index 4 is not possible here, in column 2: u»\[4\]. Allowed: u\(1\) to",
     ):
         evaluate(Expression(formula="u[4]"), U)
     with pytest.raises(DiagramError, match=r"'u' has no constant index"):

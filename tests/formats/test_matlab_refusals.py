@@ -221,7 +221,7 @@ def test_message_shows_the_line_and_what_is_supported() -> None:
     with pytest.raises(FormatError) as caught:
         read_script(b"x = 1;\n\nfor i = 1:6, L{i}.m = 1; end\n", "loop.m")
     text = str(caught.value)
-    assert text.startswith("loop.m:3: 'for' is not supported, in column 1: ‸for i = 1:6, L{i}.m = 1; end")
+    assert text.startswith("loop.m:3: 'for' is not supported, in column 1: »for i = 1:6, L{i}.m = 1; end")
     assert "Allowed: straight-line scripts of the Robotics Toolbox" in text
 
 
@@ -234,7 +234,7 @@ def test_the_error_for_an_inconsistent_robot_names_its_line() -> None:
     links = "; ".join(f"L{{{i}}} = link([0 1 0 0])" for i in (1, 2))
     script = f"{links};\nr = robot(L);\nr.links{{2}}.m = 1e400;"
     with pytest.raises(
-        FormatError, match=r"a\.m:3: '1e400' is too large a number, in column 16: .*= ‸1e400;"
+        FormatError, match=r"a\.m:3: '1e400' is too large a number, in column 16: .*= »1e400;"
     ):
         read_script(script.encode(), "a.m")
 

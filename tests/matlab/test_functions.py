@@ -150,8 +150,8 @@ def test_plain_numbers_are_evaluated_without_objects() -> None:
         value("sin(:)")
 
 
-def test_long_lines_are_quoted_around_the_caret() -> None:
+def test_long_lines_are_quoted_around_the_error() -> None:
     text = "1 + " * 60 + "* 2 " + "+ 1" * 60
-    with pytest.raises(InputError, match=r"in column 241: … \+ 1 \+ .*\+ ‸\* 2 \+.* …\. Allowed") as caught:
+    with pytest.raises(InputError, match=r"in column 241: … \+ 1 \+ .*\+ »\* 2 \+.* …\. Allowed") as caught:
         Formula(text, "here")
     assert len(re.sub(".*column 241: ", "", caught.value.what)) <= 106

@@ -270,7 +270,7 @@ def shape_of(tree: object) -> object:
 def test_random_expressions_have_the_values_of_an_independent_evaluator() -> None:
     draw = random.Random(20)
     compared = refused = 0
-    for _ in range(400):
+    for _ in range(300):
         text = written(draw, 4)
         with np.errstate(all="ignore"):
             try:
@@ -295,7 +295,7 @@ def test_random_expressions_have_the_values_of_an_independent_evaluator() -> Non
         else:
             assert by_numbers == found or abs(by_numbers) == abs(found) == 0.0, text
             compared += 1
-    assert compared > 150
+    assert compared > 120
     assert refused > 5
 
 

@@ -54,7 +54,9 @@ _NUMBER = re.compile(
     rf"|(?:{_DIGITS}(?:\.(?!\*(?!\*)|[/\\^']|\.\.)(?:{_DIGITS})?)?|\.{_DIGITS})(?:[eEdD][+-]?{_DIGITS})?"
 )
 _NAME = re.compile(r"[^\W\d]\w*")
-_OPERATORS = sorted({*INFIX, *ALTERNATIVES, ".'", *"=~'()[]{},;.@"}, key=len, reverse=True)
+_OPERATOR = re.compile(
+    "|".join(map(re.escape, sorted({*INFIX, *ALTERNATIVES, ".'", *"=~'()[]{},;.@"}, key=len, reverse=True)))
+)
 _UNFINISHED = frozenset((*INFIX, "=", ",", "(", "~"))
 """Operators after which no statement can end."""
 _CLOSING = {"(": ")", "[": "]", "{": "}"}
@@ -156,10 +158,9 @@ class _Lexer:
             return found.end()
         if character == '"' or (character == "'" and not self._is_transpose(spaced)):
             return self._string(at, text, position, spaced)
-        for operator in _OPERATORS:
-            if text.startswith(operator, position):
-                self._operator(at, ALTERNATIVES.get(operator, operator), spaced)
-                return position + len(operator)
+        if (found := _OPERATOR.match(text, position)) is not None:
+            self._operator(at, ALTERNATIVES.get(found.group(), found.group()), spaced)
+            return found.end()
         raise self.source.place(at).error(
             f"the character {character!r} means nothing in MATLAB outside strings"
         )

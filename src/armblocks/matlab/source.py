@@ -19,8 +19,8 @@ FORMULAS = (
 
 LONGEST_QUOTE = 100
 """Characters of a line that a message repeats."""
-CARET = "\u2038"
-"""Marks the column in a quoted line. Unlike ``^``, it is no operator of the language."""
+POINTER = "\u00bb"
+"""Marks the column in a quoted line. Unlike ``^``, it is no operator; old code pages have it, too."""
 
 
 class Position(NamedTuple):
@@ -72,7 +72,7 @@ class Place:
         """
         source, (line, column) = self.source, self.at
         text = source.lines[line - 1] if 1 <= line <= len(source.lines) else ""
-        if quoted := _with_caret(text, column):
+        if quoted := _quoted(text, column):
             within = f"line {line}, column" if len(source.lines) > 1 and not source.is_file else "column"
             what = f"{what}, in {within} {column}: {quoted}"
         if source.is_file:
@@ -82,12 +82,12 @@ class Place:
         )
 
 
-def _with_caret(text: str, column: int) -> str:
-    """The line with a caret before the column; of a long line, the part around it."""
+def _quoted(text: str, column: int) -> str:
+    """The line with a pointer before the column; of a long line, the part around it."""
     if not text.strip():
         return ""
     start, end = max(0, column - 1 - 2 * LONGEST_QUOTE // 3), column - 1
     before, after = text[start:end], text[end : start + LONGEST_QUOTE]
     head = "… " if start and before.strip() else ""
     tail = " …" if start + LONGEST_QUOTE < len(text.rstrip()) else ""
-    return f"{head}{before.lstrip()}{CARET}{after.rstrip()}{tail}"
+    return f"{head}{before.lstrip()}{POINTER}{after.rstrip()}{tail}"
