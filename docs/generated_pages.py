@@ -8,13 +8,13 @@ import warnings
 from pathlib import Path
 
 from block_pages import block_pages, prose, style_sheet
+from function_tables import function_tables
 from reference_signatures import arm_page
 from robot_pages import robots_page
 
 import armblocks as ab
 from armblocks.drawing import diagram_picture
 from armblocks.integration.butcher_tableau import ButcherTableau
-from armblocks.matlab.functions import TABLE
 from armblocks.pictures.svg import svg_inline
 from armblocks.simulation.tableaux import TABLEAUX
 
@@ -84,20 +84,6 @@ def public_names() -> str:
 def _first_sentence(thing: object) -> str:
     paragraph = inspect.cleandoc(thing.__doc__ or "").partition("\n\n")[0].replace("\n", " ")
     return re.split(r"(?<=[.:]) (?=[A-Z])|::$", paragraph)[0].rstrip(":")
-
-
-def function_tables() -> str:
-    """All functions and constants of formulas and scripts, one table a group."""
-    groups = dict.fromkeys(function.group for function in TABLE.values())
-    lines: list[str] = []
-    for group in groups:
-        lines += [f"### {group}", "", "| | |", "|---|---|"]
-        for name, function in TABLE.items():
-            if function.group == group:
-                call = f"{name}({function.arguments})" if function.most else name
-                lines.append(f"| `{call}` | {function.meaning.replace('|', chr(92) + '|')} |")
-        lines.append("")
-    return "\n".join(lines)
 
 
 def solver_table() -> str:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import random
 import re
+import runpy
+from pathlib import Path
 
 import casadi
 import numpy as np
@@ -18,9 +20,11 @@ from armblocks.matlab.formula import Formula
 from armblocks.matlab.functions import RESERVED, TABLE
 from armblocks.matlab.number_functions import FUNCTIONS_OF_NUMBERS
 from armblocks.matlab.numbers import Numbers, Plain
+from armblocks.matlab.operators import INFIX, Level
 from armblocks.matlab.parser import parse_formula
 from armblocks.matlab.source import formula_source
 
+DOCS = Path(__file__).resolve().parents[2] / "docs"
 ARGUMENTS = {
     **dict.fromkeys(("diag", "inv", "transpose", "trace", "size"), ("A",)),
     **dict.fromkeys(("cross", "dot"), ("v", "w")),
@@ -121,6 +125,21 @@ def test_every_entry_is_documented() -> None:
         assert function.elementwise or name not in FUNCTIONS_OF_NUMBERS or name in ("any", "all")
     assert {"sin", "pi", "sum"} <= RESERVED
     assert not {"length", "round", "mean", "size", "eps"} & RESERVED
+
+
+def test_the_documentation_has_all_functions_and_operators() -> None:
+    tables = runpy.run_path(str(DOCS / "function_tables.py"))["function_tables"]()
+    rows = [re.split(r"(?<!\\)\|", line) for line in tables.splitlines() if line.startswith("| `")]
+    assert {len(row) for row in rows} == {4}
+    assert {re.split(r"[`(]", row[1].strip())[1] for row in rows} == set(TABLE)
+    page = (DOCS / "formulas.md").read_text(encoding="utf-8").replace("\\|", "∨")
+    table = [line.split("|")[1].replace("∨", "|") for line in page.splitlines() if line.startswith("| `")]
+    spans = [re.findall("`([^`]+)`", row) for row in table if "(" not in row]
+    listed = [[":"] if "a:b" in row else row for row in spans if not row[0].isalpha()]
+    assert {operator for row in listed for operator in row} == {*INFIX, "~"}
+    levels = [INFIX[row[0]] if "~" not in row else Level.SIGN for row in listed]
+    assert levels == sorted(levels, reverse=True)
+    assert all(INFIX[operator] == INFIX[row[0]] for row in listed if "~" not in row for operator in row)
 
 
 def test_a_name_hides_a_function_that_is_not_reserved() -> None:

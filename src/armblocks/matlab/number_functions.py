@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from armblocks.matlab.function_kinds import (
@@ -23,8 +23,8 @@ from armblocks.matlab.function_kinds import (
 
 
 def _nearest(by: Arithmetic, x: Any) -> Any:
-    whole = by.floor(by.absolute(x))
-    return by.sign(x) * (whole + (by.absolute(x) - whole >= 0.5))
+    below = by.floor(by.absolute(x))
+    return by.sign(x) * (below + (by.absolute(x) - below >= 0.5))
 
 
 def _toward_zero(by: Arithmetic, x: Any) -> Any:
@@ -37,12 +37,12 @@ def _modulo(by: Arithmetic, x: Any, y: Any) -> Any:
     return by.where(y == 0.0, x, by.where(other_sign, rest + y, rest))
 
 
-def _extreme(name: str) -> Callable[..., Any]:
-    def compute(by: Arithmetic, x: Any, *other: Any) -> Any:
-        combine = getattr(by, name)
-        return combine(x, *other) if other else by.folded(combine, x)
+def _least(by: Arithmetic, x: Any, *other: Any) -> Any:
+    return by.least(x, *other) if other else by.folded(by.least, x)
 
-    return compute
+
+def _greatest(by: Arithmetic, x: Any, *other: Any) -> Any:
+    return by.greatest(x, *other) if other else by.folded(by.greatest, x)
 
 
 CONSTANTS_BY_NAME: Mapping[str, Function] = {
@@ -50,8 +50,8 @@ CONSTANTS_BY_NAME: Mapping[str, Function] = {
     "e": constant(math.e, "Euler's number, 2.718…", reserved=True),
     "inf": constant(math.inf, "Infinity.", reserved=True),
     "Inf": constant(math.inf, "Infinity.", reserved=True),
-    "nan": constant(math.nan, "Not a number.", reserved=False),
-    "NaN": constant(math.nan, "Not a number.", reserved=False),
+    "nan": constant(math.nan, "Not a number."),
+    "NaN": constant(math.nan, "Not a number."),
     "eps": constant(2.0**-52, "The distance from 1 to the next larger number."),
     "deg": constant(math.pi / 180.0, "One degree in rad: `45*deg`.", reserved=True),
     "rad": constant(1.0, "One radian: `0.5*rad`.", reserved=True),
@@ -153,7 +153,7 @@ FUNCTIONS_OF_NUMBERS: Mapping[str, Function] = {
         "x, y",
         "The smaller of two numbers, element by element; `min(x)` is the smallest element.",
         CHOICE,
-        _extreme("least"),
+        _least,
         optional=1,
         reserved=True,
     ),
@@ -161,7 +161,7 @@ FUNCTIONS_OF_NUMBERS: Mapping[str, Function] = {
         "x, y",
         "The larger of two numbers, element by element; `max(x)` is the largest element.",
         CHOICE,
-        _extreme("greatest"),
+        _greatest,
         optional=1,
         reserved=True,
     ),

@@ -1,0 +1,19 @@
+"""The tables of all functions of formulas and scripts."""
+
+from __future__ import annotations
+
+from armblocks.matlab.functions import TABLE
+
+
+def function_tables() -> str:
+    """All functions and constants of formulas and scripts, one table a group."""
+    groups = dict.fromkeys(function.group for function in TABLE.values())
+    lines: list[str] = []
+    for group in groups:
+        lines += [f"### {group}", "", "| | |", "|---|---|"]
+        for name, function in TABLE.items():
+            if function.group == group:
+                call = f"{name}({function.arguments})" if function.most else name
+                lines.append(f"| `{call}` | {function.meaning.replace('|', chr(92) + '|')} |")
+        lines.append("")
+    return "\n".join(lines)
