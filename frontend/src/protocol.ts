@@ -988,7 +988,7 @@ export interface Channel {
   entries: string[];
 }
 /**
- * The plot or 3-D view of a sink. For the kind ``robot``, ``robot`` is the key of its scene.
+ * The plot or 3-D view of a sink; ``signals`` are the recorded signals that it shows.
  */
 export interface ViewOf {
   block: string;

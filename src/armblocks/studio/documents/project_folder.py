@@ -146,7 +146,7 @@ class ProjectFolder:
         return self.path(relative).exists()
 
     def compared(self, relative: str, known: Fingerprint | None) -> tuple[Disk, Fingerprint | None]:
-        """Return the state of a file, and its present fingerprint if it is known or has the same content."""
+        """Return the state of a file, and its present fingerprint if unchanged in content, else ``known``."""
         path = self.path(relative)
         try:
             status = path.stat()

@@ -52,18 +52,18 @@ class Mark:
 
 
 class RunHistory:
-    """One run of a model with checkpoints; instants are numbered from the start of the first segment."""
+    """One run of a model with checkpoints; the numbers of its instants continue after each return."""
 
     def __init__(self, model: CompiledDiagram) -> None:
         self.run: DiagramRun = model.begin()
         self._marks = [Mark(0, None, self.run.diagram, self.run.parameters)]
         self._begin = 0
-        """Number of the first instant that the present segment records."""
+        """Number of the first new instant of ``run``, which restarts at a checkpoint."""
 
     @property
     def recorded(self) -> int:
         """Number of recorded instants."""
-        # A resumed run records its initial instant, which the previous segment has recorded already.
+        # A resumed run records its initial instant, which was recorded before the return already.
         return self._begin + max(0, self.run.recorded - (self._begin > 0))
 
     def samples(self, begin: int) -> Samples:

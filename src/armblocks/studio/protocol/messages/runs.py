@@ -12,7 +12,7 @@ from armblocks.studio.protocol.message import Event, Fault, Message, Request
 
 
 class ViewOf(Message):
-    """The plot or 3-D view of a sink. For the kind ``robot``, ``robot`` is the key of its scene."""
+    """The plot or 3-D view of a sink; ``signals`` are the recorded signals that it shows."""
 
     block: str
     kind: str
