@@ -43,14 +43,11 @@ export class Growing {
    */
   grow([time, ...columns]: Drawn, factor: number, ends: number[], ratio: number): void {
     const { ctx, bbox } = this.plot
-    const width = WIDTH * ratio
     ctx.save()
     ctx.beginPath()
     ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height)
     ctx.clip()
-    // The offset that uPlot uses for lines whose width is not a whole number of pixels.
-    ctx.translate((width % 2) / 2, (width % 2) / 2)
-    ctx.lineWidth = width
+    ctx.lineWidth = WIDTH * ratio
     ctx.lineJoin = 'round'
     columns.forEach((column, k) => {
       const from = this.rows[k]!
@@ -66,8 +63,8 @@ export class Growing {
       for (let row = Math.max(from, 0); row <= to; row++) {
         const value = column[row]
         if (typeof value !== 'number' || Number.isNaN(value)) continue
-        const x = Math.round(this.plot.valToPos(time[row]!, 'x', true))
-        const y = Math.round(this.plot.valToPos(value * factor, 'y', true))
+        const x = this.plot.valToPos(time[row]!, 'x', true)
+        const y = this.plot.valToPos(value * factor, 'y', true)
         if (Number.isNaN(lastX)) ctx.moveTo(x, y)
         else {
           ctx.lineTo(x, y)

@@ -63,6 +63,8 @@ export function plotOptions(
         width: 1.5,
         dash,
         spanGaps: true,
+        // Without this, uPlot rounds points to whole pixels, and slow curves have stairs.
+        pxAlign: 0,
         points: { show: false },
       })),
     ],

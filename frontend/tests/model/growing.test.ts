@@ -78,6 +78,19 @@ test('a line drawn in parts equals the line drawn at once, dashes included', () 
   }
 })
 
+test('points of a line lie between pixels where the values do', () => {
+  const { plot, drawn } = surface()
+  const growing = new Growing(plot, [{ colour: 'black', dash: [] }])
+  const slow: Drawn = [Float64Array.of(0, 1.005, 2), [0, 0.0012, 0.0037]]
+  growing.shows(nothing({ drawn: slow }), [0])
+  growing.grow(slow, 1, [3], 1)
+  expect(drawn()[0]!.points).toEqual([
+    [0, 50],
+    [100 * 1.005, 50 - 40 * 0.0012],
+    [200, 50 - 40 * 0.0037],
+  ])
+})
+
 /** A sample frame in the format of the server: header, instants, columns. */
 function frame(run: string, first: number, time: number[], columns: number[][]): ArrayBuffer {
   const header = JSON.stringify({ run, first, count: time.length })
