@@ -21,7 +21,7 @@ Complex = NDArray[np.complex128]
 
 
 def invariant_zeros(A: Array, B: Array, C: Array, D: Array) -> Complex:
-    """The finite numbers at which ``[[A - s I, B], [C, D]]`` has less than its usual rank."""
+    """The finite numbers s for which ``[[A - s I, B], [C, D]]`` has a lower rank than for almost all s."""
     with from_extra("analysis", "zeros of a linear system"):
         from scipy.linalg import eigvals
 

@@ -43,7 +43,8 @@ def rounding_edges(function: str, n: SX, mirrored: bool = False) -> tuple[SX, SX
 def step_after(now: SX, before: SX, e: Signals, up: str = "up", down: str = "down") -> SX:
     """An integer after the events at both ends of its interval; ``now``: computed from the present values.
 
-    A jump may pass several integers at once; at a border, rounding errors must not undo the step.
+    A jump may pass several integers at once. The integer changes by at least one, because at a border
+    rounding errors could give the old value again.
     """
     lower = if_else(e[down] < 0.0, fmin(now, before - 1.0), before)
     return if_else(e[up] > 0.0, fmax(now, before + 1.0), lower)
@@ -53,8 +54,8 @@ def step_after(now: SX, before: SX, e: Signals, up: str = "up", down: str = "dow
 class IntegerSteps:
     """Rounding of the input ``signal`` to the mode ``mode``, element by element.
 
-    A block returns these modes, guards and values from its methods. ``count``: the integer is held from 0 to
-    ``count - 1``; without it, it has no bounds. ``mark`` is the prefix of the guard names.
+    A block returns these modes, guards and values from its methods. With ``count`` the integer is limited to
+    0 … ``count - 1``; without ``count`` it is unlimited. ``mark`` is the prefix of the guard names.
     """
 
     signal: str

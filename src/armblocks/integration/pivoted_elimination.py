@@ -30,12 +30,13 @@ class PivotedElimination:
         return FullMatrix(size=self.size, numbers=self.matrix)
 
     def factor(self, r: Routine) -> None:
-        """Factor the matrix: the factors ``L`` below the diagonal, ``U`` from the diagonal on."""
+        """Factor the matrix: ``L`` is stored below the diagonal, ``U`` on and above it."""
         for k in r.range(0, self.size):
             self._column(r, k)
 
     def _column(self, r: Routine, k: Integer) -> None:
-        """Exchange row ``k`` with the one that has the largest entry of column ``k``; eliminate below it."""
+        """Exchange row ``k`` with the row that has the largest entry of column ``k``; eliminate the rows
+        below."""
         A, place = self.matrix, self.full.place
         below = k + 1
         largest = r.integer(k)
@@ -60,7 +61,7 @@ class PivotedElimination:
                 self.full.subtract_from_row(r, i, factor, k)
 
     def solve(self, r: Routine, y: Reals) -> None:
-        """Solve for the right side ``y``, in its place."""
+        """Replace the right side ``y`` by the solution."""
         # Whole rows were exchanged, also in L, so the right side is permuted before the substitution.
         for k in r.range(0, self.size):
             row = self.swaps[k]

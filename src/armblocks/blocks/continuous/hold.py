@@ -66,7 +66,7 @@ class FirstOrderHold(Block):
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         shape = self.output_shapes(inputs)["y"]
-        samples = (State("last", shape, "the last sample"), State("before", shape, "the one before"))
+        samples = (State("last", shape, "the last sample"), State("before", shape, "the sample before"))
         return (COUNT, FRESH, *samples)
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:

@@ -45,7 +45,8 @@ class PythonFunction(Block):
     NumPy's functions. The function runs once, when the diagram is traced, and its equations are compiled and
     differentiated like those of any block. The values of the inputs are not known at that time, so the
     function cannot branch on them (``if u > 0``): use ``casadi.if_else``, ``fmin``, ``fmax`` and ``fabs``.
-    The function must depend on its arguments alone. It returns one value for each name in ``results``.
+    The result of the function must depend only on its arguments. It returns one value for each name in
+    ``results``.
 
     The file of a diagram stores ``file.py:name`` and runs no code unless it is trusted.
     """
@@ -93,7 +94,8 @@ class PythonFunction(Block):
         where = f"the function {user.name}"
         try:
             with warnings.catch_warnings():
-                # CasADi's annotations include numbers; symbols stay symbols
+                # CasADi warns that the result type of NumPy functions of its values will change; it is SX
+                # here.
                 warnings.simplefilter("ignore", FutureWarning)
                 returned: Any = user.function(**given)
             values = [returned] if len(names) == 1 else list(returned)
@@ -242,7 +244,7 @@ def _check_results(block: Block, names: list[str]) -> None:
 
 
 def _array(value: SX, shape: Shape) -> Any:
-    """A symbol as the user's function receives it."""
+    """The argument of the user's function for a symbolic input: a symbol, or an array of symbols."""
     if not shape:
         return value
     found = np.empty(shape, dtype=object)
@@ -262,7 +264,7 @@ def _shape(value: Any) -> Shape:
 
 
 def _symbols(value: Any) -> SX:
-    """The result of the user's function, in its natural shape."""
+    """The result of the user's function as one symbolic matrix."""
     if isinstance(value, SX):
         return value
     entries = SX.zeros(value.size)
