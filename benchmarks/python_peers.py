@@ -13,8 +13,8 @@ steps and its final states. The model is built again for each line; graphics and
 - `five_blocks`: step, sum, gain, second-order plant of two integrators, 10 s; fixed steps of 1 ms, RK4.
 - `multirate`: the first 0.1 s of the shipped `puma560_multirate`: computed torque at 1 kHz (KP 900, KD 60)
   around PI control of the currents at 10 kHz, windings of six motors, the arm with viscous friction;
-    Runge-Kutta 5(4), rtol 1e-6, atol 1e-9. A sampled block of bdsim outputs at a tick its input of the
-    previous tick, so the P part is corrected by the contribution of this tick to the integral.
+  Runge-Kutta 5(4), rtol 1e-6, atol 1e-9. A sampled block of bdsim outputs at a tick its input of the
+  previous tick, so the P part is corrected by the contribution of this tick to the integral.
 """
 
 # bdsim and PathSim have no type annotations.
