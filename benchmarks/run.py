@@ -65,12 +65,12 @@ def dynamics_part(repeats: int) -> list[str]:
     lines += table(head, comparison_rows(comparisons))
     lines += [
         "",
-        "Per evaluation: medians of the turns, and the median of the ratios turn by turn. The robots are "
+        "Per evaluation: medians over the turns, and the median of the ratios of the turns. The robots are "
         "frictionless here, because Pinocchio has no friction.",
     ]
     lines += [
         "",
-        "### The same numbers",
+        "### Agreement of the results",
         "",
         *table(["what", "largest difference to Pinocchio, relative"], agreements),
     ]
@@ -92,7 +92,7 @@ def diagram_part(repeats: int) -> list[str]:
     theirs, ours = paper_model.compare(repeats)
     ratio = ours.times_faster_than(theirs)
     row = [
-        "kr180model, 10 s at 10 ms, run without compile",
+        "kr180model, 10 s at 10 ms, run without compilation",
         "Drake, native systems",
         f"{theirs.median * 1e3:.2f} ms",
         f"{ours.median * 1e3:.4f} ms",
@@ -124,7 +124,7 @@ def compared_table(group: str, repeats: int) -> list[str]:
         ]
         for row in simulations.rows(group, repeats)
     ]
-    head = ["what", "peer", "peer's time", "armblocks", "faster", "target", "", "ends differ by"]
+    head = ["what", "peer", "peer's time", "armblocks", "faster", "target", "", "final values differ by"]
     return table(head, compared)
 
 
@@ -147,7 +147,7 @@ def growth_part(repeats: int) -> list[str]:
         "",
         *table(head, grown),
         "",
-        "Seconds, each in a new process without a cache, the best of the turns. `mixed`: gains, first-order "
+        "Seconds, each in a new process without a cache, minimum of the turns. `mixed`: gains, first-order "
         "transfer functions, unit delays at 10 ms, saturations in turn.",
     ]
 
@@ -227,7 +227,7 @@ def main() -> None:
     else:
         text = results.read_text().split("\n## What was missed")[0].rstrip() + "\n"
         for section in sections.values():
-            told = ["", f"Measured alone on {today}: {machine[-1]}."]
+            told = ["", f"Measured separately on {today}: {machine[-1]}."]
             text = replaced(text, [*section, *told])
         text += "\n" + (HERE / "NOTES.md").read_text().rstrip() + "\n"
     results.write_text(text)
