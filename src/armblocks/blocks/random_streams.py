@@ -78,7 +78,8 @@ def normal_quantile(probability: SX) -> SX:
 
 
 def _modulo(value: SX, modulus: float) -> SX:
-    # Exact for |value| < 2^53: the quotient is below 2^21, so its doubles lie closer than 1 / modulus.
+    # Exact for |value| < 2^53: the quotient is below 2^21, where the distance of doubles is below 1 /
+    # modulus.
     return value - modulus * floor(value / modulus)
 
 
@@ -113,7 +114,7 @@ def _ratio(x: SX, coefficients: tuple[Sequence[float], Sequence[float]]) -> SX:
     return numerator / denominator
 
 
-# The terms as (n-3, n-2, n-1) to (n-2, n-1, n).
+# Transition matrices from the terms (n-3, n-2, n-1) to (n-2, n-1, n).
 _RECURRENCE_1: _Matrix = ((0, 1, 0), (0, 0, 1), (int(_M1 - _A13N), int(_A12), 0))
 _RECURRENCE_2: _Matrix = ((0, 1, 0), (0, 0, 1), (int(_M2 - _A23N), 0, int(_A21)))
 

@@ -360,8 +360,8 @@ class Block(ABC):
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         """The consistent value of every mode at the present time.
 
-        It is computed from the present values. ``x`` has the present modes (for modes with memory), or the
-        modes before the event time (for modes that remember them).
+        It is computed from the present values. For a stateful mode ``x`` has the present mode, for a
+        hysteresis mode the previous mode: the mode before the instant, or before the latest event at it.
         """
         return {}
 

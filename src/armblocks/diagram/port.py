@@ -28,11 +28,12 @@ class Port:
 class State:
     """One state or mode of a block; the integrator stores its value, the block does not.
 
-    ``follows``: whether a mode is a function of the signals of the moment alone. Such modes are made
-    consistent before any event (an edge, a trigger, a reset) acts on the signals. ``remembers``: such a
-    function may also read the value that the mode had before (a hysteresis): that before the instant, or
-    before the latest event at it. A discrete state that ``remembers`` is captured at the same times.
-    ``momentary``: a discrete state that is 0 again at the end of every instant.
+    ``follows``: whether a mode is a following mode, that is, a function of the present signals. Following
+    modes are made consistent before any event (an edge, a trigger, a reset) is processed. Other modes are
+    stateful. ``remembers``: whether a following mode has hysteresis, that is, also depends on its previous
+    value: the value before the instant, or before the latest event at it. A discrete state that ``remembers``
+    is captured at the same times. ``momentary``: whether a discrete state becomes 0 at the end of every
+    instant.
     """
 
     name: str

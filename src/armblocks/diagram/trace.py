@@ -269,7 +269,7 @@ def _contradictions(
 
 
 def _remembered(model: Model, symbols: Symbols) -> tuple[tuple[int, int], ...]:
-    """The indices in ``z`` of all modes with memory, each with the index of the remembered value."""
+    """The indices in ``z`` of all hysteresis modes, each with the index of its previous value."""
     ranges = signature(*symbols.discrete_slots).ranges
     return tuple(
         place

@@ -131,20 +131,20 @@ class HybridSystem:
     modes: tuple[int, ...] = ()
     """The indices of the modes in ``z``."""
     followers: tuple[bool, ...] = ()
-    """For each mode, whether it is a function of the present signals."""
+    """For each mode, whether it is a following mode: a function of the present signals, possibly with
+    hysteresis."""
     remembered: tuple[tuple[int, int], ...] = ()
-    """Pairs of indices in ``z``: a mode with memory, and its previous value, which is the value before the
+    """Pairs of indices in ``z``: a hysteresis mode, and its previous value, which is the value before the
     instant or before the latest event at it."""
     recaptured: tuple[int, ...] = ()
-    """The indices in ``z`` of the captured values of modes with memory, which are captured again at
-    events."""
+    """The indices in ``z`` of the captured values of hysteresis modes, which are captured again at events."""
     momentary: tuple[int, ...] = ()
     """The indices in ``z`` of the momentary values, which become 0 at the end of every instant."""
     silenced: tuple[tuple[int, int], ...] = ()
     """Guards, each with the index in ``z`` of a momentary value. While that value is nonzero the guard does
     not fire; at the end of the instant its stored sign becomes that of its value."""
     locating: tuple[int, ...] = ()
-    """The guards that only locate changes of modes that are functions of the signals."""
+    """The guards that only locate changes of following modes."""
     tangents: tuple[int, int, int] | None = None
     """The first indices in ``x``, ``z`` and the guards that belong to derivatives, if there are any."""
     contradictions: TracedFunction | None = None

@@ -84,7 +84,7 @@ class Events:
             f.counts[left] = 0
 
     def _follow_at_start(self) -> None:
-        """Make the modes consistent that are functions of the signals, before those with memory."""
+        """Make the following modes consistent, before the stateful modes."""
         f, r, functions, t = self.frame, self.frame.r, self.functions, self.point.memory
         turns = r.integer(0)
         with r.loop() as loop:
@@ -115,10 +115,10 @@ class Events:
     def fire(self, time: Real) -> None:
         """Iterate over modes and guards until all modes are consistent and no guard fires.
 
-        1. Modes that are functions of the signals are made consistent. Before that the signals do not have
-           their values of this instant, so no state or mode with memory may change.
+        1. Following modes are made consistent. Before that the signals do not have their values of this
+           instant, so no state or stateful mode may change.
         2. All other guards that fire cause one reset.
-        3. If none fires, inconsistent modes with memory take their consistent values.
+        3. If none fires, inconsistent stateful modes take their consistent values.
 
         In the first iterations all inconsistent modes change together, then only the first of them. With this
         least index rule the iteration ends for every complementarity problem with a P-matrix (Murty 1974). If
@@ -156,7 +156,7 @@ class Events:
             slopes[i] = float("nan")
 
     def _follow(self, time: Real, quiet_turns: IntegerVariable) -> None:
-        """One iteration of the modes that are functions of the signals."""
+        """One iteration of the following modes."""
         f, r, functions = self.frame, self.frame.r, self.functions
         r.call(functions.any_fired, f.reals, r.constant_boolean(True))
         self._count_quiet_turn(time, quiet_turns)
@@ -169,7 +169,7 @@ class Events:
             r.call(functions.take_tangent_signs, f.reals)
 
     def _settle(self, time: Real, quiet_turns: IntegerVariable) -> None:
-        """One iteration of the modes with memory, without an event."""
+        """One iteration of the stateful modes, without an event."""
         f, r = self.frame, self.frame.r
         r.call(self.functions.take_signs, f.reals, r.constant_boolean(False))
         self._count_quiet_turn(time, quiet_turns)
@@ -179,7 +179,7 @@ class Events:
         self._take_fired_signs()
 
     def _capture_again(self) -> None:
-        """Capture the present values that belong to modes with memory, before the reset of this iteration."""
+        """Capture the present values that belong to hysteresis modes, before the reset of this iteration."""
         f, r, places = self.frame, self.frame.r, self.frame.places
         if not f.sizes.recaptured:
             return
@@ -195,7 +195,7 @@ class Events:
             z[recaptured[i]] = new_z[recaptured[i]]
 
     def _remember_modes(self) -> None:
-        """Store the present modes as the previous values that modes with memory read."""
+        """Store the present values of hysteresis modes as their previous values."""
         f = self.frame
         if not f.sizes.remembered:
             return

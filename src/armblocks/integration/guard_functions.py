@@ -136,8 +136,7 @@ class GuardFunctions:
         return found.value
 
     def _any_contradicts(self, r: Routine, reals: Reals, follows: Boolean) -> Boolean:
-        """Whether an inconsistent mode is a function of the signals (``follows``), or whether another one
-        is."""
+        """Whether a following mode is inconsistent (``follows``), or whether a stateful mode is."""
         found, contradictions = r.boolean(False), reals.after(self.places.contradictions)
         followers = r.integers("mode.follows", self.followers)
         for i in r.each(len(self.modes)):
@@ -147,8 +146,8 @@ class GuardFunctions:
 
     def _hold_modes(self, r: Routine, reals: Reals, follows: Boolean, only_first: Boolean) -> None:
         """Keep in ``new_z`` the values of the reset for inconsistent modes of one kind, all or only the
-        first; give all other modes their old values. ``follows`` selects modes that are functions of the
-        signals, else the rest."""
+        first; give all other modes their old values. ``follows`` selects following modes, else stateful
+        modes."""
         z, new_z, contradictions = (
             reals.after(place) for place in (self.places.z, self.places.new_z, self.places.contradictions)
         )
@@ -162,7 +161,7 @@ class GuardFunctions:
             held.value = kept | (contradicts & only_first)
 
     def _take_followers(self, r: Routine, reals: Reals) -> None:
-        """Copy the values of the reset for modes that are functions of the signals, and for derivatives."""
+        """Copy the values of the reset for following modes, and for derivatives."""
         places = self.places
         x, new_x, z, new_z = (
             reals.after(place) for place in (places.x, places.new_x, places.z, places.new_z)

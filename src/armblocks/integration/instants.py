@@ -5,9 +5,9 @@ At an instant (a tick, an event, a breakpoint, the start) the loop does the foll
 1. the flow is integrated up to the instant with the old values, and a step ends exactly there; if states
 store left limits, ``update`` is called without a marked clock;
 2. all clocks that tick now are marked and ``update`` gives ``z``;
-3. mode iteration: modes that are functions of the signals are made consistent; then ``reset`` gives ``x`` and
-   ``z`` for the guards that fire, because the jump changed their sign or their zero was located here; if none
-   fires, inconsistent modes with memory take their consistent values; this is repeated until nothing changes;
+3. mode iteration: following modes are made consistent; then ``reset`` gives ``x`` and ``z`` for the guards
+   that fire, because the jump changed their sign or their zero was located here; if none fires, inconsistent
+   stateful modes take their consistent values; this is repeated until nothing changes;
 4. the instant is recorded: signals are right-continuous;
 5. the integration restarts. The first step after an event is at most a hundredth of the time between the last
    two events, and each later step at most ten times the one before. No step can then pass over bounces whose

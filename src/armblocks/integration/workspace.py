@@ -88,7 +88,7 @@ class Count(IntEnum):
     SAVED = 13
     """Whether the checkpoint has been written."""
     WATCHED = 14
-    """Number of steps so far that count for the interval between stiffness checks."""
+    """Number of steps so far; every ``CHECK_EVERY``-th step is checked for stiffness."""
     STIFF = 15
     """Explicit methods: number of checks with a stability-limited step. Methods for stiff systems: number of
     consecutive checks after which an explicit method, which could take the same steps, takes over."""
@@ -140,10 +140,10 @@ class LoopSizes:
     - ``directions``: the direction of each guard. ``stops``: the guards that end the run when they are
       positive.
     - ``captures``: whether ``update`` is also called just before every instant.
-    - ``modes``: the places of the modes in ``z``. ``followers``: for each mode, whether it is a function of
-      the signals.
-    - ``remembered``: the places in ``z`` of the modes with memory, each with the place of its previous value.
-    - ``recaptured``: the places in ``z`` of the captured values that belong to modes with memory.
+    - ``modes``: the places of the modes in ``z``. ``followers``: for each mode, whether it is a following
+      mode.
+    - ``remembered``: the places in ``z`` of the hysteresis modes, each with the place of its previous value.
+    - ``recaptured``: the places in ``z`` of the captured values that belong to hysteresis modes.
     - ``momentary``: the places in ``z`` that are set to 0 at the end of every instant.
     - ``silenced``: guards, each with a place in ``momentary``; the guard does not fire while that value is
       nonzero.
@@ -247,5 +247,5 @@ class Workspace:
         self.counts = int(Count.END) + len(sizes.clocks) + 2 * lines
 
     def slope(self, row: int) -> int:
-        """Where row ``row`` of the stage derivatives begins."""
+        """The place of row ``row`` of the stage derivatives."""
         return self._slopes + row * self.states

@@ -114,7 +114,7 @@ Mark: TypeAlias = Polyline | Curve | Rectangle | Disc | Text | Raster | Group
 
 @dataclass(eq=False, kw_only=True)
 class Picture:
-    """A drawing under construction: size in px, words for readers who cannot see it, and its marks."""
+    """A drawing under construction: size in px, text alternative, and marks."""
 
     width: float
     height: float

@@ -105,7 +105,8 @@ class Recording:
         return None if self._log is None else self._write
 
     def hand_over(self) -> None:
-        """Write the remaining samples of the last part to the log. Raises as the :attr:`consumer`."""
+        """Write the remaining samples of the last part to the log. Raises the errors of the
+        :attr:`consumer`."""
         if self._log is not None and self.stretches:
             self.stretches[-1].settle()
             self._write(self.stretches[-1].rows())
