@@ -37,7 +37,8 @@ def _beginning(typed: str, names: tuple[str, ...]) -> list[str]:
 
 
 def _files(typed: str) -> list[str]:
-    """Folders, and files with a suffix of robots (diagrams have that of JSON), in the typed folder."""
+    """Folders and files in the typed folder that have a suffix of robots, which include ``.json`` of
+    diagrams."""
     from armblocks.formats import ROBOT_SUFFIXES
 
     folder, slash, beginning = typed.rpartition("/")

@@ -60,8 +60,8 @@ class Arrays:
 class Frame:
     """The routine of a loop with its arrays and its variables.
 
-    Scalars that change in every step are variables between the calls of the loop; :meth:`keep` writes them
-    back into the arrays.
+    Scalars that change in every step are variables during a call of the loop. Between calls the arrays hold
+    them: :meth:`keep` writes them there.
     """
 
     def __init__(self, r: Routine, arrays: Arrays, places: Workspace, sizes: LoopSizes) -> None:
@@ -123,7 +123,7 @@ class Frame:
         self.whole.leave()
 
     def leave_unless(self, condition: Boolean, status: Status) -> None:
-        """Return from the loop where the condition fails."""
+        """Return from the loop if the condition fails."""
         with self.r.unless(condition):
             self.leave(status)
 

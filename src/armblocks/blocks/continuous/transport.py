@@ -139,8 +139,8 @@ class VariableTransportDelay(Block):
     """A transport delay in a pipe: y(t) = u(t - d), where ``T(t)`` is the transit time at the inlet.
 
     The flow between t - d and t fills the pipe, so the integral of 1/T over that time is 1. Therefore d' = 1
-    - T(t - d) / T(t). (Simulink's Variable Transport Delay; Variable Time Delay takes T itself for d.) A
-    transit time that is not above 0 ends the run with an error.
+    - T(t - d) / T(t). This is Simulink's Variable Transport Delay; the input of a Variable Time Delay is d
+    itself. A transit time of 0 or below ends the run with an error.
     """
 
     title: ClassVar[str] = "Variable Transport Delay"
