@@ -51,6 +51,7 @@ def value(text: str, rule: Parameter = ANY_ARRAY) -> object:
         ("diag([1 2])", [[1, 0], [0, 2]]),
         ("diag(A)", [1, 4]),
         ("sum(v) + norm([3 4])", 11),
+        ("norm(A)^2", 30),
         ("90*deg - deg2rad(90) + rad2deg(pi)", 180),
         ("-inf", -math.inf),
         ("[]", []),

@@ -107,6 +107,8 @@ REFUSED = [
     ("x = inv([1 2])", "a 1 x 2 matrix has no inverse"),
     ("x = inv([1 1; 1 1])", "a singular matrix has no inverse"),
     ("x = max([])", "max: the array is empty"),
+    ("x = norm([1 2; 3 4])", "norm: the argument is a matrix, whose norm\\(A\\) would be its largest"),
+    ("x = norm([1 2], 'inf')", "norm: the option is not known; allowed is 'fro'"),
     ("x = sin", "the function 'sin' has no arguments"),
     ("a = 'b'; x = a(end)", "what 'end' belongs to is text"),
     ("a(:) = 1", "assignment to several elements at once"),

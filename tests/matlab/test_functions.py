@@ -31,6 +31,7 @@ ARGUMENTS = {
     **dict.fromkeys(("transl", "SE3"), ("v",)),
     **dict.fromkeys(("zeros", "ones", "eye"), ("2", "3")),
     "linspace": ("-1", "2.5", "7"),
+    "norm": ("v",),
     "if": ("v > 0", "v", "w"),
     **dict.fromkeys(("rotx", "roty", "rotz", "trotx", "troty", "trotz"), ("k",)),
 }
@@ -93,6 +94,7 @@ def test_numbers_constants_and_symbols_have_the_same_values(name: str) -> None:
         ("mean([1 2 6])", 3.0),
         ("sum(mean([1 2; 3 4]))", 5.0),
         ("norm([3 4])", 5.0),
+        ("norm([1 2; 2 4], 'fro')", 5.0),
         ("dot([1 2 3], [4 5 6])", 32.0),
         ("sum(cross([1 0 0], [0 1 0]) == [0 0 1])", 3.0),
         ("trace([1 2; 3 4])", 5.0),

@@ -31,6 +31,14 @@ def _mean(by: Arithmetic, x: Any) -> Any:
     return by.quotient(by.total(x), by.constant(np.array([[float(rows if rows > 1 else columns)]])))
 
 
+def _norm(by: Arithmetic, x: Any, kind: Any = None) -> Any:
+    if kind is None and by.has_orientation and 1 not in by.shape(x):
+        raise MismatchError("the argument is a matrix, whose norm(A) would be its largest singular value")
+    if not (kind is None or (isinstance(kind, str) and kind == "fro")):
+        raise MismatchError("the option is not known; allowed is 'fro'")
+    return by.length_of(x)
+
+
 def _vectors(by: Arithmetic, name: str, count: int | None, *vectors: Any) -> list[list[Any]]:
     found = [by.entries(vector) for vector in vectors]
     sizes = {len(entries) for entries in found}
@@ -185,11 +193,13 @@ FUNCTIONS_OF_ARRAYS: Mapping[str, Function] = {
     ),
     "mean": whole("x", "The mean of the elements.", ARRAYS, _mean),
     "norm": whole(
-        "x",
-        "The length of a vector; of a matrix, the root of the sum of all squares, "
-        "which is MATLAB's `norm(A, 'fro')`.",
+        "x, 'fro'",
+        "The length of a vector; of a matrix, `norm(A, 'fro')` is the root of the sum of all squares, "
+        "in formulas also `norm(A)`.",
         ARRAYS,
-        lambda by, x: by.length_of(x),
+        _norm,
+        optional=1,
+        takes_text=True,
         reserved=True,
     ),
     "dot": whole("a, b", "The scalar product of two vectors.", ARRAYS, _dot),

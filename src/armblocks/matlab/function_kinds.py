@@ -25,6 +25,11 @@ class Arithmetic(Protocol):
     arrays, which are listed last.
     """
 
+    @property
+    def has_orientation(self) -> bool:
+        """Whether a row differs from a column, as in MATLAB."""
+        ...
+
     def elementary(self, name: str, *values: Any) -> Any:
         """A function of :mod:`armblocks.rounded_functions`."""
         ...

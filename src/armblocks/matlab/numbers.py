@@ -38,6 +38,8 @@ Plain = Array | str
 class NumberArithmetic:
     """The operations of the function table on arrays of numbers (:class:`~.function_kinds.Arithmetic`)."""
 
+    has_orientation = True
+
     def elementary(self, name: str, *values: Array) -> Array:
         """A correctly rounded function, element by element."""
         return np.vectorize(rounded_functions.FUNCTIONS[name], otypes=[np.float64])(*values)

@@ -58,6 +58,8 @@ _OPERATIONS: Mapping[str, Callable[[SX, SX], SX]] = {
 class SymbolArithmetic:
     """The operations of the function table on symbols (:class:`~.function_kinds.Arithmetic`)."""
 
+    has_orientation = False
+
     def elementary(self, name: str, *values: SX) -> SX:
         """An elementary function, correctly rounded for constants."""
         return elementary(name, *values)
