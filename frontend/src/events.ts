@@ -16,6 +16,11 @@ function changed(document: OpenDocument, state: DocumentState, change: ChangeOf<
     else delete blocks[name]
   }
   const removed = new Set(sheet.wires_removed.map(wireKey))
+  const lines = { ...document.lines }
+  for (const [source, one] of Object.entries(sheet.lines)) {
+    if (one) lines[source] = one
+    else delete lines[source]
+  }
   return {
     ...document,
     state,
@@ -23,6 +28,7 @@ function changed(document: OpenDocument, state: DocumentState, change: ChangeOf<
     blocks,
     name: document.inside.length ? document.name : state.title,
     wires: [...document.wires.filter((wire) => !removed.has(wireKey(wire))), ...sheet.wires_added],
+    lines,
     notes: sheet.notes ?? document.notes,
     description: sheet.description ?? document.description,
     logged: sheet.logged ?? document.logged,

@@ -36,6 +36,7 @@ export interface Envelope {
     | Rewind
     | RobotOfBlock
     | AskRobotTables
+    | RouteWires
     | Run
     | Save
     | AskScene
@@ -579,6 +580,29 @@ export interface AskRobotTables {
   kind: "robot_tables";
 }
 /**
+ * Ask for the lines of a sheet while blocks are dragged: those that are not as in the document.
+ *
+ * ``places``: where the dragged blocks are. ``wires``: the wires that are shown, if these are not those of
+ * the document. ``passed``: a block that lines do not avoid, because it may be dropped on one.
+ */
+export interface RouteWires {
+  kind: "route";
+  document: string;
+  inside?: string[];
+  places: {
+    [k: string]: Spot;
+  };
+  wires?: Wire[] | null;
+  passed?: string | null;
+}
+/**
+ * The top left corner of a block, px.
+ */
+export interface Spot {
+  x: number;
+  y: number;
+}
+/**
  * Start a run. ``speed`` is simulated seconds per second; ``None`` runs as fast as possible.
  *
  * ``tuned``: trial values of tunable parameters, by ``block.parameter``; the model keeps its own values.
@@ -714,6 +738,9 @@ export interface SheetChange {
   };
   wires_added: Wire[];
   wires_removed: Wire[];
+  lines: {
+    [k: string]: WireLines | null;
+  };
   notes?: {
     [k: string]: SheetNote;
   } | null;
@@ -768,6 +795,19 @@ export interface ParameterRule {
   tunable: boolean;
   choices: string[];
   allowed: string;
+}
+/**
+ * The drawn lines of the wires from one output, px.
+ *
+ * ``paths``: for each target the corner points from the output or from a branch of another path. A wire
+ * without points has no room for a line: the output and the target carry ``label``. ``dots``: branches.
+ */
+export interface WireLines {
+  paths: {
+    [k: string]: [number, number][];
+  };
+  dots: [number, number][];
+  label: string;
 }
 /**
  * A robot after a change: the complete content, because one cell may affect many others.
@@ -910,6 +950,9 @@ export interface Sheet {
     [k: string]: SheetBlock;
   };
   wires: Wire[];
+  lines: {
+    [k: string]: WireLines;
+  };
   notes: {
     [k: string]: SheetNote;
   };
@@ -1099,6 +1142,9 @@ export interface Replies {
   rewind: null;
   robot_of_block: string;
   robot_tables: RobotTables;
+  route: {
+    [k: string]: WireLines;
+  };
   run: string;
   save: string;
   scene: RobotScene;

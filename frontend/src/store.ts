@@ -16,6 +16,7 @@ import type {
   ViewOf,
   Wire,
   WireKind,
+  WireLines,
 } from './protocol'
 import { samples } from './samples'
 
@@ -30,6 +31,8 @@ export interface OpenDocument {
   description: string
   blocks: Record<string, SheetBlock>
   wires: Wire[]
+  /** The lines of the wires, by output. */
+  lines: Record<string, WireLines>
   notes: Record<string, SheetNote>
   /** Path of the library block that contains the sheet; empty if the sheet is not in a library block. */
   linked: string[]

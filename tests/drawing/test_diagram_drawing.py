@@ -43,6 +43,7 @@ from armblocks.drawing.diagram_drawing import (
     block_picture,
     diagram_picture,
     diagram_svg,
+    drawn_bends,
     obstacle,
     wire_nets,
 )
@@ -108,7 +109,7 @@ def routed(
     diagram: Diagram,
 ) -> tuple[dict[PortRef, list[PortRef]], list[Net], list[RoutedNet], list[Obstacle]]:
     placed = boxes(diagram)
-    nets, wires = wire_nets(diagram, placed)
+    nets, wires = wire_nets(diagram.connections, drawn_bends(diagram), placed)
     obstacles = [obstacle(box) for box in placed.values()]
     return wires, nets, route(obstacles, nets), obstacles
 

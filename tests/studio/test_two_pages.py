@@ -28,6 +28,7 @@ from armblocks.studio.protocol.messages.sheet_edits import (
 )
 from armblocks.studio.protocol.messages.sheets import SheetChange
 from armblocks.studio.sheet.document import Document
+from armblocks.studio.sheet.lines import SheetLines, other_lines
 from armblocks.studio.sheet.shown import sheet, sheet_change
 
 HERE = Place(x=0, y=0)
@@ -143,6 +144,7 @@ class Page:
         self.version = document.version
         self.blocks: dict[str, Any] = dict(sheet(document.diagram).blocks)
         self.wires = set(sheet(document.diagram).wires)
+        self.lines: dict[str, Any] = dict(SheetLines().of(document.diagram))
         self.coming: deque[tuple[int, SheetChange]] = deque()
 
     def hear(self) -> None:
@@ -154,6 +156,7 @@ class Page:
             else:
                 self.blocks[name] = block
         self.wires = (self.wires - set(told.wires_removed)) | set(told.wires_added)
+        self.lines = {key: lines for key, lines in {**self.lines, **told.lines}.items() if lines is not None}
 
 
 def random_edit(random_: random.Random, page: Page) -> DiagramEdit:
@@ -177,7 +180,7 @@ def test_random_edits_of_two_pages_overwrite_no_unseen_change_and_converge(seed:
     """200 turns for each seed, 10 000 interleavings. An applied edit that has disappeared was undone by a
     page that had seen it."""
     random_ = random.Random(seed)
-    document = drawing()
+    document, lines = drawing(), SheetLines()
     pages = [Page("one", document), Page("two", document)]
     done: list[tuple[int, str, set[tuple[str, ...]]]] = []
     for _ in range(200):
@@ -196,10 +199,12 @@ def test_random_edits_of_two_pages_overwrite_no_unseen_change_and_converge(seed:
             if author != page.name and version > page.version:
                 assert not clash(touched, theirs), "an edit that the page had not seen was overwritten"
         done.append((document.version, page.name, touched))
+        changed = other_lines(lines.of(before), lines.of(document.diagram))
         for listener in pages:
-            listener.coming.append((document.version, sheet_change(before, document.diagram)))
+            listener.coming.append((document.version, sheet_change(before, document.diagram, changed)))
     for page in pages:
         while page.coming:
             page.hear()
     assert pages[0].blocks == pages[1].blocks == sheet(document.diagram).blocks
     assert pages[0].wires == pages[1].wires == set(sheet(document.diagram).wires)
+    assert pages[0].lines == pages[1].lines == SheetLines().of(document.diagram)

@@ -4,7 +4,7 @@ import { wireKey } from '../model/wires'
 import { useStudio } from '../store'
 import { present, type SheetDrag } from './sheet_drag'
 import { SheetGraph } from './sheet_graph'
-import { SheetRoutes } from './sheet_layout'
+import { useLiveLines } from './live_lines'
 import { useBending } from './wire_edge'
 
 /** The nodes and edges of the visible sheet, including the present drag. */
@@ -17,22 +17,26 @@ export function useSheetDrawing({ drag, freed, loose, into }: SheetDrag, chosenW
   const level = useStudio((s) => s.document!.inside.map((name) => `${name}/`).join(''))
   const selection = useStudio((s) => s.selection)
   const bending = useBending((s) => s.wire)
-  const [{ graph, routes }] = useState(() => ({ graph: new SheetGraph(), routes: new SheetRoutes() }))
+  const [graph] = useState(() => new SheetGraph())
   const shown = useMemo(() => {
     if (bending) return wires.map((wire) => (wireKey(wire) === wireKey(bending) ? bending : wire))
     return freed.length ? takenOut(present(blocks, freed), wires) : wires
   }, [wires, bending, freed, blocks])
-  const routed = useMemo(
-    () => routes.update(blocks, shown, drag, loose),
-    [routes, blocks, shown, drag, loose],
+  const dragged = useMemo(
+    () =>
+      shown === wires && loose === null && !Object.keys(drag).length
+        ? null
+        : { places: drag, wires: shown === wires ? null : shown, passed: loose },
+    [drag, shown, wires, loose],
   )
+  const { lines, late } = useLiveLines(dragged)
   const nodes = useMemo(
     () => graph.nodes(blocks, notes, findings, level, drag, selection),
     [graph, blocks, notes, findings, level, drag, selection],
   )
   const edges = useMemo(
-    () => graph.edges(shown, routed, kinds, level, chosenWires, into),
-    [graph, shown, routed, kinds, level, chosenWires, into],
+    () => graph.edges({ blocks, wires: shown, drag, lines, late, kinds, level, chosen: chosenWires, into }),
+    [graph, blocks, shown, drag, lines, late, kinds, level, chosenWires, into],
   )
   return { graph, nodes, edges }
 }

@@ -1,17 +1,18 @@
 import type { NodeHandle } from '@xyflow/react'
-import type { Finding, PortSpot, SheetBlock, SheetNote, Wire, WireKind } from '../protocol'
+import type { Finding, PortSpot, SheetBlock, SheetNote, Wire, WireKind, WireLines } from '../protocol'
 import type { BlockNodeType } from './block_node'
 import { wholeWay } from '../model/bends'
 import type { NoteNodeType } from './note_node'
-import type { Point, RoutedNet } from '../model/router'
+import { attached, endsOf, fits, type Lines, type Point } from '../model/wire_lines'
 import { blockOf, portOf, wireKey, type Places } from '../model/wires'
 import { PORT, side } from './sheet_layout'
-import type { WireEdgeType } from './wire_edge'
+import type { WireEdgeType, WireTag } from './wire_edge'
 
 export type SheetNode = BlockNodeType | NoteNodeType
 
 const NO_FINDINGS: Finding[] = []
 const NO_POINTS: Point[] = []
+const NO_TAGS: WireTag[] = []
 const SCALAR: WireKind = { shape: [], unit: '' }
 
 /**
@@ -34,6 +35,20 @@ class Kept<T> {
     this.known = this.seen
     this.seen = new Map()
   }
+}
+
+/** What the edges of a sheet are made from. */
+interface DrawnWires {
+  blocks: Record<string, SheetBlock>
+  wires: Wire[]
+  drag: Places
+  lines: Lines
+  /** Whether the server has not routed the dragged blocks for a while. */
+  late: boolean
+  kinds: Record<string, WireKind>
+  level: string
+  chosen: ReadonlySet<string>
+  into: string | null
 }
 
 /** The nodes and edges of one sheet, for React Flow. */
@@ -102,27 +117,24 @@ export class SheetGraph {
     return (this.lastNodes = unlessSame(this.lastNodes, made))
   }
 
-  edges(
-    wires: Wire[],
-    routed: Map<string, RoutedNet>,
-    kinds: Record<string, WireKind>,
-    level: string,
-    chosen: ReadonlySet<string>,
-    into: string | null,
-  ): WireEdgeType[] {
+  edges({ wires, lines, kinds, level, chosen, into, ...drawn }: DrawnWires): WireEdgeType[] {
     const dotted = new Set<string>()
+    const labelled = new Set<string>()
     const made = wires.map((wire) => {
-      const net = routed.get(wire.source)
+      const net = lines[wire.source]
       const kind = kinds[level + wire.source] ?? SCALAR
       const key = wireKey(wire)
       const dots = dotted.has(wire.source) ? NO_POINTS : (net?.dots ?? NO_POINTS)
       dotted.add(wire.source)
-      const path = net?.paths.get(key) ?? NO_POINTS
+      const { path, pending } = this.path(wire, net, drawn)
+      const tags = path.length || !net ? NO_TAGS : tagsOf(wire, net.label, drawn, labelled)
       const rank = kind.bus ? 3 : Math.min(kind.shape.length, 2)
       const carried = [kind.shape.join(' × '), kind.unit].filter(Boolean)
       const label = [`${wire.source} to ${wire.target}`, ...carried].join(', ')
       const selected = chosen.has(key)
-      return this.wires.get(key, [path, dots, net, rank, label, selected, wire, key === into], () => ({
+      const place = tags.map(({ x, y }) => `${x} ${y}`).join(' ')
+      const from = [path, dots, net, rank, label, selected, wire, key === into, pending, place]
+      return this.wires.get(key, from, () => ({
         id: key,
         type: 'wire',
         source: blockOf(wire.source),
@@ -138,13 +150,45 @@ export class SheetGraph {
           rank,
           label,
           bent: Boolean(wire.bends?.length),
-          way: () => (net ? wholeWay(net, key) : []),
+          pending,
+          tags,
+          way: () => (net ? wholeWay(net, wire.target) : []),
         },
       }))
     })
     this.wires.turn()
     return (this.lastEdges = unlessSame(this.lastEdges, made))
   }
+
+  /** The path of a wire; `pending`: the server has not said yet where it runs. */
+  private path(
+    wire: Wire,
+    net: WireLines | undefined,
+    { blocks, drag, late }: Pick<DrawnWires, 'blocks' | 'drag' | 'late'>,
+  ): { path: readonly Point[]; pending: boolean } {
+    const path = net?.paths[wire.target]
+    if (path && !(blockOf(wire.source) in drag) && !(blockOf(wire.target) in drag))
+      return { path, pending: false }
+    const ends = endsOf(wire, blocks, drag)
+    const branches = Boolean(path?.[0] && net?.dots.some(([x, y]) => x === path[0]![0] && y === path[0]![1]))
+    if (!ends || path?.length === 0) return { path: NO_POINTS, pending: false }
+    if (path && fits(path, branches, ends)) return { path, pending: false }
+    return { path: attached(path ?? NO_POINTS, branches, ends), pending: late || !path }
+  }
+}
+
+/** The labels of a wire without a line: at its target, and once at its output. */
+function tagsOf(
+  wire: Wire,
+  text: string,
+  { blocks, drag }: Pick<DrawnWires, 'blocks' | 'drag'>,
+  labelled: Set<string>,
+): WireTag[] {
+  const ends = endsOf(wire, blocks, drag)
+  if (!ends) return NO_TAGS
+  const shown = labelled.has(wire.source) ? ends.slice(1) : ends
+  labelled.add(wire.source)
+  return shown.map((end) => ({ ...end, text }))
 }
 
 const port = (spot: PortSpot, output: boolean): NodeHandle => ({

@@ -1,19 +1,23 @@
-import { BaseEdge, useReactFlow, type Edge, type EdgeProps } from '@xyflow/react'
+import { BaseEdge, EdgeLabelRenderer, useReactFlow, type Edge, type EdgeProps } from '@xyflow/react'
 import { memo } from 'react'
 import { create } from 'zustand'
 import type { Wire } from '../protocol'
 import { change } from '../store'
-import { dragged, isFlat } from '../model/bends'
+import { dragged } from '../model/bends'
 import { GRID } from './insert'
-import { svgPath, type Point } from '../model/router'
+import { isFlat, svgPath, type Point, type PortPlace } from '../model/wire_lines'
 
 export type WireEdgeType = Edge<
   {
-    path: Point[]
-    dots: Point[]
+    path: readonly Point[]
+    dots: readonly Point[]
     rank: number
     label: string
     bent: boolean
+    /** Whether the server has not said yet where the wire runs. */
+    pending: boolean
+    /** What its ends say where it has no line. */
+    tags: readonly WireTag[]
     /**
      * The whole way from the source, of which `path` is the last part where the wire branches from another.
      */
@@ -21,6 +25,11 @@ export type WireEdgeType = Edge<
   },
   'wire'
 >
+
+/** A label at a port. */
+export interface WireTag extends PortPlace {
+  text: string
+}
 
 /** The wire whose route is being drawn, with its present bends. */
 export const useBending = create<{ wire: Required<Wire> | null }>(() => ({ wire: null }))
@@ -31,25 +40,22 @@ const SNAP = 7
  * A wire along its way: thin for a scalar, heavier for a vector, double for a matrix, three lines for a bus.
  * Its pieces can be dragged.
  */
-export const WireEdge = memo(function WireEdge({
-  id,
-  data,
-  selected,
-  sourceX,
-  sourceY,
-  targetX,
-  targetY,
-}: EdgeProps<WireEdgeType>) {
-  const path = data?.path.length
-    ? data.path
-    : ([
-        [sourceX, sourceY],
-        [targetX, targetY],
-      ] as Point[])
-  const rank = data?.rank ?? 0
-  const line = svgPath(path)
+export const WireEdge = memo(function WireEdge({ id, data, selected }: EdgeProps<WireEdgeType>) {
+  if (!data) return null
+  const { path, rank } = data
+  const line = svgPath(path, data.dots)
+  const named = ['wire', selected && 'selected', data.pending && 'pending'].filter(Boolean).join(' ')
+  if (!path.length)
+    return (
+      <g className={named}>
+        {data.tags.map((tag) => (
+          <Tag key={`${tag.x} ${tag.y}`} tag={tag} selected={Boolean(selected)} />
+        ))}
+        <title>{data.label}</title>
+      </g>
+    )
   return (
-    <g className={selected ? 'wire selected' : 'wire'}>
+    <g className={named}>
       <BaseEdge
         id={id}
         path={line}
@@ -59,20 +65,52 @@ export const WireEdge = memo(function WireEdge({
       />
       {rank >= 2 && <path d={line} className={rank === 3 ? 'core wide' : 'core'} />}
       {rank === 3 && <path d={line} className="line rank0 inner" />}
-      {data?.dots.map(([x, y]) => (
+      {data.dots.map(([x, y]) => (
         <circle key={`${x} ${y}`} cx={x} cy={y} r={2.6 + 0.3 * rank} className="dot" />
       ))}
-      {data &&
-        path
-          .slice(1)
-          .map((_, piece) => <Piece key={piece} id={id} path={path} piece={piece} way={data.way} />)}
-      {data?.label && <title>{data.label}</title>}
+      {path.slice(1).map((_, piece) => (
+        <Piece key={piece} id={id} path={path} piece={piece} way={data.way} />
+      ))}
+      <title>{data.label}</title>
     </g>
   )
 })
 
+/** px of dashed line between a port and the label of a wire without a line, as in `drawing.wire_marks`. */
+const TAG_STUB = 8
+
+/** A dashed stub at a port, and a label that says to what it is connected, above the blocks. */
+function Tag({ tag: { x, y, dx, dy, text }, selected }: { tag: WireTag; selected: boolean }) {
+  const [tx, ty] = [x + TAG_STUB * dx, y + TAG_STUB * dy]
+  const shift = `translate(${50 * (dx - 1)}%, ${50 * (dy - 1)}%)`
+  return (
+    <>
+      <line x1={x} y1={y} x2={tx} y2={ty} className="line rank0 stub" />
+      <line x1={x} y1={y} x2={tx} y2={ty} className="piece" />
+      <EdgeLabelRenderer>
+        <span
+          className={selected ? 'wire-tag selected' : 'wire-tag'}
+          style={{ transform: `translate(${tx}px, ${ty}px) ${shift}` }}
+        >
+          {text}
+        </span>
+      </EdgeLabelRenderer>
+    </>
+  )
+}
+
 /** One segment of a wire, which can be dragged. */
-function Piece({ id, path, piece, way }: { id: string; path: Point[]; piece: number; way: () => Point[] }) {
+function Piece({
+  id,
+  path,
+  piece,
+  way,
+}: {
+  id: string
+  path: readonly Point[]
+  piece: number
+  way: () => Point[]
+}) {
   const flow = useReactFlow()
   const [[x1, y1], [x2, y2]] = [path[piece]!, path[piece + 1]!]
   const flat = isFlat(path, piece)

@@ -1,21 +1,23 @@
-import { corners, type Point, type RoutedNet } from './router'
+import type { WireLines } from '../protocol'
+import { corners, isFlat, type Point } from './wire_lines'
 
 /**
  * User-drawn routes: the dragged segments of a wire are stored as `bends`, the alternating coordinates of
- * the segments (see `bent` in the router).
+ * the segments (see `bent` in `armblocks.drawing.wires`).
  */
 
 const STUB = 15
 
-export const isFlat = (path: readonly Point[], piece: number): boolean =>
-  path[piece]![1] === path[piece + 1]![1]
-
-/** The complete route of a wire: its own path, preceded by the part shared with the wire it branches from. */
-export function wholeWay(net: RoutedNet, key: string, seen: ReadonlySet<string> = new Set([key])): Point[] {
-  const own = net.paths.get(key) ?? []
+/** The whole route to a target: its own path, preceded by what it shares with the one it branches from. */
+export function wholeWay(
+  net: WireLines,
+  target: string,
+  seen: ReadonlySet<string> = new Set([target]),
+): Point[] {
+  const own = net.paths[target] ?? []
   const [start] = own
   if (!start) return []
-  for (const [other, path] of net.paths) {
+  for (const [other, path] of Object.entries(net.paths)) {
     if (seen.has(other)) continue
     for (let k = 1; k < path.length; k++)
       if (lies(start, path[k - 1]!, path[k]!) && !same(start, path[0]!)) {

@@ -1,6 +1,6 @@
 import type { SheetBlock, Wire } from '../protocol'
 import { blockOf, wireKey, type Places } from './wires'
-import type { Point } from './router'
+import type { Point } from './wire_lines'
 
 /** Disconnecting blocks from wires and inserting them into wires: the resulting changes of the wires. */
 

@@ -4,7 +4,7 @@ import { useStore } from '@xyflow/react'
 import { useEffect, useMemo, useRef, useState } from 'react'
 import { createPortal } from 'react-dom'
 import { create } from 'zustand'
-import type { Point } from '../model/router'
+import type { Point } from '../model/wire_lines'
 import type { WireEdgeType } from '../canvas/wire_edge'
 import { changed, watch } from '../frames'
 import type { PortSpot, SheetBlock } from '../protocol'
@@ -223,7 +223,7 @@ function WireTools({
   )
 }
 
-const length = (path: Point[], k: number) =>
+const length = (path: readonly Point[], k: number) =>
   path[k + 1] ? Math.abs(path[k + 1]![0] - path[k]![0]) + Math.abs(path[k + 1]![1] - path[k]![1]) : 0
 
 /** The output of the wire under the pointer; empty if there is none. */

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from armblocks.diagram import (
@@ -71,7 +71,7 @@ def diagram_picture(
     level = carried.levels[sheet]
     path = f"{sheet}/" if sheet else ""
     placed = boxes(level)
-    nets, wires = wire_nets(level, placed)
+    nets, wires = wire_nets(level.connections, drawn_bends(level), placed)
     routed = route([obstacle(box) for box in placed.values()], nets)
     marks: list[Mark] = []
     for (source, _), net in zip(wires.items(), routed):
@@ -141,19 +141,25 @@ def block_picture(block: Block) -> Picture:
     return picture
 
 
-def wire_nets(diagram: Diagram, placed: dict[str, Box]) -> tuple[list[Net], dict[PortRef, list[PortRef]]]:
+def drawn_bends(diagram: Diagram) -> Mapping[Connection, tuple[float, ...]]:
+    """The user-drawn routes, which are of the diagram's own layout."""
+    return diagram.bends if set(diagram.layout) >= set(diagram.blocks) else {}
+
+
+def wire_nets(
+    connections: Iterable[Connection],
+    bends: Mapping[Connection, tuple[float, ...]],
+    placed: Mapping[str, Box],
+) -> tuple[list[Net], dict[PortRef, list[PortRef]]]:
     """The nets to route: one for every connected output, and its targets by source."""
     wires: dict[PortRef, list[PortRef]] = {}
-    for wire in sorted(diagram.connections, key=lambda w: (w.source, w.target)):
+    for wire in sorted(connections, key=lambda w: (w.source, w.target)):
         wires.setdefault(wire.source, []).append(wire.target)
-    drawn: Mapping[Connection, tuple[float, ...]] = {}
-    if set(diagram.layout) >= set(diagram.blocks):
-        drawn = diagram.bends
     nets = [
         Net(
             _end(placed[source.block].outputs, source.port),
             tuple(_end(placed[target.block].inputs, target.port) for target in targets),
-            tuple(drawn.get(Connection(source, target), ()) for target in targets),
+            tuple(bends.get(Connection(source, target), ()) for target in targets),
         )
         for source, targets in wires.items()
     ]
@@ -176,14 +182,18 @@ def obstacle(box: Box) -> Obstacle:
 
 
 def _label(box: Box) -> tuple[float, float, float, float]:
-    """The rectangle of the block's name: below the block, but above round sums, which wires enter from
-    below."""
+    """The rectangle of the block's name: on a side without wires, as in the studio."""
     width = box.name_width
     if not box.upright:  # wires leave above and below
         return box.x + box.width + 5, box.y + box.height / 2 - 7, width, NAME_ROOM - 4
-    if _shape(box) is Outline.CIRCLE:
+    if _name_above(box):
         return box.x + box.width * 0.78, box.y - NAME_SIZE - 2, width, NAME_SIZE + 3
     return box.x + (box.width - width) / 2, box.y + box.height + 2, width, NAME_ROOM - 4
+
+
+def _name_above(box: Box) -> bool:
+    """Whether wires enter a block from below, as a round sum."""
+    return any(spot.y >= box.y + box.height for spot in box.inputs)
 
 
 def _shape(box: Box) -> Outline:
@@ -241,10 +251,10 @@ def _outline(box: Box) -> Mark:
 
 
 def _block(box: Box, trend: Trend | None) -> list[Mark]:
-    shape, marks = _shape(box), block_marks(box, trend)
+    marks = block_marks(box, trend)
     lx, ly, lw, _ = _label(box)
     name = shorten(box.name, NAME_SIZE, lw + 1)
-    if shape is Outline.CIRCLE or not box.upright:
+    if _name_above(box) or not box.upright:
         marks.append(Text(lx, ly + NAME_SIZE, name, NAME_SIZE, Tone.MUTED))
     else:
         marks.append(Text(lx + lw / 2, ly + NAME_SIZE + 1, name, NAME_SIZE, Tone.MUTED, "middle"))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TypeAlias
 
 from armblocks.diagram import Block, Diagram, Inport, Outport, Placement
 from armblocks.diagram.signs import Outline
@@ -23,6 +25,10 @@ _COLUMN_GAP = 52.0
 _LANE = 11.0
 _STRAIGHTEN = 13.0
 """Maximum shift of a block to straighten a line, px."""
+
+
+SumSides: TypeAlias = tuple[str, str, str]
+"""Inputs of a round sum: behind, above, below; ``""`` for none."""
 
 
 @dataclass(frozen=True)
@@ -79,9 +85,20 @@ def boxes(diagram: Diagram) -> dict[str, Box]:
     drawn = drawn_blocks(diagram)
     if not diagram.layout or set(diagram.layout) < set(diagram.blocks):
         sized = {name: sized_box(name, block) for name, block in drawn.items()}
-        return with_turned_sums(diagram, _straightened(diagram, layered(diagram, sized)))
-    placed = {name: standing_box(name, block, diagram.layout[name]) for name, block in drawn.items()}
-    return with_turned_sums(diagram, placed)
+        placed = _straightened(diagram, layered(diagram, sized))
+        sides = _sum_sides(diagram, placed)
+    else:
+        placed, sides = _placed(diagram), sum_sides(diagram)
+    return {name: turned_sum(box, sides[name]) if name in sides else box for name, box in placed.items()}
+
+
+def _placed(diagram: Diagram) -> Mapping[str, Box]:
+    """The boxes of all blocks where the layout has them, sums upright."""
+    drawn = drawn_blocks(diagram)
+    return diagram.keep(
+        "placed boxes",
+        lambda: {name: standing_box(name, block, diagram.layout[name]) for name, block in drawn.items()},
+    )
 
 
 def drawn_blocks(diagram: Diagram) -> Mapping[str, Block]:
@@ -102,15 +119,18 @@ def _numbered(diagram: Diagram) -> dict[str, Block]:
 
 def standing_box(name: str, block: Block, place: Placement) -> Box:
     """The box of a block at ``place``, independent of its connections."""
-    sized = sized_box(name, block)
+    return replace(_at_origin(block, replace(place, x=0.0, y=0.0)), name=name).at(place.x, place.y)
+
+
+@lru_cache(maxsize=4096)
+def _at_origin(block: Block, place: Placement) -> Box:
+    sized = sized_box("", block)
     width, height = sized.width, sized.height
     if place.rotation % 180:
         width, height = _standing(sized)
     return _with_ports(
         replace(
             sized,
-            x=place.x,
-            y=place.y,
             width=place.width or width,
             height=place.height or height,
             flipped=place.flipped,
@@ -167,44 +187,52 @@ def _apart(a: Box, b: Box) -> bool:
     )
 
 
-def with_turned_sums(diagram: Diagram, placed: Mapping[str, Box]) -> dict[str, Box]:
-    """Move each input of a round sum to the side from which its wire comes; the signs move with the ports."""
-    turned = dict(placed)
-    for name, box in placed.items():
-        count = len(box.inputs)
-        if face_size(box.block)[0] is not Outline.CIRCLE or count not in (2, 3) or box.rotation:
-            continue
-        centre = box.y + box.height / 2
-        height = {
-            wire.target.port: _port_y(placed[wire.source.block].outputs, wire.source.port) - centre
-            for wire in diagram.connections
-            if wire.target.block == name
-        }
-        if len(height) < count:
+def turned_sum(box: Box, sides: SumSides) -> Box:
+    """A round sum with each input on the side from which its wire comes; the signs move with the ports."""
+    behind, above, below = sides
+    x, first = box.x + box.width / 2, box.inputs[0]
+    spots = {
+        behind: PortSpot(behind, first.x, box.y + box.height / 2, first.dx, 0),
+        above: PortSpot(above, x, box.y, 0, 1),
+        below: PortSpot(below, x, box.y + box.height, 0, -1),
+    }
+    return replace(box, inputs=tuple(spots[spot.name] for spot in box.inputs))
+
+
+def sum_sides(diagram: Diagram) -> Mapping[str, SumSides]:
+    """The inputs of round sums that are behind, above and below, for those that are turned by their wires."""
+    return diagram.keep("sum sides", lambda: _sum_sides(diagram, _placed(diagram)))
+
+
+def _sum_sides(diagram: Diagram, placed: Mapping[str, Box]) -> dict[str, SumSides]:
+    sums = {
+        name: box
+        for name, box in placed.items()
+        if len(box.inputs) in (2, 3) and not box.rotation and face_size(box.block)[0] is Outline.CIRCLE
+    }
+    sources: dict[str, dict[str, tuple[float, float]]] = {name: {} for name in sums}
+    for wire in diagram.connections:
+        if wire.target.block in sums:
+            source = placed[wire.source.block]
+            height = _port_y(source.outputs, wire.source.port)
+            sources[wire.target.block][wire.target.port] = source.x, height
+    found: dict[str, SumSides] = {}
+    for name, box in sums.items():
+        if len(sources[name]) < len(box.inputs):
             continue  # an incomplete diagram: the direction of an open input is unknown
         ports = [spot.name for spot in box.inputs]
         # The straightest wire enters from the left, except the feedback wire of a loop.
-        behind = {
-            wire.target.port: placed[wire.source.block].x < box.x
-            for wire in diagram.connections
-            if wire.target.block == name
-        }
-        west = min(ports, key=lambda port: (not behind[port], abs(height[port]), port))
-        others = sorted((port for port in ports if port != west), key=lambda port: (height[port], port))
-        if count == 3:
-            north, south = others
+        behind = {port: x < box.x for port, (x, _) in sources[name].items()}
+        heights = {port: y - box.y - box.height / 2 for port, (_, y) in sources[name].items()}
+        west = min(ports, key=lambda port: (not behind[port], abs(heights[port]), port))
+        others = sorted((port for port in ports if port != west), key=lambda port: (heights[port], port))
+        if len(others) == 2:
+            found[name] = west, others[0], others[1]
         else:
             (other,) = others
-            north, south = (other, "") if behind[other] and height[other] < -box.height else ("", other)
-        x, top, bottom = box.x + box.width / 2, box.y, box.y + box.height
-        first = box.inputs[0]
-        spots = {
-            west: PortSpot(west, first.x, centre, first.dx, 0),
-            north: PortSpot(north, x, top, 0, 1),
-            south: PortSpot(south, x, bottom, 0, -1),
-        }
-        turned[name] = replace(box, inputs=tuple(spots[port] for port in ports))
-    return turned
+            above = behind[other] and heights[other] < -box.height
+            found[name] = (west, other, "") if above else (west, "", other)
+    return found
 
 
 def layered(diagram: Diagram, sized: Mapping[str, Box]) -> dict[str, Box]:

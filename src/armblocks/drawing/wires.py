@@ -39,6 +39,11 @@ class Net:
     """The user-drawn route for each target, see :func:`bent`; empty for automatic routing."""
 
 
+def moved_bends(bends: Sequence[float], flat: bool, shift: tuple[float, float]) -> tuple[float, ...]:
+    """A user-drawn route whose blocks have moved by ``shift``; ``flat``: it leaves its source sideways."""
+    return tuple(value + shift[(k + flat + 1) % 2] for k, value in enumerate(bends))
+
+
 @dataclass(frozen=True)
 class RoutedNet:
     """The drawn lines of a net.

@@ -31,6 +31,7 @@ from armblocks.studio.robots.open_robots import OpenRobots
 from armblocks.studio.robots.presenter import RobotPresenter
 from armblocks.studio.runs.desk import RunDesk
 from armblocks.studio.runs.settings import setting_rules, solver_choices
+from armblocks.studio.sheet.lines import LinesOfSheets
 from armblocks.studio.sheet.nesting import with_robot
 from armblocks.studio.sheet.open_documents import OpenDocuments
 from armblocks.studio.sheet.presenter import DiagramPresenter
@@ -62,18 +63,19 @@ class Hub:
         self._pages = Pages()
         self._diagrams = OpenDocuments(folder, self._kept, self._resolve_robot)
         self.runs = RunDesk(folder, self._pages, self._diagrams, self._resolve_robot)
+        lines = LinesOfSheets()
         robots = RobotPresenter(OpenRobots(folder, self._kept), folder, self._robot_saved)
         self.documents = DocumentDesk(
             folder,
             self._pages,
-            {"diagram": DiagramPresenter(self._diagrams, self._pages, self.runs), "robot": robots},
+            {"diagram": DiagramPresenter(self._diagrams, self._pages, self.runs, lines), "robot": robots},
         )
         self.answers = Answers()
         self.answers.on(Ping, self._ping)
         self.answers.on(Files, self._files)
         for part in (
             self.documents,
-            SheetQueries(folder, self.documents, self._diagrams, self._resolve_robot),
+            SheetQueries(folder, self.documents, self._diagrams, self._resolve_robot, lines),
             RobotDesk(folder, self.documents, robots, self._diagrams),
             self.runs,
         ):

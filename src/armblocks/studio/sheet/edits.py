@@ -30,6 +30,7 @@ from armblocks.diagram.diagram import block_in_scope
 from armblocks.diagram.mask import Scope
 from armblocks.diagram.names import folded
 from armblocks.drawing.diagram_layout import standing_box
+from armblocks.drawing.wires import moved_bends
 from armblocks.errors import DiagramError, UnknownNameError
 from armblocks.studio.documents.edit_table import EditTable
 from armblocks.studio.protocol.messages.sheet_edits import (
@@ -162,7 +163,7 @@ def _remove(edit: RemoveBlocks, diagram: Diagram, _: EditContext) -> Diagram:
 
 def _without(edit: RemoveBlocks, diagram: Diagram) -> Diagram:
     gone = {_known(name, diagram) for name in edit.blocks}
-    cut = {_connection(wire) for wire in edit.wires}
+    cut = {connection(wire) for wire in edit.wires}
     for wire in cut:
         _present(wire, diagram)
     return dataclasses.replace(
@@ -206,7 +207,7 @@ def _connect(edit: Connect, diagram: Diagram, _: EditContext) -> Diagram:
 def _connected(wires: Sequence[Wire], diagram: Diagram, *, replace: bool) -> Diagram:
     connections = {wire.target: wire for wire in diagram.connections}
     for wire in wires:
-        made = _connection(wire)
+        made = connection(wire)
         _check_port(made.source, diagram, output=True)
         _check_port(made.target, diagram, output=False)
         present = connections.get(made.target)
@@ -224,7 +225,8 @@ def _connected(wires: Sequence[Wire], diagram: Diagram, *, replace: bool) -> Dia
     return _bent([wire for wire in wires if wire.bends], connected)
 
 
-def _connection(wire: Wire) -> Connection:
+def connection(wire: Wire) -> Connection:
+    """The connection that a wire of a message means; raises ``DiagramError`` for what is no port."""
     return Connection(_port(wire.source), _port(wire.target))
 
 
@@ -268,8 +270,7 @@ def _move(edit: MoveBlocks, diagram: Diagram, _: EditContext) -> Diagram:
     for wire, values in diagram.bends.items():
         shift = shifts.get(wire.source.block)
         if shift is not None and shift == shifts.get(wire.target.block):
-            flat = _leaves_sideways(wire, diagram)
-            bends[wire] = tuple(value + shift[(k + flat + 1) % 2] for k, value in enumerate(values))
+            bends[wire] = moved_bends(values, _leaves_sideways(wire, diagram), shift)
     moved = _noted(edit.notes, dataclasses.replace(diagram, layout=layout, bends=bends), known=True)
     return _connected(edit.wires, _without(RemoveBlocks(wires=edit.instead), moved), replace=False)
 
@@ -288,7 +289,7 @@ def _bend(edit: BendWires, diagram: Diagram, _: EditContext) -> Diagram:
 def _bent(wires: Sequence[Wire], diagram: Diagram) -> Diagram:
     bends = dict(diagram.bends)
     for wire in wires:
-        bends[_present(_connection(wire), diagram)] = tuple(wire.bends)
+        bends[_present(connection(wire), diagram)] = tuple(wire.bends)
     return dataclasses.replace(diagram, bends=bends)
 
 

@@ -12,6 +12,7 @@ from armblocks.studio.documents.presenter import Opening, Place, Presenter
 from armblocks.studio.protocol.messages.sheets import Checked, DiagramChange, DiagramContent
 from armblocks.studio.protocol.page import Page, Pages
 from armblocks.studio.sheet.check import check
+from armblocks.studio.sheet.lines import LinesOfSheets, other_lines
 from armblocks.studio.sheet.nesting import inside, linked_part
 from armblocks.studio.sheet.open_documents import OpenDocument, OpenDocuments
 from armblocks.studio.sheet.shown import sheet, sheet_change
@@ -35,8 +36,11 @@ class RunsOfDiagrams(Protocol):
 class DiagramPresenter(Presenter[OpenDocument]):
     """Shows on each page the sheet of a diagram that the page has selected."""
 
-    def __init__(self, files: OpenDocuments, pages: Pages, runs: RunsOfDiagrams) -> None:
+    def __init__(
+        self, files: OpenDocuments, pages: Pages, runs: RunsOfDiagrams, lines: LinesOfSheets
+    ) -> None:
         super().__init__(files)
+        self._lines = lines
         self._documents = files
         self._pages = pages
         self._runs = runs
@@ -58,7 +62,8 @@ class DiagramPresenter(Presenter[OpenDocument]):
     def content(self, found: OpenDocument, place: Place) -> DiagramContent:
         """Return the sheet at a path."""
         diagram = found.document.diagram
-        drawn, linked = sheet(inside(diagram, place)), linked_part(diagram, place)
+        shown, linked = inside(diagram, place), linked_part(diagram, place)
+        drawn = sheet(shown, self._lines.on(found.key, place).of(shown))
         if linked:
             link = inside(diagram, linked).link
             drawn = drawn.model_copy(update={"linked": list(linked), "link": link})
@@ -72,8 +77,9 @@ class DiagramPresenter(Presenter[OpenDocument]):
     def change(self, found: OpenDocument, before: Diagram, place: Place) -> DiagramChange:
         """Return the changes of the sheet at a path."""
         diagram = found.document.diagram
+        old, new, lines = inside(before, place), inside(diagram, place), self._lines.on(found.key, place)
         return DiagramChange(
-            sheet=sheet_change(inside(before, place), inside(diagram, place)),
+            sheet=sheet_change(old, new, other_lines(lines.of(old), lines.of(new))),
             settings=dataclasses.asdict(diagram.settings),
         )
 

@@ -17,6 +17,8 @@ from armblocks.studio.protocol.messages import sheets as say
 from armblocks.studio.protocol.messages.sheet_edits import SetMask
 from armblocks.studio.protocol.page import Page
 from armblocks.studio.sheet.clipping import clipped
+from armblocks.studio.sheet.edits import connection
+from armblocks.studio.sheet.lines import LinesOfSheets, is_possible
 from armblocks.studio.sheet.mask_edits import mask_of
 from armblocks.studio.sheet.nesting import inside
 from armblocks.studio.sheet.open_documents import OpenDocuments
@@ -34,15 +36,18 @@ class SheetQueries:
         documents: DocumentDesk,
         diagrams: OpenDocuments,
         resolve_robot: ResolveRobot,
+        lines: LinesOfSheets,
     ) -> None:
         self._folder = folder
         self._documents = documents
         self._diagrams = diagrams
         self._resolve_robot = resolve_robot
+        self._lines = lines
 
     def register(self, answers: Answers) -> None:
         """Register the handlers of these requests."""
         answers.on(say.Look, self._look)
+        answers.on(say.RouteWires, self._route)
         answers.on(say.AskOutline, self._outline)
         answers.on(say.AskMask, self._mask)
         answers.on(say.Copy, self._copy)
@@ -55,6 +60,18 @@ class SheetQueries:
 
     async def _look(self, page: Page, request: say.Look) -> None:
         await self._documents.show(page, self._diagrams[request.document], tuple(request.inside))
+
+    async def _route(self, _: Page, request: say.RouteWires) -> dict[str, say.WireLines]:
+        sheet = self._sheet(request.document, request.inside)
+        lines = self._lines.on(request.document, tuple(request.inside))
+        connections, bends = sheet.connections, sheet.bends
+        if request.wires is not None:
+            shown = {connection(wire): wire.bends for wire in request.wires}
+            connections, bends = tuple(wire for wire in shown if is_possible(wire, sheet)), shown
+        before = lines.of(sheet)
+        places = {name: (spot.x, spot.y) for name, spot in request.places.items()}
+        after = lines.dragged(sheet, places, connections, bends, request.passed)
+        return {source: shown for source, shown in after.items() if before.get(source) != shown}
 
     async def _outline(self, _: Page, request: say.AskOutline) -> say.Outline:
         return outline(self._sheet(request.document))

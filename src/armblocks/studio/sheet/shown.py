@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from functools import lru_cache
+from types import MappingProxyType
 from typing import Any
 
 from armblocks.blocks import BLOCKS
@@ -11,7 +13,14 @@ from armblocks.diagram import Block, Connection, Diagram, DiagramBlock, Paramete
 from armblocks.diagram.signs import Outline
 from armblocks.drawing.block_faces import face_size, port_labels
 from armblocks.drawing.diagram_drawing import block_marks
-from armblocks.drawing.diagram_layout import Box, drawn_blocks, standing_box
+from armblocks.drawing.diagram_layout import (
+    Box,
+    SumSides,
+    drawn_blocks,
+    standing_box,
+    sum_sides,
+    turned_sum,
+)
 from armblocks.errors import ArmblocksError
 from armblocks.formats import load_robot
 from armblocks.pictures.picture import Picture
@@ -24,12 +33,13 @@ from armblocks.studio.protocol.messages.sheets import (
     Sheet,
     SheetBlock,
     SheetChange,
+    WireLines,
 )
 from armblocks.studio.sheet.edits import DEFAULT_ROBOT
 from armblocks.studio.sheet.parameter_values import parameter_json
 
 
-def sheet(diagram: Diagram) -> Sheet:
+def sheet(diagram: Diagram, lines: Mapping[str, WireLines] = MappingProxyType({})) -> Sheet:
     """Return the drawing of a diagram whose blocks all have a position."""
     return Sheet(
         linked=[],
@@ -38,17 +48,22 @@ def sheet(diagram: Diagram) -> Sheet:
         description=diagram.description,
         blocks={name: _sheet_block(name, block, diagram) for name, block in diagram.blocks.items()},
         wires=[_wire(wire, diagram) for wire in diagram.connections],
+        lines=dict(lines),
         notes=_notes(diagram),
         logged=[str(ref) for ref in diagram.logged],
     )
 
 
-def sheet_change(before: Diagram, after: Diagram) -> SheetChange:
+def sheet_change(
+    before: Diagram, after: Diagram, lines: Mapping[str, WireLines | None] = MappingProxyType({})
+) -> SheetChange:
     """Return the difference between two sheets; blocks that are the same objects are skipped."""
     blocks: dict[str, SheetBlock | None] = {name: None for name in before.blocks if name not in after.blocks}
     shown, shows = drawn_blocks(before), drawn_blocks(after)
+    turned, turns = sum_sides(before), sum_sides(after)
     for name, block in after.blocks.items():
         same = before.blocks.get(name) is block and (shown[name] is shows[name] or shown[name] == shows[name])
+        same = same and turned.get(name) == turns.get(name)
         if not same or before.layout.get(name) != after.layout.get(name):
             blocks[name] = _sheet_block(name, block, after)
     old, new = (
@@ -58,6 +73,7 @@ def sheet_change(before: Diagram, after: Diagram) -> SheetChange:
         blocks=blocks,
         wires_added=[_wire(wire, after) for wire, _ in sorted(new - old)],
         wires_removed=[_wire(wire, before) for wire, _ in sorted(old - new)],
+        lines=dict(lines),
         notes=_notes(after) if after.notes != before.notes else None,
         description=after.description if after.description != before.description else None,
         logged=[str(ref) for ref in after.logged] if after.logged != before.logged else None,
@@ -115,7 +131,7 @@ def _default(kind: type[Block]) -> Block:
 def _sheet_block(name: str, block: Block, diagram: Diagram) -> SheetBlock:
     place = diagram.layout[name]
     shown = drawn_blocks(diagram)[name]
-    drawn = _drawn(shown, dataclasses.replace(place, x=0.0, y=0.0))
+    drawn = _drawn(shown, dataclasses.replace(place, x=0.0, y=0.0), sum_sides(diagram).get(name))
     own: dict[str, Any] = {"name": name, "place": Place(**dataclasses.asdict(place))}
     if shown is not block:
         own["parameters"] = _parameters(block)
@@ -123,9 +139,11 @@ def _sheet_block(name: str, block: Block, diagram: Diagram) -> SheetBlock:
 
 
 @lru_cache(maxsize=4096)
-def _drawn(block: Block, place: Placement) -> SheetBlock:
+def _drawn(block: Block, place: Placement, sides: SumSides | None) -> SheetBlock:
     """Draw a block at the origin; the result is cached, so that equal blocks are drawn once."""
     box = standing_box("", block, place)
+    if sides is not None:
+        box = turned_sum(box, sides)
     into, out = port_labels(block)
     return SheetBlock(
         name="",

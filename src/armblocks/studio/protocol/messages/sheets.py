@@ -8,7 +8,7 @@ from pydantic import Field
 
 from armblocks.studio.protocol.message import Event, Message, Request
 from armblocks.studio.protocol.messages.documents import Content, ContentChange
-from armblocks.studio.protocol.messages.sheet_edits import Place, SetMask, SheetNote, Wire
+from armblocks.studio.protocol.messages.sheet_edits import Place, Px, SetMask, SheetNote, Wire
 
 
 class PortSpot(Message):
@@ -78,6 +78,18 @@ class SheetBlock(Message):
     """The library entry to which the block is linked, ``file#name``; ``""`` without a link."""
 
 
+class WireLines(Message):
+    """The drawn lines of the wires from one output, px.
+
+    ``paths``: for each target the corner points from the output or from a branch of another path. A wire
+    without points has no room for a line: the output and the target carry ``label``. ``dots``: branches.
+    """
+
+    paths: dict[str, list[tuple[float, float]]]
+    dots: list[tuple[float, float]]
+    label: str
+
+
 class Sheet(Message):
     """The complete drawing of a sheet."""
 
@@ -85,6 +97,8 @@ class Sheet(Message):
     description: str
     blocks: dict[str, SheetBlock]
     wires: list[Wire]
+    lines: dict[str, WireLines]
+    """The lines of all wires, by output."""
     notes: dict[str, SheetNote]
     logged: list[str]
     """Logged outputs, ``block/port``: their signals are recorded without a Scope."""
@@ -101,6 +115,8 @@ class SheetChange(Message):
     """New or changed blocks; ``None`` for removed blocks."""
     wires_added: list[Wire]
     wires_removed: list[Wire]
+    lines: dict[str, WireLines | None]
+    """New or changed lines, by output; ``None`` where no wire is left."""
     notes: dict[str, SheetNote] | None = None
     description: str | None = None
     logged: list[str] | None = None
@@ -170,6 +186,28 @@ class Look(Request[None]):
     kind: Literal["look"] = "look"
     document: str
     inside: list[str]
+
+
+class Spot(Message):
+    """The top left corner of a block, px."""
+
+    x: Px
+    y: Px
+
+
+class RouteWires(Request[dict[str, WireLines]]):
+    """Ask for the lines of a sheet while blocks are dragged: those that are not as in the document.
+
+    ``places``: where the dragged blocks are. ``wires``: the wires that are shown, if these are not those of
+    the document. ``passed``: a block that lines do not avoid, because it may be dropped on one.
+    """
+
+    kind: Literal["route"] = "route"
+    document: str
+    inside: list[str] = Field(default_factory=list[str])
+    places: dict[str, Spot]
+    wires: list[Wire] | None = None
+    passed: str | None = None
 
 
 class AskOutline(Request[Outline]):

@@ -1,0 +1,140 @@
+import type { PortSpot, SheetBlock, Wire, WireLines } from '../protocol'
+import { blockOf, portOf, type Places } from './wires'
+
+/** The lines of wires as the server has routed them, and how they are drawn. */
+
+export type Point = readonly [x: number, y: number]
+
+/** The lines of the wires of a sheet, by output. */
+export type Lines = Readonly<Record<string, WireLines>>
+
+/** A port on the sheet; `dx`, `dy` lead away from its block. */
+export interface PortPlace {
+  x: number
+  y: number
+  dx: number
+  dy: number
+}
+
+/** px by which a line may miss the middle of a port where that makes it straight. */
+const AT_PORT = 1.6
+
+/** The places of both ports of a wire; undefined if one of them does not exist. */
+export function endsOf(
+  wire: Wire,
+  blocks: Record<string, SheetBlock>,
+  places: Places,
+): [PortPlace, PortPlace] | undefined {
+  const from = blocks[blockOf(wire.source)]
+  const to = blocks[blockOf(wire.target)]
+  const source = from?.outputs.find(({ name }) => name === portOf(wire.source))
+  const target = to?.inputs.find(({ name }) => name === portOf(wire.target))
+  if (!from || !to || !source || !target) return undefined
+  return [placed(source, places[from.name] ?? from.place, 1), placed(target, places[to.name] ?? to.place, -1)]
+}
+
+const placed = (spot: PortSpot, at: { x: number; y: number }, way: number): PortPlace => ({
+  x: at.x + spot.x,
+  y: at.y + spot.y,
+  dx: way * spot.dx,
+  dy: way * spot.dy,
+})
+
+/** Whether a path ends at its ports: one that branches from another path begins anywhere. */
+export function fits(path: readonly Point[], branches: boolean, ends: [PortPlace, PortPlace]): boolean {
+  const [first, last] = [path[0], path.at(-1)]
+  return Boolean(first && last) && (branches || near(first!, ends[0])) && near(last!, ends[1])
+}
+
+const near = ([x, y]: Point, port: PortPlace) =>
+  Math.abs(x - port.x) <= AT_PORT && Math.abs(y - port.y) <= AT_PORT
+
+/**
+ * A path attached to ports that have moved since it was routed: the outer pieces stretch. Without a path a
+ * straight line between the ports. It is a preview for the frames until the server has routed the wire again.
+ */
+export function attached(path: readonly Point[], branches: boolean, ends: [PortPlace, PortPlace]): Point[] {
+  if (path.length < 2) return [at(ends[0]), at(ends[1])]
+  const points = [...path]
+  const flat = isFlat(points, 0)
+  if (points.length < 4) {
+    const [[ax, ay], [bx, by]] = [branches ? points[0]! : at(ends[0]), at(ends[1])]
+    const [mx, my] = [(ax + bx) / 2, (ay + by) / 2]
+    return corners(
+      flat
+        ? [
+            [ax, ay],
+            [mx, ay],
+            [mx, by],
+            [bx, by],
+          ]
+        : [
+            [ax, ay],
+            [ax, my],
+            [bx, my],
+            [bx, by],
+          ],
+    )
+  }
+  const moved = stretched(points, at(ends[1]))
+  return corners(branches ? moved : stretched(moved.reverse(), at(ends[0])).reverse())
+}
+
+/** A path with another last point; the last piece keeps its direction. */
+function stretched(path: Point[], end: Point): Point[] {
+  const flat = isFlat(path, path.length - 2)
+  const [x, y] = path.at(-2)!
+  return [...path.slice(0, -2), flat ? [x, end[1]] : [end[0], y], end]
+}
+
+const at = ({ x, y }: PortPlace): Point => [x, y]
+
+export const isFlat = (path: readonly Point[], piece: number): boolean =>
+  path[piece]![1] === path[piece + 1]![1]
+
+/** The points without repetitions and without those on a straight line between their neighbours. */
+export function corners(points: Point[]): Point[] {
+  const kept: Point[] = []
+  for (const point of points) {
+    const last = kept.at(-1)
+    if (last && last[0] === point[0] && last[1] === point[1]) continue
+    const before = kept.at(-2)
+    if (
+      last &&
+      before &&
+      ((before[0] === last[0] && last[0] === point[0]) || (before[1] === last[1] && last[1] === point[1]))
+    )
+      kept[kept.length - 1] = point
+    else kept.push(point)
+  }
+  return kept
+}
+
+const ROUNDING = 5
+
+/** The path as SVG: straight pieces with small round corners, which are sharp where there are dots. */
+export function svgPath(points: readonly Point[], dots: readonly Point[] = []): string {
+  const [first] = points
+  if (!first) return ''
+  let text = `M${first[0]} ${first[1]}`
+  for (let k = 1; k < points.length - 1; k++) {
+    const [before, corner, after] = [points[k - 1]!, points[k]!, points[k + 1]!]
+    if (dots.some(([x, y]) => x === corner[0] && y === corner[1])) {
+      text += `L${corner[0]} ${corner[1]}`
+      continue
+    }
+    const radius = Math.min(ROUNDING, length(before, corner) / 2, length(corner, after) / 2)
+    const [ax, ay] = towards(corner, before, radius)
+    const [bx, by] = towards(corner, after, radius)
+    text += `L${ax} ${ay}Q${corner[0]} ${corner[1]} ${bx} ${by}`
+  }
+  const last = points.at(-1)!
+  return `${text}L${last[0]} ${last[1]}`
+}
+
+const length = (a: Point, b: Point) => Math.abs(a[0] - b[0]) + Math.abs(a[1] - b[1])
+
+function towards(a: Point, b: Point, by: number): Point {
+  const share = by / (length(a, b) || 1)
+  return [a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share]
+}

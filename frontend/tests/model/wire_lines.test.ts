@@ -1,0 +1,81 @@
+import { describe, expect, test } from 'vitest'
+import { dragged, wholeWay } from '../../src/model/bends'
+import { attached, fits, svgPath, type Point, type PortPlace } from '../../src/model/wire_lines'
+
+const output: PortPlace = { x: 60, y: 20, dx: 1, dy: 0 }
+const input: PortPlace = { x: 300, y: 120, dx: -1, dy: 0 }
+const step: Point[] = [
+  [60, 20],
+  [150, 20],
+  [150, 120],
+  [300, 120],
+]
+
+describe('a line that the server has routed', () => {
+  test('fits ports at its ends, and ports that have moved stretch it until it is routed again', () => {
+    expect(fits(step, false, [output, input])).toBe(true)
+    const moved = { ...input, x: 320, y: 90 }
+    expect(fits(step, false, [output, moved])).toBe(false)
+    expect(attached(step, false, [output, moved])).toEqual([
+      [60, 20],
+      [150, 20],
+      [150, 90],
+      [320, 90],
+    ])
+    const lower = { ...output, y: 40 }
+    expect(attached(step, false, [lower, input])[1]).toEqual([150, 40])
+  })
+
+  test.each([0, 30])('that is straight gets a step where a port has moved by %i px', (by) => {
+    const straight: Point[] = [
+      [60, 20],
+      [300, 20],
+    ]
+    const ends: [PortPlace, PortPlace] = [output, { ...input, y: 20 + by }]
+    const path = attached(straight, false, ends)
+    expect(fits(path, false, ends)).toBe(true)
+    for (const [k, [x, y]] of path.slice(1).entries())
+      expect(x === path[k]![0] || y === path[k]![1], 'each piece is level or upright').toBe(true)
+    expect(attached([], false, ends)).toEqual([path[0], path.at(-1)])
+  })
+
+  test('has round corners, and sharp ones where it branches', () => {
+    expect(svgPath(step)).toContain('Q150 20')
+    expect(svgPath(step, [[150, 20]])).toContain('L150 20L')
+  })
+
+  test('that branches follows its whole way from the output', () => {
+    const net = {
+      paths: {
+        'b/u': step as [number, number][],
+        'c/u': [
+          [150, 60],
+          [200, 60],
+        ] as [number, number][],
+      },
+      dots: [[150, 60]] as [number, number][],
+      label: 'a',
+    }
+    expect(wholeWay(net, 'b/u')).toEqual(step)
+    expect(wholeWay(net, 'c/u')).toEqual([
+      [60, 20],
+      [150, 20],
+      [150, 60],
+      [200, 60],
+    ])
+  })
+})
+
+test('a piece that is dragged becomes a bend; a piece at a port stays there for a short way', () => {
+  expect(dragged(step, 1, 220)).toEqual([220])
+  expect(dragged(step, 0, 60)).toEqual([75, 60, 150])
+  const stepped: Point[] = [
+    [60, 20],
+    [75, 20],
+    [75, 60],
+    [150, 60],
+    [150, 120],
+    [300, 120],
+  ]
+  expect(dragged(stepped, 2, 20), 'dragged back, the step is not seen').toEqual([75, 20, 150])
+})

@@ -1,0 +1,100 @@
+"""The lines of the sheets that pages show, routed anew only where something has changed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from armblocks.diagram import Connection, Diagram
+from armblocks.drawing.diagram_drawing import obstacle, wire_label, wire_nets
+from armblocks.drawing.diagram_layout import boxes
+from armblocks.drawing.wire_routing import Routing
+from armblocks.drawing.wires import moved_bends
+from armblocks.studio.protocol.messages.sheets import WireLines
+
+Lines = Mapping[str, WireLines]
+_MOST_SHEETS = 16
+
+
+class SheetLines:
+    """The lines of one sheet."""
+
+    def __init__(self) -> None:
+        self._routing = Routing()
+        self._latest: list[tuple[Diagram, Lines]] = []
+
+    def of(self, sheet: Diagram) -> Lines:
+        """The lines of a sheet, by output."""
+        for known, lines in self._latest:
+            if known is sheet:
+                return lines
+        lines = self.dragged(sheet, {}, sheet.connections, sheet.bends, None)
+        self._latest = [*self._latest[-1:], (sheet, lines)]
+        return lines
+
+    def dragged(
+        self,
+        sheet: Diagram,
+        places: Mapping[str, tuple[float, float]],
+        connections: Iterable[Connection],
+        bends: Mapping[Connection, tuple[float, ...]],
+        passed: str | None,
+    ) -> Lines:
+        """The lines of a sheet with blocks at other places, and with other connections."""
+        placed = dict(boxes(sheet))
+        shifts: dict[str, tuple[float, float]] = {}
+        for name, (x, y) in places.items():
+            if name in placed:
+                shifts[name] = x - placed[name].x, y - placed[name].y
+                placed[name] = placed[name].at(x, y)
+        moved = dict(bends)
+        for wire, values in bends.items():
+            shift = shifts.get(wire.source.block)
+            if shift is not None and shift == shifts.get(wire.target.block):
+                spots = placed[wire.source.block].outputs
+                flat = any(spot.name == wire.source.port and spot.dx != 0 for spot in spots)
+                moved[wire] = moved_bends(values, flat, shift)
+        nets, wires = wire_nets(connections, moved, placed)
+        obstacles = {name: obstacle(box) for name, box in placed.items() if name != passed}
+        routed = self._routing.update(obstacles, dict(zip(map(str, wires), nets)))
+        return {
+            str(source): WireLines(
+                paths={str(target): list(path) for target, path in zip(targets, routed[str(source)].paths)},
+                dots=list(routed[str(source)].dots),
+                label=wire_label(sheet, source),
+            )
+            for source, targets in wires.items()
+        }
+
+
+class LinesOfSheets:
+    """The lines of the sheets that were shown last, by document and path."""
+
+    def __init__(self) -> None:
+        self._sheets: dict[tuple[str, tuple[str, ...]], SheetLines] = {}
+
+    def on(self, document: str, path: tuple[str, ...]) -> SheetLines:
+        """The lines of the sheet at a path of a document."""
+        found = self._sheets.pop((document, path), None) or SheetLines()
+        self._sheets[document, path] = found
+        if len(self._sheets) > _MOST_SHEETS:
+            del self._sheets[next(iter(self._sheets))]
+        return found
+
+
+def is_possible(wire: Connection, sheet: Diagram) -> bool:
+    """Whether both ports of a wire are on a sheet, of which a page may show an earlier version."""
+    source, target = sheet.blocks.get(wire.source.block), sheet.blocks.get(wire.target.block)
+    return (
+        source is not None
+        and target is not None
+        and any(port.name == wire.source.port for port in source.output_ports())
+        and any(port.name == wire.target.port for port in target.input_ports())
+    )
+
+
+def other_lines(before: Lines, after: Lines) -> dict[str, WireLines | None]:
+    """The lines that are not as before; ``None`` for those that are gone."""
+    changed: dict[str, WireLines | None] = {
+        source: lines for source, lines in after.items() if before.get(source) != lines
+    }
+    return {**dict.fromkeys(before.keys() - after.keys()), **changed}

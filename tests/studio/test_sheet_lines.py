@@ -1,0 +1,51 @@
+"""The lines that pages show: those of the report, also after drags; blocks that wires pass."""
+
+from __future__ import annotations
+
+import armblocks as ab
+from armblocks.diagram import Connection, PortRef
+from armblocks.drawing.diagram_drawing import drawn_bends, obstacle, wire_nets
+from armblocks.drawing.diagram_layout import boxes
+from armblocks.drawing.wire_routing import route
+from armblocks.studio.sheet.lines import SheetLines, is_possible
+
+
+def test_a_page_shows_the_lines_of_the_report_also_after_a_drag() -> None:
+    sheet = ab.load_diagram("puma560_computed_torque")
+    lines = SheetLines()
+    before = lines.of(sheet)
+    place = boxes(sheet)["rne"]
+    moved = lines.dragged(sheet, {"rne": (place.x, place.y + 90)}, sheet.connections, sheet.bends, None)
+    assert moved != before
+    again = lines.dragged(sheet, {}, sheet.connections, sheet.bends, None)
+    assert again == before == SheetLines().of(sheet)
+    nets, wires = wire_nets(sheet.connections, drawn_bends(sheet), boxes(sheet))
+    routed = route([obstacle(box) for box in boxes(sheet).values()], nets)
+    for source, targets, net in zip(wires, wires.values(), routed):
+        shown = before[str(source)]
+        assert [tuple(shown.paths[str(target)]) for target in targets] == list(net.paths)
+        assert tuple(shown.dots) == net.dots
+
+
+def test_wires_pass_a_block_that_may_be_dropped_on_them() -> None:
+    sheet = ab.load_diagram("van_der_pol_pid")
+    lines, ramp = SheetLines(), boxes(sheet)["x2"].outputs[0]
+    over = {"one": (ramp.x + 20, ramp.y - 25)}
+    others = [wire for wire in sheet.connections if wire.source.block != "one"]
+
+    def path(passed: str | None) -> list[tuple[float, float]]:
+        found = lines.dragged(sheet, over, others, sheet.bends, passed)
+        return found["x2/y"].paths["x1/u"]
+
+    assert path("one") == lines.of(sheet)["x2/y"].paths["x1/u"]
+    assert path(None) != path("one")
+
+
+def test_a_wire_of_an_earlier_version_of_the_sheet_is_left_out() -> None:
+    sheet = ab.load_diagram("van_der_pol_pid")
+    for source, target, possible in (
+        (PortRef("PID", "y"), PortRef("u", "u1"), True),
+        (PortRef("gone", "y"), PortRef("u", "u1"), False),
+        (PortRef("PID", "y"), PortRef("u", "u9"), False),
+    ):
+        assert is_possible(Connection(source, target), sheet) == possible
