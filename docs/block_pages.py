@@ -276,8 +276,11 @@ def figure_html(figure: Figure) -> str:
 
 
 def style_sheet() -> str:
-    """CSS: colours of the figures by the switch of the theme, and the rules of the block pages."""
-    light, dark = theme_variables("light"), theme_variables("dark")
+    """CSS: colours of the figures by the switch of the theme, and the rules of the block pages.
+
+    A picture in a file of its own has the colours of both themes and follows ``color-scheme`` of the page.
+    """
+    light, dark = (f"color-scheme:{theme};{theme_variables(theme)}" for theme in ("light", "dark"))
     return (
         f"body{{{light}}}body[data-theme=dark]{{{dark}}}"
         f"@media(prefers-color-scheme:dark){{body:not([data-theme=light]){{{dark}}}}}" + page_rules() + RULES

@@ -12,6 +12,7 @@ os.environ.setdefault("ARMBLOCKS_EFFORT", "little")
 from generated_pages import write_generated_pages  # noqa: E402
 from name_links import link_names  # noqa: E402
 from reference_signatures import ALIASES, readable_signature, shorten_annotations  # noqa: E402
+from theme_pictures import show_by_theme  # noqa: E402
 
 from armblocks.pictures.style import PALETTE, Tone  # noqa: E402
 
@@ -57,6 +58,7 @@ def setup(app):
     shorten_annotations()
     app.connect("autodoc-process-signature", readable_signature)
     app.connect("source-read", link_names)
+    app.connect("source-read", show_by_theme)
 
 
 # Called before Sphinx searches for sources and static files.

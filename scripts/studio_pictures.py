@@ -194,12 +194,12 @@ def dialog(browser: Browser) -> None:
         keep(opened, "paper-configuration")
 
 
-def model(browser: Browser) -> None:
+def model(browser: Browser, theme: str) -> None:
     """Figure 9: the model, alone on the sheet."""
-    with shown(browser, "light", (1440, 860)) as page:
+    with shown(browser, theme, (1440, 860)) as page:
         page.locator(".react-flow__controls-fitview").click()
         page.wait_for_timeout(600)
-        keep(page.locator(".react-flow"), "paper-9-model")
+        keep(page.locator(".react-flow"), f"paper-9-model-{theme}")
 
 
 def moments(browser: Browser) -> None:
@@ -248,7 +248,8 @@ SHOTS: dict[str, Callable[[Browser], None]] = {
     "script": script,
     "library": library,
     "dialog": dialog,
-    "model": model,
+    "model light": lambda browser: model(browser, "light"),
+    "model dark": lambda browser: model(browser, "dark"),
     "moments": moments,
     "scopes": scopes,
     "notebook": notebook,

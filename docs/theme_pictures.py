@@ -1,0 +1,29 @@
+"""Pictures of the pages in the light and in the dark theme.
+
+The Markdown of a page has a ``<picture>`` with a dark source, which GitHub shows by the theme of the reader.
+Sphinx copies only pictures that it knows, and the pages have a switch of their own for the theme. Therefore
+each ``<picture>`` becomes two images, and the theme hides one of them.
+"""
+
+from __future__ import annotations
+
+import re
+
+_PICTURE = re.compile(
+    r'<picture>\n  <source media="\(prefers-color-scheme: dark\)" srcset="([^"]+)">\n'
+    r'  <img alt="([^"]+)" src="([^"]+)">\n</picture>\n'
+)
+
+
+def show_by_theme(_app: object, _page: str, source: list[str]) -> None:
+    """Write each ``<picture>`` as two images; Sphinx calls it with the text of each page."""
+    source[0] = _PICTURE.sub(_both, source[0])
+
+
+def _both(found: re.Match[str]) -> str:
+    dark, alternative, light = found.groups()
+    return _image(light, alternative, "light") + "\n" + _image(dark, alternative, "dark")
+
+
+def _image(path: str, alternative: str, theme: str) -> str:
+    return f"```{{image}} {path}\n:alt: {alternative}\n:class: only-{theme}\n```\n"
