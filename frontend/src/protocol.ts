@@ -580,10 +580,10 @@ export interface AskRobotTables {
   kind: "robot_tables";
 }
 /**
- * Ask for the lines of a sheet while blocks are dragged: those that are not as in the document.
+ * Return the lines of a sheet during a drag that differ from those of the document.
  *
- * ``places``: where the dragged blocks are. ``wires``: the wires that are shown, if these are not those of
- * the document. ``passed``: a block that lines do not avoid, because it may be dropped on one.
+ * ``places``: positions of the dragged blocks. ``wires``: the displayed wires, if they differ from those of
+ * the document. ``passed``: a block that lines do not avoid, because it may be inserted into one.
  */
 export interface RouteWires {
   kind: "route";
@@ -797,10 +797,11 @@ export interface ParameterRule {
   allowed: string;
 }
 /**
- * The drawn lines of the wires from one output, px.
+ * The lines of the wires from one output, px.
  *
- * ``paths``: for each target the corner points from the output or from a branch of another path. A wire
- * without points has no room for a line: the output and the target carry ``label``. ``dots``: branches.
+ * ``paths``: the corner points of the line to each target, from the output or from a branch. A path without
+ * points means that there is no room for a line: output and target have ``label`` instead. ``dots``:
+ * branches.
  */
 export interface WireLines {
   paths: {

@@ -1,4 +1,4 @@
-"""The lines that pages show: those of the report, also after drags; blocks that wires pass."""
+"""The lines of displayed sheets equal those of the report, also after drags; blocks that lines ignore."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from armblocks.drawing.wire_routing import route
 from armblocks.studio.sheet.lines import SheetLines, is_possible
 
 
-def test_a_page_shows_the_lines_of_the_report_also_after_a_drag() -> None:
+def test_displayed_lines_equal_those_of_the_report_also_after_a_drag() -> None:
     sheet = ab.load_diagram("puma560_computed_torque")
     lines = SheetLines()
     before = lines.of(sheet)
@@ -27,7 +27,7 @@ def test_a_page_shows_the_lines_of_the_report_also_after_a_drag() -> None:
         assert tuple(shown.dots) == net.dots
 
 
-def test_wires_pass_a_block_that_may_be_dropped_on_them() -> None:
+def test_lines_do_not_avoid_a_block_that_may_be_inserted_into_them() -> None:
     sheet = ab.load_diagram("van_der_pol_pid")
     lines, ramp = SheetLines(), boxes(sheet)["x2"].outputs[0]
     over = {"one": (ramp.x + 20, ramp.y - 25)}
@@ -41,7 +41,7 @@ def test_wires_pass_a_block_that_may_be_dropped_on_them() -> None:
     assert path(None) != path("one")
 
 
-def test_a_wire_of_an_earlier_version_of_the_sheet_is_left_out() -> None:
+def test_wires_with_ports_that_no_longer_exist_are_not_routed() -> None:
     sheet = ab.load_diagram("van_der_pol_pid")
     for source, target, possible in (
         (PortRef("PID", "y"), PortRef("u", "u1"), True),

@@ -31,7 +31,7 @@ export type Edge = 'left' | 'centre' | 'right' | 'top' | 'middle' | 'bottom'
 const right = ({ place, width }: SheetBlock) => place.x + width
 const bottom = ({ place, height }: SheetBlock) => place.y + height
 
-/** Bring the selected blocks into one line: by an edge, or by their middles. */
+/** Align the selected blocks: by an edge or by their centres. */
 export function align(edge: Edge): void {
   const chosen = chosenBlocks()
   const [left, far] = [Math.min(...chosen.map(({ place }) => place.x)), Math.max(...chosen.map(right))]
@@ -47,7 +47,7 @@ export function align(edge: Edge): void {
   place(to[edge])
 }
 
-/** The same gap between each of the selected blocks and the next; the outer two stay. */
+/** Make the gaps between the selected blocks equal; the outer two blocks do not move. */
 export function distribute(axis: 'x' | 'y'): void {
   const size = axis === 'x' ? 'width' : 'height'
   const chosen = chosenBlocks().sort((a, b) => a.place[axis] - b.place[axis])
@@ -64,7 +64,7 @@ export function distribute(axis: 'x' | 'y'): void {
   place(({ name }) => ({ [axis]: at.get(name) }))
 }
 
-/** Put the selected blocks into a subsystem of their own. */
+/** Move the selected blocks into a new subsystem. */
 export function group(): void {
   const { document, select } = useStudio.getState()
   const chosen = chosenBlocks()

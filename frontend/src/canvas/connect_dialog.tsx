@@ -5,9 +5,9 @@ import { SCROLLED } from '../scrolled'
 import { change, useStudio } from '../store'
 
 /**
- * How a port is chosen: by typing. Without `selectFirstOptionOnDropdownOpen`, Mantine forgets the highlighted
- * option in a timer after the list opens; on a busy machine that is after the first keys, and Enter chooses
- * nothing.
+ * Options of the port fields. Without `selectFirstOptionOnDropdownOpen`, Mantine resets the highlighted
+ * option in a timer after the list opens; on a busy machine this happens after the first keys, and Enter
+ * selects nothing.
  */
 const TYPED = {
   ...SCROLLED,
@@ -16,7 +16,7 @@ const TYPED = {
   selectFirstOptionOnDropdownOpen: true,
 } as const
 
-/** The way to draw a wire by keyboard: type the names of two ports. The selected block's are suggested. */
+/** Draws a wire by keyboard: type the names of two ports. The ports of the selected block are suggested. */
 export function ConnectDialog() {
   const opened = useDialogs((s) => s.open === 'connect')
   const blocks = useStudio((s) => s.document?.blocks)
@@ -44,7 +44,7 @@ export function ConnectDialog() {
       ports.find((port) => [...selection].some((name) => port.startsWith(`${name}/`))) ?? null
     setSource(of(sources))
     setTarget(selection.size > 1 ? of(targets) : null)
-    // The suggestion is made once, when the dialog opens.
+    // The suggestion is computed once, when the dialog opens.
     // eslint-disable-next-line react-hooks/exhaustive-deps
   }, [opened])
   const draw = () => {

@@ -8,8 +8,8 @@ export const BLOCK_TYPE = 'application/x-armblocks-block'
 export const GRID = 5
 
 /**
- * Put a new block of a type on the sheet, its middle at a point and in a wire if one is given; it is selected
- * then.
+ * Add a new block of a type with its centre at a point, and insert it into a wire if one is given; the block
+ * is then selected.
  */
 export function insertBlock(type: string, at: { x: number; y: number }, wire?: Wire): void {
   const { document, library, select } = useStudio.getState()

@@ -4,27 +4,27 @@ import type { Places } from '../model/wires'
 import type { RouteWires, Spot, Wire } from '../protocol'
 import { line, useStudio } from '../store'
 
-/** A sheet that is not as in the document, because something is dragged. */
+/** The layout of a sheet during a drag, which differs from the document. */
 interface Dragged {
   places: Places
-  /** The wires that are shown, where these are not those of the document. */
+  /** The displayed wires, if they differ from those of the document. */
   wires: Wire[] | null
   passed: string | null
 }
 
-/** The request that comes next, and whether one is on its way. */
+/** The next request, and whether a request is pending. */
 interface Asking {
   wanted: RouteWires | null
   busy: boolean
   dragging: boolean
 }
 
-/** After this long without an answer the wires of the moved blocks are drawn dashed. */
+/** Time without a reply after which the wires of the moved blocks are drawn dashed, ms. */
 const LATE_MS = 120
 
 /**
- * The lines of the sheet on the screen. While something is dragged the server routes them: one request at a
- * time, always of the latest layout. `late` says that no answer has come for a while.
+ * The lines of the displayed sheet. During a drag the server routes them: one request at a time, with the
+ * latest layout. `late` is true if a reply is overdue.
  */
 export function useLiveLines(dragged: Dragged | null): { lines: Lines; late: boolean } {
   const kept = useStudio((s) => s.document!.lines)
@@ -53,7 +53,7 @@ export function useLiveLines(dragged: Dragged | null): { lines: Lines; late: boo
   return { lines, late: late && dragged !== null }
 }
 
-/** Ask for the lines of the latest layout, until there is no later one. */
+/** Request the lines of the latest layout, until no newer layout is waiting. */
 async function follow(
   now: Asking,
   answer: (lines: Lines) => void,
@@ -64,7 +64,7 @@ async function follow(
     const { wanted } = now
     now.wanted = null
     const timer = setTimeout(() => setLate(true), LATE_MS)
-    // A refusal means that the sheet has changed meanwhile: its lines come with the change.
+    // The request is refused if the sheet has changed meanwhile: its lines are sent with the change.
     const lines = await line.ask(wanted).catch(() => null)
     clearTimeout(timer)
     setLate(false)

@@ -9,7 +9,7 @@ export type NoteNodeType = Node<{ note: SheetNote }, 'note'>
 /** The note that is being edited, including new ones that are not on the sheet yet. */
 const useWriting = create<{ id: string | null }>(() => ({ id: null }))
 
-/** Begin a note at a place on the sheet. */
+/** Start a note at a position on the sheet. */
 export function writeNote(x: number, y: number): void {
   const { document, select } = useStudio.getState()
   if (!document) return

@@ -9,13 +9,13 @@ export const sheetView: { fit: (() => void) | null; middle: (() => { x: number; 
   middle: null,
 }
 
-/** Begin a note in the middle of the visible part. */
+/** Start a note in the centre of the visible part. */
 export function addNote(): void {
   const at = sheetView.middle?.()
   if (at) writeNote(at.x, at.y)
 }
 
-/** A double click: into a subsystem that has no mask, else the parameters of a block. */
+/** Handle a double click: open a subsystem without a mask, otherwise the parameters of the block. */
 export function openBlock(block: SheetBlock): void {
   const { document, edit } = useStudio.getState()
   if (block.opens && !block.mask.length && document) look([...document.inside, block.name])

@@ -9,30 +9,30 @@ import type { SheetNode } from './sheet_graph'
 import type { WireEdgeType } from './wire_edge'
 
 /**
- * What the mouse holds: blocks that it takes out of their wires, and one without wires, which goes into a
- * wire that it is dropped on.
+ * The dragged blocks with a role: blocks that are disconnected from their wires, and an unconnected block
+ * that is inserted into the wire on which it is dropped.
  */
 const NOTHING_HELD: { freed: readonly string[]; loose: string | null } = { freed: [], loose: null }
 
 /**
- * What the mouse does on a sheet: how far it has moved blocks, what it holds, and the wire that a block would
- * go into.
+ * The state of a drag on a sheet: displaced blocks, blocks with a role, and the wire into which a block would
+ * be inserted.
  */
 export function useSheetDrag(blocks: Record<string, SheetBlock>, notes: Record<string, SheetNote>) {
   const [drag, setDrag] = useState<Places>({})
   const [{ freed, loose }, setHeld] = useState(NOTHING_HELD)
-  /** What is held, also before the next drawing knows of it. */
+  /** The blocks with a role, available before the next rendering. */
   const held = useRef(NOTHING_HELD)
-  /** The wire that a dragged block would go into. */
+  /** The wire into which a dragged block would be inserted. */
   const [into, setInto] = useState<string | null>(null)
-  // A place that the server has taken over needs no memory of the drag any more.
+  // When the server has applied the new positions, the displacements of the drag are discarded.
   useEffect(() => setDrag((now) => (Object.keys(now).length ? {} : now)), [blocks, notes])
   return { drag, setDrag, freed, loose, held, setHeld, into, setInto }
 }
 
 export type SheetDrag = ReturnType<typeof useSheetDrag>
 
-/** What blocks do that are dragged on the sheet. */
+/** The handlers of a drag of blocks on the sheet. */
 export function dragHandlers(
   { held, setHeld, setInto }: SheetDrag,
   blocks: Record<string, SheetBlock>,
@@ -62,7 +62,7 @@ export function dragHandlers(
     const found = block && wireAt(middleOf(block, node.position), edges, wires)
     if (found) to[block.name] = levelled(block, node.position, found)
     const after = found ? putInto(block, found.wire, left) : left
-    // The wires stay as they are drawn until the server has them so.
+    // The wires remain as drawn until the server has applied the edit.
     void move(to, freed.length || found ? rewired(wires, after) : undefined).finally(() =>
       setHeld((now) => (now === held.current ? now : NOTHING_HELD)),
     )
@@ -71,7 +71,7 @@ export function dragHandlers(
   return { onNodeDragStart: takeHold, onNodeDrag: carry, onNodeDragStop: letGo }
 }
 
-/** What a block type does that is dragged from the library onto the sheet. */
+/** The handlers of a drag of a block type from the library to the sheet. */
 export function dropHandlers(
   setInto: SheetDrag['setInto'],
   flow: ReactFlowInstance<SheetNode, WireEdgeType>,

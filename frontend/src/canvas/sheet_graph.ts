@@ -16,8 +16,8 @@ const NO_TAGS: WireTag[] = []
 const SCALAR: WireKind = { shape: [], unit: '' }
 
 /**
- * Things by name, made anew only where what they are made from is other than before: so an edit draws what it
- * touches.
+ * A cache of objects by name. An object is created again only if its inputs have changed, so that an edit
+ * renders only what it affects.
  */
 class Kept<T> {
   private known = new Map<string, { from: readonly unknown[]; made: T }>()
@@ -37,13 +37,13 @@ class Kept<T> {
   }
 }
 
-/** What the edges of a sheet are made from. */
+/** The inputs of the edges of a sheet. */
 interface DrawnWires {
   blocks: Record<string, SheetBlock>
   wires: Wire[]
   drag: Places
   lines: Lines
-  /** Whether the server has not routed the dragged blocks for a while. */
+  /** Whether the server's routes for the dragged blocks are overdue. */
   late: boolean
   kinds: Record<string, WireKind>
   level: string
@@ -53,7 +53,7 @@ interface DrawnWires {
 
 /** The nodes and edges of one sheet, for React Flow. */
 export class SheetGraph {
-  /** Sizes of notes, which React Flow has measured. */
+  /** Sizes of notes, measured by React Flow. */
   readonly measured = new Map<string, { width: number; height: number }>()
   private blocks = new Kept<BlockNodeType>()
   private notes = new Kept<NoteNodeType>()
@@ -160,7 +160,7 @@ export class SheetGraph {
     return (this.lastEdges = unlessSame(this.lastEdges, made))
   }
 
-  /** The path of a wire; `pending`: the server has not said yet where it runs. */
+  /** The path of a wire; `pending`: the server has not routed the wire yet. */
   private path(
     wire: Wire,
     net: WireLines | undefined,
@@ -201,7 +201,7 @@ const port = (spot: PortSpot, output: boolean): NodeHandle => ({
   height: PORT,
 })
 
-/** The list before, where the new one has the same things in it: then nobody is told of anything. */
+/** Return the previous list if it has the same elements, so that React renders nothing. */
 function unlessSame<T>(before: T[], now: T[]): T[] {
   return before.length === now.length && now.every((one, k) => one === before[k]) ? before : now
 }

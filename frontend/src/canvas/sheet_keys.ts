@@ -76,8 +76,8 @@ export function useSheetKeys(
   }
 
   const onKeyDown = (event: KeyboardEvent) => {
-    // A focused block may have gone, and then nothing has the focus; a button elsewhere keeps only the keys
-    // that press it.
+    // If the focused block was removed, nothing has the focus. A button outside the sheet handles only the
+    // keys that press it.
     const focused = event.target instanceof Element ? event.target : null
     if (
       focused instanceof HTMLInputElement ||

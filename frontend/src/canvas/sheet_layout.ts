@@ -30,15 +30,15 @@ export function nameWidth(name: string): number {
   return width
 }
 
-/** The side of a block's name: one without wires, as in the drawings of reports. */
+/** The side of a block for its name: one without wires, as in the drawings of reports. */
 export function nameSide({ place, inputs, height }: SheetBlock): 'below' | 'beside' | 'above' {
   if ((place.rotation ?? 0) % 180 !== 0) return 'beside' // signals run from top to bottom
   return inputs.some(({ y }) => y >= height) ? 'above' : 'below' // wires enter a round sum from below
 }
 
 /**
- * How the sheet is fitted into its panel: nothing of it lies under the buttons at the left, and the lowest
- * names are seen.
+ * Padding with which the sheet is fitted into its panel: no part of it is under the buttons at the left, and
+ * the lowest names are visible.
  */
 export const FIT: FitViewOptions = {
   padding: { top: '16px', right: '24px', bottom: '32px', left: '56px' },

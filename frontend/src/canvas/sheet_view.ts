@@ -11,7 +11,7 @@ const SETTLE_MS = 120
 type Sheet = RefObject<HTMLDivElement | null>
 type Flow = ReactFlowInstance<SheetNode, WireEdgeType>
 
-/** Centres a block that was found by search, and focuses it. */
+/** Centre and focus a block that was found by a search. */
 export function useSought(sheet: Sheet, flow: Flow, blocks: Record<string, SheetBlock>): void {
   const sought = useStudio((s) => s.sought)
   useEffect(() => {
@@ -19,7 +19,7 @@ export function useSought(sheet: Sheet, flow: Flow, blocks: Record<string, Sheet
     if (!block) return
     useStudio.setState({ sought: null })
     const { place, width, height } = block
-    // After the sheet has fitted itself into the window, where it has just been opened.
+    // Executed after a newly opened sheet has been fitted into the window.
     setTimeout(() => {
       void flow.setCenter(place.x + width / 2, place.y + height / 2, {
         zoom: Math.max(flow.getZoom(), 0.8),

@@ -3,8 +3,8 @@ import { useLayoutEffect, useRef, useState } from 'react'
 type Handlers = Record<string, (...given: never[]) => unknown>
 
 /**
- * Handlers that are the same functions at every drawing, and do what the latest ones do. React Flow tells
- * every block, port and wire of a sheet when it is given another function.
+ * Handlers that are the same function objects at every rendering and call the latest versions. React Flow
+ * renders every block, port and wire of a sheet again if it receives another function.
  */
 export function useSteady<T extends Handlers>(latest: T): T {
   const now = useRef(latest)

@@ -14,12 +14,12 @@ export type WireEdgeType = Edge<
     rank: number
     label: string
     bent: boolean
-    /** Whether the server has not said yet where the wire runs. */
+    /** Whether the server has not routed the wire yet. */
     pending: boolean
-    /** What its ends say where it has no line. */
+    /** The labels at its ports, if it has no line. */
     tags: readonly WireTag[]
     /**
-     * The whole way from the source, of which `path` is the last part where the wire branches from another.
+     * The complete route from the source; `path` is its last part if the wire branches from another wire.
      */
     way: () => Point[]
   },
@@ -37,8 +37,8 @@ export const useBending = create<{ wire: Required<Wire> | null }>(() => ({ wire:
 const SNAP = 7
 
 /**
- * A wire along its way: thin for a scalar, heavier for a vector, double for a matrix, three lines for a bus.
- * Its pieces can be dragged.
+ * A wire on its route: thin for a scalar, thicker for a vector, double for a matrix, three lines for a bus.
+ * Its segments can be dragged.
  */
 export const WireEdge = memo(function WireEdge({ id, data, selected }: EdgeProps<WireEdgeType>) {
   if (!data) return null
@@ -76,10 +76,10 @@ export const WireEdge = memo(function WireEdge({ id, data, selected }: EdgeProps
   )
 })
 
-/** px of dashed line between a port and the label of a wire without a line, as in `drawing.wire_marks`. */
+/** Length of the dashed stub between a port and the label of a wire without a line, px, as in `wire_marks`. */
 const TAG_STUB = 8
 
-/** A dashed stub at a port, and a label that says to what it is connected, above the blocks. */
+/** A dashed stub at a port, and a label with the name of the connected port, drawn above the blocks. */
 function Tag({ tag: { x, y, dx, dy, text }, selected }: { tag: WireTag; selected: boolean }) {
   const [tx, ty] = [x + TAG_STUB * dx, y + TAG_STUB * dy]
   const shift = `translate(${50 * (dx - 1)}%, ${50 * (dy - 1)}%)`
@@ -158,7 +158,7 @@ function Piece({
 }
 
 /**
- * Where a piece comes to lie: level with the next parallel pieces where it is near them, else on the grid.
+ * The position of a dragged segment: aligned with near parallel segments, otherwise on the grid.
  */
 function level(way: Point[], piece: number, wanted: number): number {
   const axis = isFlat(way, piece) ? 1 : 0

@@ -8,7 +8,7 @@ import { corners, isFlat, type Point } from './wire_lines'
 
 const STUB = 15
 
-/** The whole route to a target: its own path, preceded by what it shares with the one it branches from. */
+/** The complete route to a target: its own path, preceded by the part shared with another path. */
 export function wholeWay(
   net: WireLines,
   target: string,

@@ -1,14 +1,14 @@
 import type { PortSpot, SheetBlock, Wire, WireLines } from '../protocol'
 import { blockOf, portOf, type Places } from './wires'
 
-/** The lines of wires as the server has routed them, and how they are drawn. */
+/** The lines of wires, as routed by the server, and their drawing. */
 
 export type Point = readonly [x: number, y: number]
 
 /** The lines of the wires of a sheet, by output. */
 export type Lines = Readonly<Record<string, WireLines>>
 
-/** A port on the sheet; `dx`, `dy` lead away from its block. */
+/** A port on the sheet; `dx`, `dy` is the direction away from its block. */
 export interface PortPlace {
   x: number
   y: number
@@ -16,10 +16,10 @@ export interface PortPlace {
   dy: number
 }
 
-/** px by which a line may miss the middle of a port where that makes it straight. */
+/** Allowed offset of a line from the centre of a port, if the offset makes the line straight, px. */
 const AT_PORT = 1.6
 
-/** The places of both ports of a wire; undefined if one of them does not exist. */
+/** The positions of both ports of a wire; undefined if one of them does not exist. */
 export function endsOf(
   wire: Wire,
   blocks: Record<string, SheetBlock>,
@@ -40,7 +40,7 @@ const placed = (spot: PortSpot, at: { x: number; y: number }, way: number): Port
   dy: way * spot.dy,
 })
 
-/** Whether a path ends at its ports: one that branches from another path begins anywhere. */
+/** Whether a path ends at its ports; a path that branches from another one may begin anywhere. */
 export function fits(path: readonly Point[], branches: boolean, ends: [PortPlace, PortPlace]): boolean {
   const [first, last] = [path[0], path.at(-1)]
   return Boolean(first && last) && (branches || near(first!, ends[0])) && near(last!, ends[1])
@@ -50,8 +50,9 @@ const near = ([x, y]: Point, port: PortPlace) =>
   Math.abs(x - port.x) <= AT_PORT && Math.abs(y - port.y) <= AT_PORT
 
 /**
- * A path attached to ports that have moved since it was routed: the outer pieces stretch. Without a path a
- * straight line between the ports. It is a preview for the frames until the server has routed the wire again.
+ * A path whose ends follow ports that have moved since it was routed: the outer segments are stretched.
+ * Without a path, a straight line between the ports. Used as a preview until the server has routed the wire
+ * again.
  */
 export function attached(path: readonly Point[], branches: boolean, ends: [PortPlace, PortPlace]): Point[] {
   if (path.length < 2) return [at(ends[0]), at(ends[1])]
@@ -80,7 +81,7 @@ export function attached(path: readonly Point[], branches: boolean, ends: [PortP
   return corners(branches ? moved : stretched(moved.reverse(), at(ends[0])).reverse())
 }
 
-/** A path with another last point; the last piece keeps its direction. */
+/** A path with another last point; the last segment keeps its direction. */
 function stretched(path: Point[], end: Point): Point[] {
   const flat = isFlat(path, path.length - 2)
   const [x, y] = path.at(-2)!
@@ -92,7 +93,7 @@ const at = ({ x, y }: PortPlace): Point => [x, y]
 export const isFlat = (path: readonly Point[], piece: number): boolean =>
   path[piece]![1] === path[piece + 1]![1]
 
-/** The points without repetitions and without those on a straight line between their neighbours. */
+/** The points without repetitions and without points on a straight line between their neighbours. */
 export function corners(points: Point[]): Point[] {
   const kept: Point[] = []
   for (const point of points) {
@@ -112,7 +113,7 @@ export function corners(points: Point[]): Point[] {
 
 const ROUNDING = 5
 
-/** The path as SVG: straight pieces with small round corners, which are sharp where there are dots. */
+/** The path as SVG: straight segments with small round corners, which are sharp at branches. */
 export function svgPath(points: readonly Point[], dots: readonly Point[] = []): string {
   const [first] = points
   if (!first) return ''

@@ -12,7 +12,7 @@ const step: Point[] = [
 ]
 
 describe('a line that the server has routed', () => {
-  test('fits ports at its ends, and ports that have moved stretch it until it is routed again', () => {
+  test('fits the ports at its ends, and is stretched to moved ports until it is routed again', () => {
     expect(fits(step, false, [output, input])).toBe(true)
     const moved = { ...input, x: 320, y: 90 }
     expect(fits(step, false, [output, moved])).toBe(false)
@@ -26,7 +26,7 @@ describe('a line that the server has routed', () => {
     expect(attached(step, false, [lower, input])[1]).toEqual([150, 40])
   })
 
-  test.each([0, 30])('that is straight gets a step where a port has moved by %i px', (by) => {
+  test.each([0, 30])('that is straight gets a step if a port has moved by %i px', (by) => {
     const straight: Point[] = [
       [60, 20],
       [300, 20],
@@ -35,16 +35,16 @@ describe('a line that the server has routed', () => {
     const path = attached(straight, false, ends)
     expect(fits(path, false, ends)).toBe(true)
     for (const [k, [x, y]] of path.slice(1).entries())
-      expect(x === path[k]![0] || y === path[k]![1], 'each piece is level or upright').toBe(true)
+      expect(x === path[k]![0] || y === path[k]![1], 'each segment is horizontal or vertical').toBe(true)
     expect(attached([], false, ends)).toEqual([path[0], path.at(-1)])
   })
 
-  test('has round corners, and sharp ones where it branches', () => {
+  test('has round corners, and sharp corners at branches', () => {
     expect(svgPath(step)).toContain('Q150 20')
     expect(svgPath(step, [[150, 20]])).toContain('L150 20L')
   })
 
-  test('that branches follows its whole way from the output', () => {
+  test('that branches has its complete route from the output', () => {
     const net = {
       paths: {
         'b/u': step as [number, number][],
@@ -66,7 +66,7 @@ describe('a line that the server has routed', () => {
   })
 })
 
-test('a piece that is dragged becomes a bend; a piece at a port stays there for a short way', () => {
+test('a dragged segment becomes a bend; a segment at a port keeps a short part at the port', () => {
   expect(dragged(step, 1, 220)).toEqual([220])
   expect(dragged(step, 0, 60)).toEqual([75, 60, 150])
   const stepped: Point[] = [
@@ -77,5 +77,5 @@ test('a piece that is dragged becomes a bend; a piece at a port stays there for 
     [150, 120],
     [300, 120],
   ]
-  expect(dragged(stepped, 2, 20), 'dragged back, the step is not seen').toEqual([75, 20, 150])
+  expect(dragged(stepped, 2, 20), 'after dragging back, the step has no height').toEqual([75, 20, 150])
 })

@@ -226,7 +226,7 @@ def _connected(wires: Sequence[Wire], diagram: Diagram, *, replace: bool) -> Dia
 
 
 def connection(wire: Wire) -> Connection:
-    """The connection that a wire of a message means; raises ``DiagramError`` for what is no port."""
+    """Return the connection of a wire in a message; raise ``DiagramError`` for an invalid port name."""
     return Connection(_port(wire.source), _port(wire.target))
 
 

@@ -1,4 +1,4 @@
-"""The lines of the sheets that pages show, routed anew only where something has changed."""
+"""The lines of the displayed sheets; only wires affected by a change are routed again."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class SheetLines:
         self._latest: list[tuple[Diagram, Lines]] = []
 
     def of(self, sheet: Diagram) -> Lines:
-        """The lines of a sheet, by output."""
+        """Return the lines of a sheet, by output."""
         for known, lines in self._latest:
             if known is sheet:
                 return lines
@@ -39,7 +39,7 @@ class SheetLines:
         bends: Mapping[Connection, tuple[float, ...]],
         passed: str | None,
     ) -> Lines:
-        """The lines of a sheet with blocks at other places, and with other connections."""
+        """Return the lines of a sheet with some blocks at other positions and with other connections."""
         placed = dict(boxes(sheet))
         shifts: dict[str, tuple[float, float]] = {}
         for name, (x, y) in places.items():
@@ -67,13 +67,13 @@ class SheetLines:
 
 
 class LinesOfSheets:
-    """The lines of the sheets that were shown last, by document and path."""
+    """The lines of the last displayed sheets, by document and path."""
 
     def __init__(self) -> None:
         self._sheets: dict[tuple[str, tuple[str, ...]], SheetLines] = {}
 
     def on(self, document: str, path: tuple[str, ...]) -> SheetLines:
-        """The lines of the sheet at a path of a document."""
+        """Return the lines of the sheet at a path of a document."""
         found = self._sheets.pop((document, path), None) or SheetLines()
         self._sheets[document, path] = found
         if len(self._sheets) > _MOST_SHEETS:
@@ -82,7 +82,7 @@ class LinesOfSheets:
 
 
 def is_possible(wire: Connection, sheet: Diagram) -> bool:
-    """Whether both ports of a wire are on a sheet, of which a page may show an earlier version."""
+    """Whether both ports of a wire exist on the sheet; a page may show an earlier version of it."""
     source, target = sheet.blocks.get(wire.source.block), sheet.blocks.get(wire.target.block)
     return (
         source is not None
@@ -93,7 +93,7 @@ def is_possible(wire: Connection, sheet: Diagram) -> bool:
 
 
 def other_lines(before: Lines, after: Lines) -> dict[str, WireLines | None]:
-    """The lines that are not as before; ``None`` for those that are gone."""
+    """Return the changed lines; ``None`` for outputs without wires."""
     changed: dict[str, WireLines | None] = {
         source: lines for source, lines in after.items() if before.get(source) != lines
     }

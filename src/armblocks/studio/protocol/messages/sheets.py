@@ -79,10 +79,11 @@ class SheetBlock(Message):
 
 
 class WireLines(Message):
-    """The drawn lines of the wires from one output, px.
+    """The lines of the wires from one output, px.
 
-    ``paths``: for each target the corner points from the output or from a branch of another path. A wire
-    without points has no room for a line: the output and the target carry ``label``. ``dots``: branches.
+    ``paths``: the corner points of the line to each target, from the output or from a branch. A path without
+    points means that there is no room for a line: output and target have ``label`` instead. ``dots``:
+    branches.
     """
 
     paths: dict[str, list[tuple[float, float]]]
@@ -116,7 +117,7 @@ class SheetChange(Message):
     wires_added: list[Wire]
     wires_removed: list[Wire]
     lines: dict[str, WireLines | None]
-    """New or changed lines, by output; ``None`` where no wire is left."""
+    """New or changed lines, by output; ``None`` for outputs without wires."""
     notes: dict[str, SheetNote] | None = None
     description: str | None = None
     logged: list[str] | None = None
@@ -196,10 +197,10 @@ class Spot(Message):
 
 
 class RouteWires(Request[dict[str, WireLines]]):
-    """Ask for the lines of a sheet while blocks are dragged: those that are not as in the document.
+    """Return the lines of a sheet during a drag that differ from those of the document.
 
-    ``places``: where the dragged blocks are. ``wires``: the wires that are shown, if these are not those of
-    the document. ``passed``: a block that lines do not avoid, because it may be dropped on one.
+    ``places``: positions of the dragged blocks. ``wires``: the displayed wires, if they differ from those of
+    the document. ``passed``: a block that lines do not avoid, because it may be inserted into one.
     """
 
     kind: Literal["route"] = "route"
