@@ -9,19 +9,19 @@ import type { SheetNode } from './sheet_graph'
 import type { WireEdgeType } from './wire_edge'
 
 /**
- * The dragged blocks with a role: blocks that are disconnected from their wires, and an unconnected block
- * that is inserted into the wire on which it is dropped.
+ * The dragged blocks that change wires: blocks that are disconnected, and an unconnected block that is
+ * inserted into the wire on which it is dropped.
  */
 const NOTHING_HELD: { freed: readonly string[]; loose: string | null } = { freed: [], loose: null }
 
 /**
- * The state of a drag on a sheet: displaced blocks, blocks with a role, and the wire into which a block would
- * be inserted.
+ * The state of a drag on a sheet: displaced blocks, blocks that change wires, and the wire into which a block
+ * would be inserted.
  */
 export function useSheetDrag(blocks: Record<string, SheetBlock>, notes: Record<string, SheetNote>) {
   const [drag, setDrag] = useState<Places>({})
   const [{ freed, loose }, setHeld] = useState(NOTHING_HELD)
-  /** The blocks with a role, available before the next rendering. */
+  /** The blocks that change wires, available before the next rendering. */
   const held = useRef(NOTHING_HELD)
   /** The wire into which a dragged block would be inserted. */
   const [into, setInto] = useState<string | null>(null)

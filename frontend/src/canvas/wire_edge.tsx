@@ -76,7 +76,7 @@ export const WireEdge = memo(function WireEdge({ id, data, selected }: EdgeProps
   )
 })
 
-/** Length of the dashed stub between a port and the label of a wire without a line, px, as in `wire_marks`. */
+/** Length of the dashed stub from a port to the label of a wire without a line, px, as in `wire_marks`. */
 const TAG_STUB = 8
 
 /** A dashed stub at a port, and a label with the name of the connected port, drawn above the blocks. */
