@@ -69,7 +69,8 @@ def _entries(rows: Sequence[_Row]) -> int:
 
 
 def _chains(tape: Tape) -> Iterator[list[int]]:
-    """Operations that each add a product to the sum of the one before, which nothing else reads."""
+    """Chains of operations: each adds a product to the sum of the previous one, and no other operation reads
+    that sum."""
     first = tape.first_operation
     uses = [0] * tape.size
     for _, operands in tape.operations:

@@ -27,8 +27,8 @@ from armblocks.equations.traced_function import TracedFunction
 from armblocks.errors import InputError
 
 MIXED = OWN + "mixed"
-"""A discrete variable (2,): the first time at which events with different time derivatives coincided (s; -1:
-never), and the number of one of their guards, from 1."""
+"""A discrete variable (2,): the first time (s; -1: never) at which events coincided whose times have
+different derivatives by a parameter, and the number of one of their guards, from 1."""
 
 
 def parameters_read_by_index(system: HybridSystem) -> frozenset[str]:
@@ -183,7 +183,7 @@ class _Augmented:
             still = SX.zeros(r.numel())
             by_time = self.instants.over_time(r)
             parts.append(by_time)
-            # While S is the derivative along an instant, W is so too.
+            # If S is the derivative along an instant, W is the derivative along this instant as well.
             fixed = c.along(r, t=1.0, x=SX.zeros(c.x.numel()), z=self.delays.rate_along, w=still, p=0.0 * c.p)
             for k, instant in enumerate(self.instants.instant_p):
                 parts[k + 1] = parts[k + 1] + self.instants.open * instant * fixed

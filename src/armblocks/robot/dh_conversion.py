@@ -5,8 +5,8 @@ Both conventions describe the same product of rotations and translations,
     Rz(theta1) Tz(d1) · Tx(a1) Rx(alpha1) · Rz(theta2) Tz(d2) · Tx(a2) Rx(alpha2) …
 
 and split it at different places: a standard row has the transforms after its joint, a modified row those
-before it. So alpha and a move by one row; the remainder is added to the tool or the base. The link frames
-change, and centres of mass, inertias and shapes are transformed to the new frames.
+before it. The conversion therefore shifts alpha and a by one row; the remainder is added to the tool or the
+base. The link frames change, and centres of mass, inertias and shapes are transformed to the new frames.
 
 Sources: Corke, *Robotics, Vision and Control*, 2nd ed., 7.1.2; Craig, *Introduction to Robotics*, 3.4.
 """

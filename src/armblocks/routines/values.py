@@ -113,7 +113,7 @@ ConditionT = TypeVar("ConditionT", bound=Condition)
 
 
 class Number(Value, Generic[ConditionT]):
-    """A double, or one in each lane. Each operation is rounded once; comparisons with NaN fail, except
+    """A double, or one in each lane. Each operation is rounded once; comparisons with NaN are false, except
     ``!=``."""
 
     __slots__ = ()
