@@ -110,11 +110,11 @@ class LinearSystem(StateSpaceModel):
     # Structure.
 
     def controllability(self) -> int:
-        """The dimension of the controllable subspace."""
+        """The rank of the controllability matrix: the dimension of the controllable subspace."""
         return reachable_dimensions(self.A, self.B)
 
     def observability(self) -> int:
-        """The rank of observability."""
+        """The rank of the observability matrix."""
         return reachable_dimensions(self.A.T, self.C.T)
 
     def gramians(self) -> tuple[Array, Array]:

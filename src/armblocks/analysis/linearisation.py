@@ -68,7 +68,7 @@ def linearise(
     names, units = _elements(system.states)
 
     def ticked(ticking: tuple[int, ...]) -> Slopes:
-        """The dependence of ``z`` on the values before a tick."""
+        """The derivatives of ``z`` after a tick by the values before the tick."""
         slopes = _without(evaluated.update_slopes(point, np.array(ticking, dtype=np.float64)), unknowns)
         _check_finite(system, _elements(system.discrete)[0], slopes, "the discrete variable")
         return late(slopes) if late else slopes
@@ -205,7 +205,8 @@ def _elements(layout: Signature) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def _unknowns(evaluated: EvaluatedSystem, point: Point) -> Slopes | None:
-    """The dependence of the unknowns of the implicit equations on all other variables."""
+    """The derivatives of the unknowns of the implicit equations by all other variables; ``None`` without
+    unknowns."""
     system = evaluated.system
     if not system.algebraic.size:
         return None

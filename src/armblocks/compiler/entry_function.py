@@ -73,7 +73,7 @@ def _known_function(r: Routine, function: Function[P, R]) -> Function[P, R]:
 
 
 class _PythonObjects:
-    """Inspects Python objects, and leaves a part of the routine where they are not as expected."""
+    """Inspects Python objects, and leaves a part of the routine if they are not of the expected form."""
 
     def __init__(self, r: Routine, served: Part) -> None:
         self.r = r
@@ -121,7 +121,7 @@ class _Result:
 
 
 class _Call:
-    """Serves one call of the builtin."""
+    """Processes one call of the builtin."""
 
     def __init__(self, objects: _PythonObjects, values: Addresses, names: Address, evaluate: str) -> None:
         self.r = objects.r
@@ -372,7 +372,7 @@ def _evaluate_batch(r: Routine, start: Integer, stop: Integer, columns: Integer,
 
 
 def _options(r: Routine, values: Addresses, names: Address) -> tuple[Boolean, Address]:
-    """Whether the builtin serves the options, and the array of ``out=``, or null.
+    """Whether the builtin supports the options, and the array of ``out=``, or null.
 
     Options are ``threads=1`` and ``out=``. ``out=None`` counts as omitted.
     """

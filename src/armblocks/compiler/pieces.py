@@ -1,4 +1,4 @@
-"""Long tapes cut into pieces, each a function of its own.
+"""Long tapes divided into pieces, each of which becomes a function.
 
 LLVM's compile time grows faster than linearly with the length of a function, mainly because it compares loads
 and stores pairwise. Ten thousand operations take minutes in one function and seconds in pieces. Values that

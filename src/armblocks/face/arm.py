@@ -95,7 +95,7 @@ class Arm:
     results. The first call of a method compiles it (a fraction of a second; cached on disk for later
     processes).
 
-    Units are SI: rad or m, N m or N. Frames: world, unless said otherwise.
+    Units are SI: rad or m, N m or N. Frames: world, unless stated otherwise.
     """
 
     def __init__(self, robot: Robot) -> None:

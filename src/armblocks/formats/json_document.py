@@ -209,7 +209,8 @@ def split_members(node: Node, known: Iterable[str]) -> tuple[dict[str, Node], di
 
 
 def closed_members(node: Node, known: Iterable[str], required: Iterable[str] = ()) -> dict[str, Node]:
-    """The members of an object that may have no others. Raises ``FormatError`` with the nearest name."""
+    """The members of an object whose keys must be in ``known``. Raises ``FormatError`` with the nearest
+    name."""
     names, members = list(known), node.members()
     for key, member in members.items():
         if key not in names:
@@ -225,7 +226,8 @@ def closed_members(node: Node, known: Iterable[str], required: Iterable[str] = (
 
 
 class _RefusedError(Exception):
-    """Something that JSON's own parser lets through, found while parsing, where no line is known."""
+    """An error that Python's JSON parser does not detect. It is found during parsing, when the line is
+    unknown."""
 
     def __init__(self, what: str, needle: str, allowed: str) -> None:
         self.what, self.needle, self.allowed = what, needle, allowed
