@@ -348,9 +348,9 @@ def test_inconsistent_shapes_and_unsuitable_systems_are_refused() -> None:
         system.select("y9")
     with pytest.raises(InputError, match="the system has 2 inputs and 3 outputs"):
         system.transfer_function()
-    with pytest.raises(InputError, match="margins of 2 inputs and 3 outputs are asked for"):
+    with pytest.raises(InputError, match="margins of 2 inputs and 3 outputs are requested"):
         system.margins()
-    with pytest.raises(InputError, match="the bandwidth of 2 inputs and 3 outputs is asked for"):
+    with pytest.raises(InputError, match="the bandwidth of 2 inputs and 3 outputs is requested"):
         system.bandwidth()
     with pytest.raises(InputError, match="the gain at rest is inf"):
         transfer([1.0], [1.0, 0.0]).bandwidth()

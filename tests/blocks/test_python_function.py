@@ -118,11 +118,11 @@ def test_invalid_references_to_functions_are_refused(reference: str, says: str, 
 
 
 def test_a_function_of_a_session_cannot_be_saved(tmp_path: Path) -> None:
-    with pytest.raises(FormatError, match=r"<lambda> stands in no file of its own.*move it to a file"):
+    with pytest.raises(FormatError, match=r"<lambda> is not defined in a file.*move it to a file"):
         ab.save_diagram(fed(PythonFunction(function=lambda u: 2 * u), SineWave()), tmp_path / "d.json")
     from armblocks.formats import diagram_to_python
 
-    with pytest.raises(FormatError, match=r"<lambda> has no place in a listing"):
+    with pytest.raises(FormatError, match=r"<lambda> cannot be written into a Python program"):
         diagram_to_python(fed(PythonFunction(function=lambda u: 2 * u), SineWave()))
 
 

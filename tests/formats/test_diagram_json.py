@@ -374,7 +374,7 @@ FAULTS: list[tuple[bytes, type[ArmblocksError], str]] = [
     ),
     (altered("blocks", "a/b", value={"type": "Clock"}), DiagramError, "the block name 'a/b' contains '/'"),
     (altered("blocks", "GAIN", value={"type": "Clock"}), DiagramError, "differs only in case"),
-    (altered("connections", value=["clock -> gain"]), FormatError, "'clock -> gain' is no connection"),
+    (altered("connections", value=["clock -> gain"]), FormatError, "'clock -> gain' is not a connection"),
     (altered("connections", value=["clock/y -> gane/u"]), UnknownNameError, "no block named 'gane'"),
     (altered("connections", value=["clock/y -> gain/v"]), UnknownNameError, "no input port named 'v'"),
     (

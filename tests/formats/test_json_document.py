@@ -80,7 +80,7 @@ def test_rows_of_numbers_stay_on_one_line() -> None:
         ("[1e999]", "the number 1e999 is too large"),
         ("[" + "1" * 5000 + "]", "too large"),
         ("[" + "1" * 30 + "]", "the integer 1+ is too long"),
-        ('{"a": 1,\n"a": 2}', r"a\.json:2: the key 'a' stands twice in one object"),
+        ('{"a": 1,\n"a": 2}', r"a\.json:2: the key 'a' occurs twice in one object"),
         ('{"a":\n "\\ud800"}', r"a\.json:2, a: a text is not valid Unicode"),
         ('{"\\udfff": 1}', "a text is not valid Unicode"),
         ("[" * 70 + "]" * 70, "objects and arrays are nested too deeply. Allowed: 64 levels"),

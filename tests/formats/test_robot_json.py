@@ -298,7 +298,7 @@ def test_a_folder_is_refused_with_the_allowed_file_types(tmp_path: Path) -> None
 
 
 def test_unknown_suffix_is_refused() -> None:
-    with pytest.raises(FormatError, match=r"'\.urdf' is no suffix of a robot file.*MATLAB robot script"):
+    with pytest.raises(FormatError, match=r"'\.urdf' is not a suffix of a robot file.*MATLAB robot script"):
         load_robot("arms/ur5.urdf")
 
 

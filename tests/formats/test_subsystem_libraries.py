@@ -156,9 +156,9 @@ def cases(folder: Path) -> list[tuple[str, type[ArmblocksError], str]]:
             UnknownNameError,
             "no shipped library named 'joint_servo'.*did you mean 'joint_servos'",
         ),
-        ("parts/base.txt#A", FormatError, "'parts/base.txt' is no path of a library"),
-        ("base.json", FormatError, "'base.json' is no entry of a library"),
-        ("parts#", FormatError, "'parts#' is no entry of a library"),
+        ("parts/base.txt#A", FormatError, "'parts/base.txt' is not the path of a library"),
+        ("base.json", FormatError, "'base.json' is not an entry of a library"),
+        ("parts#", FormatError, "'parts#' is not an entry of a library"),
         ("parts\x01/a.json#A", FormatError, "there is no such file"),
         (
             "code.json#A",

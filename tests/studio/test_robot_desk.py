@@ -269,7 +269,7 @@ def test_file_kinds_are_recognised_and_file_sizes_are_bounded() -> None:
     for wrong in (b"[1, 2]", b"{"):
         with pytest.raises(FormatError, match=r"model\.json"):
             kind_of_data(wrong, "model.json")
-    with pytest.raises(FormatError, match="is no suffix of a robot file"):
+    with pytest.raises(FormatError, match="is not a suffix of a robot file"):
         read_robots(b"", "arm.step")
     with pytest.raises(FormatError, match="it has 1048577 bytes"):
         read_robots(b" " * (2**20 + 1), "arm.m")

@@ -332,7 +332,7 @@ def test_a_logged_signal_follows_renaming_and_is_removed_with_its_block() -> Non
     assert document.undo_title == "stop logging PID/y"
     assert content(document) == before
     wrong = before.replace(b'"connections":', b'"logged": ["PID"], "connections":')
-    with pytest.raises(FormatError, match="'PID' is no output"):
+    with pytest.raises(FormatError, match="'PID' is not an output"):
         diagram_from_bytes(wrong, "wrong", BLOCKS, load_robot)
 
 

@@ -87,7 +87,7 @@ def margins(system: StateSpaceModel) -> Margins:
     """
     if not system.is_siso:
         raise InputError(
-            f"margins of {system.D.shape[1]} inputs and {system.D.shape[0]} outputs are asked for",
+            f"margins of {system.D.shape[1]} inputs and {system.D.shape[0]} outputs are requested",
             where=system.name,
             allowed="one of each",
             fix="choose with system.select(output, input)",
@@ -171,7 +171,7 @@ def bandwidth(system: StateSpaceModel, drop: float) -> float:
     """See :meth:`LinearSystem.bandwidth`; ``inf`` if the gain never decreases by ``drop``."""
     if not system.is_siso:
         raise InputError(
-            f"the bandwidth of {system.D.shape[1]} inputs and {system.D.shape[0]} outputs is asked for",
+            f"the bandwidth of {system.D.shape[1]} inputs and {system.D.shape[0]} outputs is requested",
             where=system.name,
             allowed="one of each",
             fix="choose with system.select(output, input)",

@@ -42,7 +42,7 @@ def root_locus(system: LinearSystem, gains: Array | None = None) -> RootLocus:
     if not system.is_siso or not system.order:
         raise InputError(
             f"a root locus of {system.D.shape[1]} inputs, {system.D.shape[0]} outputs and {system.order} "
-            "states is asked for",
+            "states is requested",
             where=system.name,
             allowed="one input, one output, and one state or more",
             fix="choose with system.select(output, input)",

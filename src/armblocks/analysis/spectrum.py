@@ -75,7 +75,7 @@ def signal_spectrum(
     length -= length % 2
     if length < 4:
         raise InputError(
-            f"{averages} segments of {len(samples)} samples are asked for",
+            f"{averages} segments of {len(samples)} samples are requested",
             where="spectrum",
             allowed="4 samples or more in each segment",
             fix="run longer, record more finely, or average less",

@@ -500,14 +500,14 @@ def _with_infinities(value: object) -> object:
 def _wire(node: Node) -> tuple[PortRef, PortRef]:
     found = _WIRE.fullmatch(node.text())
     if found is None:
-        raise node.error(f"'{node.text()[:80]}' is no connection", allowed='"block/output -> block/input"')
+        raise node.error(f"'{node.text()[:80]}' is not a connection", allowed='"block/output -> block/input"')
     return PortRef(found[1], found[2]), PortRef(found[3], found[4])
 
 
 def _port(node: Node) -> PortRef:
     block, _, port = node.text().rpartition("/")
     if not block or not port:
-        raise node.error(f"'{node.text()[:80]}' is no output", allowed='"block/output"')
+        raise node.error(f"'{node.text()[:80]}' is not an output", allowed='"block/output"')
     return PortRef(block, port)
 
 

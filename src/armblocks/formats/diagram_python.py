@@ -278,7 +278,7 @@ def _identifiers(names: Mapping[_Named, str], others: Iterable[str]) -> dict[_Na
 def _value(value: object) -> str:
     if isinstance(value, UserFunction):
         raise FormatError(
-            f"the function {value.name} has no place in a listing",
+            f"the function {value.name} cannot be written into a Python program",
             allowed="diagrams without Python functions",
             fix="write the diagram as JSON, which names the function's file",
             where=f"function {value.name}",

@@ -240,7 +240,7 @@ def _unique_members(pairs: list[tuple[str, object]]) -> dict[str, object]:
         keys = [key for key, _ in pairs]
         twice = next(key for i, key in enumerate(keys) if key in keys[:i])
         raise _RefusedError(
-            f"the key '{_short(twice)}' stands twice in one object", json.dumps(twice), "every key once"
+            f"the key '{_short(twice)}' occurs twice in one object", json.dumps(twice), "every key once"
         )
     return members
 

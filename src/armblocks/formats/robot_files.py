@@ -100,7 +100,7 @@ def _format(name: str) -> RobotFormat:
         if suffix in format.suffixes:
             return format
     raise FormatError(
-        f"'{Path(name).suffix}' is no suffix of a robot file",
+        f"'{Path(name).suffix}' is not a suffix of a robot file",
         where=name,
         allowed=", ".join(f"{suffix} ({f.name})" for f in ROBOT_FORMATS for suffix in f.suffixes),
         fix="rename the file",

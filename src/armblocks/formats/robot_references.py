@@ -143,8 +143,8 @@ class RobotWriter:
         file, _, name = function.source.rpartition(":")
         if not file:
             raise FormatError(
-                f"the function {function.name} stands in no file of its own",
-                allowed="functions at the top of a .py file, whose place a diagram can name",
+                f"the function {function.name} is not defined in a file",
+                allowed="functions at the top level of a .py file",
                 fix="move it to a file and import it",
                 where=f"function {function.name}",
             )
@@ -162,10 +162,10 @@ class RobotWriter:
         rows = np.asarray(table)
         if rows.size > MOST_INLINE:
             raise FormatError(
-                f"a table of {rows.shape[0]} rows stands in no file",
+                f"a table of {rows.shape[0]} rows is not from a file",
                 where=table.source,
-                allowed=f"tables of up to {MOST_INLINE} numbers, or a file that holds the same",
-                fix="write the rows to a .csv or .npz file and give what load_table makes of it",
+                allowed=f"tables of up to {MOST_INLINE} numbers, or a file with the same table",
+                fix="write the rows to a .csv or .npz file and use the result of load_table",
             )
         return rows.tolist()
 

@@ -64,7 +64,7 @@ def library_path(reference: str, folder: Path | None) -> Path:
         return shipped_folder("libraries").resolve() / f"{reference}{SUFFIX}"
     if "\0" in reference or not reference.lower().endswith(SUFFIX):
         raise FormatError(
-            f"{reference[:80]!r} is no path of a library",
+            f"{reference[:80]!r} is not the path of a library",
             allowed=f"the path of a {SUFFIX} file, or one of {', '.join(list_libraries())}",
             where="library",
             fix=f"name a file that ends in {SUFFIX}",
@@ -113,7 +113,7 @@ class Libraries:
         file, sharp, name = node.text().partition("#")
         if not (file and sharp and name):
             raise node.error(
-                f"'{node.text()[:80]}' is no entry of a library",
+                f"'{node.text()[:80]}' is not an entry of a library",
                 allowed='"file.json#Name", or "shipped#Name"',
                 fix="name the file and the entry",
             )

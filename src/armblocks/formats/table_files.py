@@ -45,11 +45,11 @@ def load_table(path: str | PathLike[str]) -> TimeTable:
             f"the file cannot be read: {error}"[:300],
             where=str(place),
             allowed=f"a {place.suffix} file",
-            fix="open it in what wrote it, and write it again",
+            fix="write the file again with the program that created it",
         ) from None
     if not columns:
         raise FormatError(
-            "the file holds no columns of numbers",
+            "the file has no columns of numbers",
             where=str(place),
             fix="one column of times, one or more of values",
         )

@@ -242,7 +242,7 @@ def _run(contents: ReportContents) -> str:
     settings = contents.diagram.settings
     facts = [
         ("Solver", run.reason if run.solver == "none" else f"{run.solver} ({run.reason})"),
-        ("Stop time asked for", f"{axis_number(settings.stop_time)} s by the diagram"),
+        ("Stop time of the diagram", f"{axis_number(settings.stop_time)} s"),
         ("Steps accepted, rejected", f"{axis_number(run.steps)}, {axis_number(run.rejected)}"),
         ("Evaluations of the equations", axis_number(run.evaluations)),
         ("Continuous states", axis_number(result.states.shape[1])),

@@ -84,7 +84,7 @@ def loads_table(motion: Motion, summary: MotionSummary) -> str:
     rows.append(f'<tr><th scope="row">All</th>{"".join(_cell(text) for text in total)}</tr>')
     note = (
         "Torques at the joint; the motor's are divided by the gear ratio, its speed multiplied by it. "
-        "Work done: what the drives put in; taken: what they brake."
+        "Work done: positive work of the drives; taken: negative work, in braking."
     )
     return html_table(note, heads, rows)
 
