@@ -116,10 +116,7 @@ function NumberField({
   )
 }
 
-/**
- * The range of a slider: that of the joint, otherwise one turn or one metre in both directions; for speeds
- * the speed limit.
- */
+/** The range of a slider: that of the joint, otherwise ±π rad or ±1 m; for speeds the speed limit. */
 function range(link: LinkRow, kind: keyof Joints): [number, number] {
   const { lowest, highest, speed } = link.cells
   const most = typeof speed === 'number' ? speed : link.turns ? WHOLE_TURN : WITHOUT_RANGE
