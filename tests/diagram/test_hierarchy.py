@@ -16,6 +16,7 @@ from armblocks.blocks import (
     Clock,
     Constant,
     Display,
+    EnabledSubsystem,
     From,
     Gain,
     Goto,
@@ -184,7 +185,7 @@ def test_wrong_dimensions_of_ports_are_refused() -> None:
     builder = DiagramBuilder("top")
     with builder.subsystem("sub", builder.add("c", Constant(value=[1.0, 2.0]))) as sub:
         sub.output("y", sub.input("u", dimensions=3))
-    with pytest.raises(DiagramError, match=r"'c/y' gives shape \(2,\) but 'sub/u' takes shape \(3,\)"):
+    with pytest.raises(DiagramError, match=r"^block 'sub': 'c/y' gives shape \(2,\) but 'sub/u' takes"):
         builder.build()
 
 
@@ -198,6 +199,12 @@ def test_errors_in_a_subsystem_name_the_path() -> None:
         gained = sub.add("wide", MatrixGain(gain=np.eye(3)), sub.input("u"))
         sub.output("y", gained)
     with pytest.raises(DiagramError, match=r"'c/y' gives shape \(2,\) but 'sub/wide/u' takes shape \(3,\)"):
+        builder.build()
+    # The control block of an enabled subsystem is not in the user's diagram: the message names the port.
+    builder = DiagramBuilder("top")
+    c = builder.add("c", Constant(value=[1.0, 2.0]))
+    builder.add("enabled", EnabledSubsystem(), c, enable=c)
+    with pytest.raises(DiagramError, match=r"^block 'enabled': 'c/y' gives .* but 'enabled/enable' takes"):
         builder.build()
     builder = DiagramBuilder("top")
     with builder.subsystem("sub") as sub:

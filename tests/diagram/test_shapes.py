@@ -64,7 +64,7 @@ def test_the_error_about_a_shape_mismatch_names_both_ports() -> None:
     builder = DiagramBuilder("d")
     builder.add("xyz", T2xyz(), builder.add("pose", Constant(value=[1.0, 2.0])))
     with pytest.raises(
-        DiagramError, match=r"diagram 'd': 'pose/y' gives shape \(2,\) but 'xyz/T' takes shape \(4, 4\)"
+        DiagramError, match=r"^block 'xyz': 'pose/y' gives shape \(2,\) but 'xyz/T' takes shape \(4, 4\)"
     ):
         builder.build()
 

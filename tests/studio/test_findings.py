@@ -1,6 +1,9 @@
-"""Findings are marked at the blocks of the sheet, also where a message names a block that flattening adds."""
+"""Findings are marked at the blocks of the sheet, and signals have shapes on the sheets of subsystems.
 
-from armblocks.blocks import BusCreator, Constant, Switch
+Messages and shapes are those of the flat diagram, which has other blocks than the sheets.
+"""
+
+from armblocks.blocks import BusCreator, Constant, EnabledSubsystem, Gain, Switch
 from armblocks.diagram import Diagram, DiagramBuilder
 from armblocks.studio.sheet.check import check
 
@@ -17,3 +20,21 @@ def test_a_copy_for_a_bus_marks_its_switch() -> None:
     found = marked(builder.draft())
     assert list(found) == ["switch"]
     assert "'u1' has shape (3,) and 'u3' has shape (2,)" in found["switch"]
+
+
+def test_a_vector_at_a_control_input_marks_its_subsystem() -> None:
+    builder = DiagramBuilder("shapes")
+    c = builder.add("c", Constant(value=(1.0, 2.0)))
+    builder.add("enabled", EnabledSubsystem(), c, enable=c)
+    found = marked(builder.draft())
+    assert found == {"enabled": "'c/y' gives shape (2,) but 'enabled/enable' takes shape ()"}
+
+
+def test_signals_of_a_subsystem_have_shapes_on_its_sheet_and_outside() -> None:
+    builder = DiagramBuilder("shapes")
+    with builder.subsystem("inside", builder.add("c", Constant(value=(1.0, 2.0, 3.0)))) as inside:
+        inside.output("y", inside.add("gain", Gain(), inside.input("u")))
+    findings, wires = check(builder.draft())
+    assert findings == []
+    for port in ("inside/u/y", "inside/gain/y", "inside/y"):
+        assert wires[port].shape == [3], port

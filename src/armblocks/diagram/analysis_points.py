@@ -114,7 +114,7 @@ def with_analysis_points(
     opened = {_port(form, name, "opening") for name in _once(openings, "opening")}
     if not moved and not opened:
         return PreparedDiagram(diagram=given, inputs=parameters, levels={})
-    shapes = infer_shapes(diagram)
+    shapes = infer_shapes(given)
     blocks, wires = dict(diagram.blocks), list(diagram.connections)
     levels: dict[str, str] = {}
     chosen = {*moved, *opened}

@@ -44,6 +44,17 @@ class FlatForm:
     )
     origins: Mapping[str, str] = field(default_factory=dict[str, str])
 
+    def original_port(self, ref: PortRef) -> PortRef:
+        """The port of the hierarchy for an input port of a flat block.
+
+        The control ``enabled/enable`` of a subsystem stands for its port: ``enabled/enable/u`` becomes
+        ``enabled/enable``.
+        """
+        origin = self.origins.get(ref.block, ref.block)
+        if ref.block.startswith(f"{origin}/"):
+            return PortRef(origin, ref.block.removeprefix(f"{origin}/"))
+        return PortRef(origin, ref.port)
+
 
 def flatten_hierarchy(diagram: Diagram) -> FlatForm:
     """The flat form of a diagram, cached for each diagram object.

@@ -36,9 +36,9 @@ def diagram_model(diagram: Diagram) -> Model:
     blocks whose parameters allow no equations (a robot without mass), ``AlgebraicLoopError`` for loops that
     no order can solve.
     """
+    shapes = infer_shapes(diagram)
     form = flatten_hierarchy(diagram)
     diagram = form.diagram
-    shapes = infer_shapes(diagram)
     check_stated(form, shapes)
     free = [name for name in diagram.blocks if not diagram.clocked(name)]
     equations = {name: _equations(diagram, name, shapes) for name in free}

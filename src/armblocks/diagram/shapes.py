@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from armblocks.diagram.block import Block, Shapes
 from armblocks.diagram.diagram import Diagram
-from armblocks.diagram.hierarchy import FlatForm
+from armblocks.diagram.hierarchy import FlatForm, flatten_hierarchy
 from armblocks.diagram.port import PortRef
 from armblocks.diagram.shape_rules import shapes_agree
 from armblocks.equations import Shape
@@ -30,14 +30,14 @@ def check_stated(form: FlatForm, shapes: DiagramShapes) -> None:
         if not shapes_agree(given, stated):
             raise DiagramError(
                 f"'{source}' gives shape {given} but '{target}' takes shape {stated}",
-                where=f"diagram '{form.diagram.name}'",
+                where=f"block '{target.block}'",
                 allowed="the dimensions of the subsystem's In and Out blocks",
                 fix="change the dimensions of the block or the width of the signal",
             )
 
 
 def infer_shapes(diagram: Diagram) -> DiagramShapes:
-    """Find the shape of every signal of a flat diagram; every input must be connected.
+    """Find the shape of every signal of the flat form of a diagram; every input must be connected.
 
     Shapes propagate from the ports that declare one. A loop without declared shapes starts from the shapes of
     its integrators' initial values, which are widened if the loop requires it. A loop without integrators
@@ -45,6 +45,8 @@ def infer_shapes(diagram: Diagram) -> DiagramShapes:
 
     Raises ``DiagramError`` where the two ends of a connection, or the inputs of a block, do not agree.
     """
+    form = flatten_hierarchy(diagram)
+    diagram = form.diagram
     known: dict[PortRef, Shape] = {}
     consumers: dict[str, list[str]] = {name: [] for name in diagram.blocks}
     for wire in diagram.connections:
@@ -62,7 +64,7 @@ def infer_shapes(diagram: Diagram) -> DiagramShapes:
         if changes[ref] > len(diagram.blocks):
             raise DiagramError(
                 f"the shape of '{ref}' is inconsistent: it was {known[ref]} and becomes {shape}",
-                where=f"diagram '{diagram.name}'",
+                where=f"block '{ref.block}'",
                 allowed="loops with the same width at all signals",
                 fix="give the integrators of the loop initial values of the intended size",
             )
@@ -97,7 +99,7 @@ def infer_shapes(diagram: Diagram) -> DiagramShapes:
             if PortRef(name, port) not in known:
                 learn(PortRef(name, port), shape)
     spread()
-    # The remaining signals are in loops without state, or depend on them: scalars are assumed one by one. #
+    # The remaining signals are in loops without state, or depend on them: scalars are assumed one by one.
     # Errors of blocks are raised first.
     open_outputs = [
         (name, PortRef(name, port.name))
@@ -110,7 +112,7 @@ def infer_shapes(diagram: Diagram) -> DiagramShapes:
             if ref not in known:
                 learn(ref, ())
                 spread()
-    return _checked(diagram, known)
+    return _checked(form, known)
 
 
 def _input_shapes(
@@ -126,9 +128,9 @@ def _input_shapes(
     return shapes
 
 
-def _checked(diagram: Diagram, known: Mapping[PortRef, Shape]) -> DiagramShapes:
+def _checked(form: FlatForm, known: Mapping[PortRef, Shape]) -> DiagramShapes:
     """All shapes by block; raises the errors that were deferred until all shapes were known."""
-    drivers = diagram.drivers
+    diagram, drivers = form.diagram, form.diagram.drivers
     stated = {
         PortRef(name, port.name): port.shape
         for name, block in diagram.blocks.items()
@@ -137,9 +139,10 @@ def _checked(diagram: Diagram, known: Mapping[PortRef, Shape]) -> DiagramShapes:
     for wire in diagram.connections:
         given, wanted = known.get(wire.source), stated[wire.target]
         if given is not None and wanted is not None and not shapes_agree(given, wanted):
+            target = form.original_port(wire.target)
             raise DiagramError(
-                f"'{wire.source}' gives shape {given} but '{wire.target}' takes shape {wanted}",
-                where=f"diagram '{diagram.name}'",
+                f"'{wire.source}' gives shape {given} but '{target}' takes shape {wanted}",
+                where=f"block '{target.block}'",
                 allowed="both ends of a connection have the same shape",
                 fix="change the width of one end, or put a Mux, Demux or Matrix Gain in between",
             )

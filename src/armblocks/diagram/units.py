@@ -6,11 +6,13 @@ from collections import deque
 from collections.abc import Mapping
 
 from armblocks.diagram.diagram import Diagram
+from armblocks.diagram.hierarchy import flat_diagram
 from armblocks.diagram.port import PortRef
 
 
 def infer_units(diagram: Diagram) -> Mapping[PortRef, str]:
-    """The unit of every output port of a flat diagram; ``""`` where it is unknown. For display only."""
+    """The unit of every output port of a diagram's flat form, for display; ``""`` where it is unknown."""
+    diagram = flat_diagram(diagram)
     drivers = diagram.drivers
     consumers: dict[str, list[str]] = {name: [] for name in diagram.blocks}
     for wire in diagram.connections:

@@ -327,7 +327,7 @@ class _Carried:
     def of(cls, diagram: Diagram) -> _Carried:
         try:
             form = flatten_hierarchy(diagram)
-            outputs = infer_shapes(form.diagram).outputs
+            outputs = infer_shapes(diagram).outputs
         except DiagramError:
             return cls(levels_of(diagram), {}, {}, {})
         views = {name: view for name, view in diagram_views(diagram) if view.kind in _TRENDS}
