@@ -62,3 +62,14 @@ def test_links_between_the_documents_have_targets() -> None:
         for target in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
             if "://" not in target:
                 assert (page.parent / target).exists(), f"{page.name}: {target}"
+
+
+def test_rows_of_tables_have_a_cell_for_each_column() -> None:
+    wrong: list[str] = []
+    for page in (*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *(ROOT / "benchmarks").glob("*.md")):
+        text = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+        for table in re.findall(r"(?:^\|.*\n?)+", text, re.MULTILINE):
+            # A bar in code or after a backslash does not separate cells.
+            rows = [re.sub(r"`[^`]*`", "", row).replace("\\|", "") for row in table.splitlines()]
+            wrong += [f"{page.name}: {row}" for row in rows if row.count("|") != rows[0].count("|")]
+    assert wrong == []
