@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from casadi import SX
 
-from armblocks.errors import InputError, UnknownNameError
+from armblocks.errors import ArmblocksError, InputError, UnknownNameError
 from armblocks.formats import read_script
 from armblocks.matlab.arrays import Budget, scalar
 from armblocks.matlab.evaluation import Evaluator
@@ -118,6 +118,23 @@ def test_values_are_those_of_matlab(text: str, value: float) -> None:
     assert casadi.evalf(Formula(text, "here").trace({})).full().ravel().tolist() == [value]
 
 
+def test_wrong_arguments_are_refused_with_a_message() -> None:
+    wrong = ("", "[]", "'a'", "1, 'a'", "[1 2; 3 4], [1 2 3]", "1, 2, 3, 4", "[1 2], [3; 4]", "inf, -1")
+
+    def by_numbers(text: str) -> object:
+        return read_script(f"x = {text};".encode(), "x.m")
+
+    def by_symbols(text: str) -> object:
+        return Formula(text, "here").trace({})
+
+    for text in (f"{name}({arguments})" for name in TABLE for arguments in wrong):
+        for evaluated in (by_numbers, by_symbols):
+            try:
+                evaluated(text)
+            except ArmblocksError as error:
+                assert error.allowed, text
+
+
 def test_every_entry_is_documented() -> None:
     for name, function in TABLE.items():
         assert name.isidentifier()
@@ -163,11 +180,11 @@ def test_plain_numbers_are_evaluated_without_objects() -> None:
     assert value("['a' 'b']") == "ab"
     with pytest.raises(UnknownNameError, match=r"there is no function named 'sni'.*did you mean 'sin'"):
         value("sni(a)")
-    with pytest.raises(InputError, match=r"a cell array is no number.*Allowed: \[a b; c d\]"):
+    with pytest.raises(InputError, match=r"a cell array is not a number.*Allowed: \[a b; c d\]"):
         value("{a}")
     with pytest.raises(InputError, match=r"\{\} is used on a number"):
         value("a{1}")
-    with pytest.raises(InputError, match=r"'end' and ':' stand outside of an index"):
+    with pytest.raises(InputError, match=r"'end' and ':' are used outside of an index"):
         value("sin(:)")
 
 

@@ -42,3 +42,8 @@ def test_the_page_of_the_studio_is_served_before_slow_imports() -> None:
     loaded = loaded_by("import armblocks.studio.server.launch")
     assert "starlette" in loaded
     assert loaded & (HEAVY - {"starlette"} | BEHIND_THE_PAGE) == set()
+
+
+def test_robot_scripts_are_evaluated_without_casadi() -> None:
+    read = "from armblocks.formats import read_script; read_script(b'x = sin(1)', 'x.m')"
+    assert loaded_by(read) & (HEAVY - {"numpy"} | {"casadi"}) == set()

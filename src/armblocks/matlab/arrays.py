@@ -112,8 +112,8 @@ def check_size(place: Place, rows: int, columns: int) -> None:
 
 def operate(place: Place, budget: Budget, operator: str, left: object, right: object) -> Array:
     """``left operator right`` of arithmetic or a comparison."""
-    a = array_of(place, left, f"what stands left of '{operator}'")
-    b = array_of(place, right, f"what stands right of '{operator}'")
+    a = array_of(place, left, f"the left operand of '{operator}'")
+    b = array_of(place, right, f"the right operand of '{operator}'")
     with np.errstate(all="ignore"):
         if operator in _ELEMENTWISE or a.size == 1 == b.size:
             return _elementwise(place, budget, operator.lstrip("."), a, b)

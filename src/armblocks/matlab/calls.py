@@ -35,7 +35,8 @@ def call_function(
             raise place.error(
                 f"the size of an array made by {name} is not constant", allowed="constant numbers"
             )
-        return by.constant(function.compute(*numbers))
+        with np.errstate(all="ignore"):
+            return by.constant(function.compute(*numbers))
     except MismatchError as mismatch:
         raise place.error(f"{name}: {mismatch}", allowed=f"{name}({function.arguments})") from None
 
@@ -46,7 +47,8 @@ def _check_count(place: Place, name: str, function: Function, count: int) -> Non
     if count == 0:
         raise place.error(f"the function '{name}' has no arguments", allowed=f"{name}({function.arguments})")
     few, most = function.fewest, function.most
+    allowed = f"{few}" if few == most else f"{few} to {most}"
     raise place.error(
         f"{name} is called with {count} argument{'s' * (count != 1)}",
-        allowed=f"{few}" if few == most else f"{few} to {most}",
+        allowed=f"{allowed}: {name}({function.arguments})" if most else "no arguments",
     )

@@ -74,7 +74,7 @@ class Values(Protocol[V]):
         ...
 
     def element(self, place: Place, value: V, indices: Sequence[V | None], shown: str) -> V:
-        """``value(indices)``, where ``None`` is ``:``; ``shown`` is the name of the value in messages."""
+        """``value(indices)``, where ``None`` is ``:``; ``shown`` is its name in messages, or empty."""
         ...
 
     def last_index(self, place: Place, value: V, position: int, count: int) -> V:
@@ -134,7 +134,7 @@ class Evaluator(Generic[V]):
             case End() if self._indexed:
                 return values.last_index(place, *self._indexed[-1])
             case End() | All():
-                raise place.error("'end' and ':' stand outside of an index", allowed="v(end), A(:, 1)")
+                raise place.error("'end' and ':' are used outside of an index", allowed="v(end), A(:, 1)")
 
     def indices(self, value: V, arguments: Sequence[Expression]) -> list[V | None]:
         """The indices of ``value``: ``end`` is its last element, ``None`` stands for ``:``."""
@@ -167,7 +167,7 @@ class Evaluator(Generic[V]):
     def _postfix(self, expression: Postfix) -> V:
         base, steps = expression.base, expression.steps
         place = self._source.place(base.at)
-        shown = base.name if isinstance(base, Name) else "an array"
+        shown = base.name if isinstance(base, Name) else ""
         if isinstance(base, Name) and base.name not in self._variables:
             arguments: tuple[Expression, ...] = ()
             if isinstance(steps[0], Parentheses):
@@ -175,7 +175,7 @@ class Evaluator(Generic[V]):
             self._values.check_function(place, base.name, bool(arguments))
             given = [self.value(argument) for argument in arguments]
             value = self._values.call(place, base.name, given, arguments)
-            shown = f"{base.name}(…)"
+            shown = ""
         else:
             value = self.value(base)
         for step in steps:

@@ -43,7 +43,7 @@ class Formula:
     def names(self) -> frozenset[str]:
         """The names that need a value: all names except those of the function table.
 
-        A name such as ``length`` is a parameter where it stands alone and a function where it is called.
+        A name such as ``length`` is a parameter where it is used alone and a function where it is called.
         """
         return frozenset(name for name, called in _names(self._tree) if _needs_value(name, called))
 
@@ -84,7 +84,7 @@ class Formula:
         found = Evaluator(self._source, Symbols(names), variables).value(expression)
         if isinstance(found, str):
             raise self._source.place(expression.at).error(
-                f"the text '{found[:40]}' is no number", allowed="numbers and names without quotes"
+                f"the text '{found[:40]}' is not a number", allowed="numbers and names without quotes"
             )
         return found
 

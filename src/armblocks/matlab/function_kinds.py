@@ -163,7 +163,11 @@ class Function:
     elementary: bool = False
     """Whether an element costs much more than a sum, as numbers are computed by integer arithmetic."""
     takes_text: bool = False
-    """Whether an argument may be text in quotes."""
+    """Whether the optional argument is text in quotes."""
+
+    def may_be_text(self, position: int) -> bool:
+        """Whether the argument at a position, counted from 0, may be text."""
+        return self.takes_text and position >= self.fewest
 
 
 def constant(value: float, meaning: str, *, reserved: bool = False) -> Function:

@@ -173,13 +173,13 @@ class Numbers:
 
     def negative(self, place: Place, value: object) -> Array:
         """``-value``; 0 stays 0."""
-        array = array_of(place, value, "what stands behind '-'")
+        array = array_of(place, value, "the operand of '-'")
         self.budget.spend(place, array.size)
         return 0.0 - array if array.size == 1 and array[0, 0] == 0 else -array
 
     def logical_not(self, place: Place, value: object) -> Array:
         """``~value``"""
-        array = array_of(place, value, "what stands behind '~'")
+        array = array_of(place, value, "the operand of '~'")
         self.budget.spend(place, array.size)
         return (array == 0.0).astype(np.float64)
 
@@ -190,9 +190,9 @@ class Numbers:
     def logic(self, place: Place, operator: str, values: Sequence[object]) -> Array:
         """All values joined by one of ``&& || & |``."""
         joined = np.logical_and if operator in ("&&", "&") else np.logical_or
-        found = array_of(place, values[0], f"what stands left of '{operator}'") != 0.0
+        found = array_of(place, values[0], f"the left operand of '{operator}'") != 0.0
         for value in values[1:]:
-            other = array_of(place, value, f"what stands right of '{operator}'") != 0.0
+            other = array_of(place, value, f"the right operand of '{operator}'") != 0.0
             if found.shape != other.shape and 1 not in (found.size, other.size):
                 raise place.error(
                     f"'{operator}' of {kind_of(found)} and {kind_of(other)}",
@@ -212,7 +212,7 @@ class Numbers:
 
     def cell(self, place: Place, elements: Sequence[object]) -> Plain:
         """Cell arrays exist in scripts only."""
-        raise place.error("a cell array is no number", allowed="[a b; c d]")
+        raise place.error("a cell array is not a number", allowed="[a b; c d]")
 
     def range(self, place: Place, parts: Sequence[object]) -> Array:
         """``first:last`` or ``first:step:last``"""
@@ -227,7 +227,7 @@ class Numbers:
 
     def transposed(self, place: Place, value: object) -> Array:
         """``value'``"""
-        array = array_of(place, value, "what is transposed")
+        array = array_of(place, value, "the operand of the transpose")
         self.budget.spend(place, array.size)
         return array.T.copy()
 
@@ -241,7 +241,7 @@ class Numbers:
 
     def last_index(self, place: Place, value: object, position: int, count: int) -> Array:
         """``end`` as index ``position`` of ``count`` indices."""
-        array = array_of(place, value, "what 'end' belongs to")
+        array = array_of(place, value, "the value with the index 'end'")
         return scalar(float(array.size if count == 1 else array.shape[min(position, 1)]))
 
     def cell_element(self, place: Place, value: object, indices: Sequence[object]) -> Plain:
@@ -265,8 +265,8 @@ class Numbers:
         """``name(arguments)`` of a function in the table. Complex results are errors."""
         function = TABLE[name]
         plain: list[Any] = [
-            value if isinstance(value, str) and function.takes_text else _argument(place, value, name)
-            for value in arguments
+            value if isinstance(value, str) and function.may_be_text(k) else _argument(place, value, name)
+            for k, value in enumerate(arguments)
         ]
         arrays = [value for value in plain if is_array(value)]
         if function.elementwise:

@@ -64,7 +64,7 @@ def parse_formula(source: Source) -> Expression:
 
 
 class Parser:
-    """Precedence climbing; ``in_matrix`` says that blanks part elements right here."""
+    """Precedence climbing; ``in_matrix`` says that blanks separate elements here."""
 
     def __init__(self, source: Source) -> None:
         self.source = source
@@ -106,6 +106,8 @@ class Parser:
         """The error at a token that does not fit here."""
         token = self.token
         shown = {Kind.ROW: "the end of the line", Kind.EOF: "the end"}.get(token.kind, f"'{token.text[:40]}'")
+        if not wanted and token.kind in (Kind.NUMBER, Kind.NAME, Kind.STRING):
+            wanted = "an operator"
         what = f"{shown} is not understood here" + (f", expected {wanted}" if wanted else "")
         if token.kind is Kind.END and token.text == "\n":
             whole = "statement" if self.source.is_file else "formula"
@@ -296,13 +298,13 @@ class Parser:
         self.depth += 1
         if self.depth > DEEPEST:
             raise self.source.place(self.token.at).error(
-                f"'{self.token.text}' lies too deep in other brackets",
+                "brackets are nested too deeply",
                 allowed=f"{DEEPEST} brackets inside each other",
                 fix="split the expression",
             )
 
     def _arguments(self, opening: str, closing: str) -> tuple[Expression, ...]:
-        """``(a, b)``: blanks part nothing in here."""
+        """``(a, b)``: blanks separate nothing."""
         self._enter()
         outer, self.in_matrix = self.in_matrix, False
         self.indices += 1
@@ -335,7 +337,7 @@ class Parser:
             self.position += 1
 
     def _rows(self, opening: str, closing: str) -> tuple[tuple[tuple[Expression, ...], ...], bool]:
-        """Rows of a matrix or cell literal without the empty ones, and whether newlines alone part them."""
+        """The rows of a matrix or cell that are not empty, and whether only newlines separate them."""
         self._enter()
         outer, self.in_matrix = self.in_matrix, True
         self._expect(opening)

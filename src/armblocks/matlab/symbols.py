@@ -234,7 +234,7 @@ class Symbols:
 
     def cell(self, place: Place, elements: Sequence[Symbol]) -> Symbol:
         """Cell arrays exist in scripts only."""
-        raise place.error("a cell array is no number", allowed="[a b; c d]")
+        raise place.error("a cell array is not a number", allowed="[a b; c d]")
 
     def range(self, place: Place, parts: Sequence[Symbol]) -> Symbol:
         """``first:last`` or ``first:step:last`` of constant numbers."""
@@ -259,7 +259,9 @@ class Symbols:
         for index in indices:
             numbers = None if index is None else _constant(_symbol(place, index))
             if index is not None and numbers is None:
-                raise place.error(f"'{shown}' has no constant index", allowed=f"{shown}(1) and so on")
+                raise place.error(
+                    f"'{shown or 'the array'}' has no constant index", allowed=f"{shown or 'u'}(1) and so on"
+                )
             chosen.append(numbers)
         rows, columns = array.shape
         found = positions(place, (rows, columns), chosen, shown)
@@ -295,8 +297,8 @@ class Symbols:
         """``name(arguments)`` of a function in the table."""
         function = TABLE[name]
         given = [
-            value if isinstance(value, str) and function.takes_text else _symbol(place, value)
-            for value in arguments
+            value if isinstance(value, str) and function.may_be_text(k) else _symbol(place, value)
+            for k, value in enumerate(arguments)
         ]
         if function.elementwise and len(given) > 1:
             _check_shapes(place, [value for value in given if isinstance(value, SX)])
@@ -308,7 +310,9 @@ class Symbols:
 
 def _symbol(place: Place, value: Symbol) -> SX:
     if isinstance(value, str):
-        raise place.error(f"the text '{value[:40]}' is no number", allowed="numbers and names without quotes")
+        raise place.error(
+            f"the text '{value[:40]}' is not a number", allowed="numbers and names without quotes"
+        )
     return value
 
 

@@ -52,7 +52,7 @@ class All:
 
 @dataclass(frozen=True, slots=True)
 class Matrix:
-    """``[a b; c d]``; ``broken`` where rows are parted by newlines alone, with no ``;``."""
+    """``[a b; c d]``; ``broken`` where only newlines separate rows, without ``;``."""
 
     rows: tuple[tuple[Expression, ...], ...]
     broken: bool
