@@ -6,8 +6,13 @@ inner signal must then be equal in all periods, the first of which begins with t
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import ClassVar
+
 import numpy as np
 import pytest
+from casadi import SX, if_else
+from numpy.typing import ArrayLike
 
 import armblocks as ab
 from armblocks import Diagram, DiagramBuilder
@@ -37,9 +42,46 @@ from armblocks.blocks import (
     UnitDelay,
     ZeroOrderHold,
 )
-from armblocks.diagram import Block
+from armblocks.diagram import Block, Guard, Port, Shapes, Signals, State, sample_time_parameter
 
 PERIODS, SAMPLES = 4, 64
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tally(Block):
+    """A sampled block with a guard: it counts its ticks from 6 to 7, then again and again from 2 to 7, and
+    counts how often the count exceeds 4.5."""
+
+    title: ClassVar[str] = "Tally"
+    sampled: ClassVar[bool] = True
+    sample_time: ArrayLike = sample_time_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return ()
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the count", "", ()), Port("crossings", "how often it exceeded 4.5", "", ()))
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return State("count", (), "the count"), State("seen", (), "how often it exceeded 4.5")
+
+    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
+        return (Guard("exceeds", (), "the count exceeds 4.5", 1),)
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"count": SX(6.0), "seen": SX(0.0)}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": x["count"], "crossings": x["seen"]}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"count": if_else(x["count"] == 7.0, 2.0, x["count"] + 1.0), "seen": x["seen"]}
+
+    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"exceeds": x["count"] - 4.5}
+
+    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
+        return {"seen": x["seen"] + if_else(e["exceeds"] != 0.0, 1.0, 0.0)}
 
 
 def _around(block: Block) -> Diagram:
@@ -69,6 +111,7 @@ def _contents() -> Diagram:
     limited = b.add("limited", RateLimiterContinuous(rising=1.0, falling=-1.0), v)
     b.add("hit limited", HitCrossing(offset=0.1), limited)
     b.add("friction", CoulombFriction(), above)
+    b.add("tally", Tally(sample_time=0.0625))
     b.add("delay", UnitDelay(sample_time=0.125, initial=3.0), x)
     choice = b.add("choice", If(expressions="u > 0.3"), x)
     one = b.add("one", ActionSubsystem(diagram=_around(Gain(gain=2.0))), x, choice["if1"])
@@ -103,3 +146,11 @@ def test_a_subsystem_continues_after_a_reset_as_at_the_start_of_a_run(kind: str,
             np.testing.assert_allclose(course, later, rtol=0.0, atol=1e-6, err_msg=name)
             seen += np.ptp(course) > 0.0
     assert seen > 40
+
+
+def test_guards_of_a_sampled_block_fire_after_the_tick_that_changes_its_states() -> None:
+    b = DiagramBuilder("events of a sampled block")
+    b.add("tally", Tally(sample_time=1.0))
+    result = ab.simulate(b.build(), stop_time=16.0, sample_time=1.0)
+    assert [*result["tally/y"]] == [6, 7, *(2, 3, 4, 5, 6, 7) * 2, 2, 3, 4]
+    assert [*result["tally/crossings"]] == [0] * 5 + [1] * 6 + [2] * 6

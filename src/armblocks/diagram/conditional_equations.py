@@ -134,10 +134,16 @@ def restarted(features: Features, modes: Equation, *, clocked: bool) -> Features
             after[_BEGUN] = if_else(at.u[RESTART] != 0.0, 1.0, at.x[_BEGUN])
         return after
 
+    def update(at: Arguments) -> Signals:
+        after = {**updates(at), _DONE: at.u[RESTART]}
+        if features.guards:
+            after[_BEGUN] = if_else(at.u[RESTART] != 0.0, 1.0, at.x[_BEGUN])
+        return after
+
     equations: dict[SlotKind, Equation] = {SlotKind.RESET: reset}
     added: list[State] = []
     if clocked:
-        equations[SlotKind.UPDATE] = lambda at: {**updates(at), _DONE: at.u[RESTART]}
+        equations[SlotKind.UPDATE] = update
         added.append(State(_DONE, (), "whether this tick has reset the block"))
     if features.guards:
         added.append(State(_BEGUN, (), "1 from a restart to the end of its instant", momentary=True))

@@ -97,9 +97,9 @@ class Network:
             clocked = self.diagram.clocked(name)
             if clocked and not self.ticking:
                 yield Node(name, HELD, 0)
-                # Resets by events of a block that is active at ticks.
+                # Events of a sampled block between its ticks: guards and resets.
                 for (kind, _), index in self.equations[name].group_of.items():
-                    if kind is SlotKind.RESET:
+                    if kind in (SlotKind.GUARD, SlotKind.RESET):
                         yield Node(name, index, 0)
             if clocked is not self.ticking:
                 continue

@@ -417,7 +417,9 @@ def _signal_values(
             derived.setdefault(network.output(ref).node, []).append(ref)
 
     def recorded(node: Node, slot: BlockSlot) -> bool:
-        return node.order == 0 and slot.kind in (SlotKind.OUTPUT, SlotKind.RECORD)
+        # The outputs of a sampled block are recorded as it holds them.
+        computed = slot.kind is SlotKind.OUTPUT and not network.diagram.clocked(node.block)
+        return node.order == 0 and (computed or slot.kind is SlotKind.RECORD)
 
     signals: list[tuple[str, tuple[int, ...], Value]] = []
     for node in order:
