@@ -77,14 +77,14 @@ class NetRouter:
         extent = _around(_hull(points), level.window)
         self._examine(extent)
         surroundings = self._room.around(extent, self._number)
-        if not surroundings.is_legal((*goal, *end), level, port=end, out=(-target.dx, -target.dy)):
+        if not surroundings.is_legal_stub((*goal, *end), level, end, (-target.dx, -target.dy)):
             return ()
         found: list[Point]
         if self._tree:
             found = surroundings.branch(self._tree, self._ports(), self._dots, goal, target, level)
         else:
             port = (source.x, source.y)
-            if not surroundings.is_legal((*port, *start), level, port=port, out=(source.dx, source.dy)):
+            if not surroundings.is_legal_stub((*port, *start), level, port, (source.dx, source.dy)):
                 return ()
             found = surroundings.way(source, start, goal, target, level)
             if found:
@@ -110,7 +110,7 @@ class NetRouter:
                 ends.append((path[0], (source.dx, source.dy)))
             if k == len(path) - 2:
                 ends.append((path[-1], (-target.dx, -target.dy)))
-            if not surroundings.is_legal_between((*a, *b), level, ends):
+            if not surroundings.is_legal((*a, *b), level, ends):
                 return ()
         path = self._leaving(path)
         if len(path) < 2 or (self._tree and not surroundings.may_turn(path[0], level)):

@@ -40,6 +40,8 @@ _APPROACH = 46.0
 _APPROACH_PRICE = 4.0
 """px before a port that other nets use only where there is no better place, and the price per px there."""
 _MIDDLE_PRICE = 1 / 16
+_LITTLE = 64.0
+"""px of detour for which no better way is sought further around: a bend and a crossing."""
 _ON_EDGE = 1e-6
 
 
@@ -61,7 +63,7 @@ class Level:
 
     def most(self, least: float) -> float:
         """What a way may cost of which the best conceivable one costs ``least``."""
-        return least + 40.0 + self.detour * (least + 200.0)
+        return least + _LITTLE + self.detour * (least + 200.0)
 
 
 LEVELS = (
@@ -196,24 +198,31 @@ class Surroundings:
         self._ends = ends
         self._corners = np.vstack([pieces[:, [0, 1, 0, 1]], pieces[:, [2, 3, 2, 3]]])
 
-    def is_legal(self, line: Sequence[float], level: Level, *, port: Point, out: tuple[int, int]) -> bool:
-        """Whether a stub may lie at a port, which has its block behind it."""
-        return self.is_legal_between(line, level, [(port, out)])
+    def is_legal_stub(self, line: Sequence[float], level: Level, port: Point, out: tuple[int, int]) -> bool:
+        """Whether a stub may lie at a port, which has its block behind it. A line may cross its other end."""
+        return self._is_clear(line, level, [(port, out)]) and self.may_turn(port, level)
 
-    def is_legal_between(
+    def is_legal(
         self, line: Sequence[float], level: Level, ports: Sequence[tuple[Point, tuple[int, int]]]
     ) -> bool:
         """Whether a straight piece may lie, of which some ends are ports with their blocks behind them."""
+        ends = (line[0], line[1]), (line[2], line[3])
+        return self._is_clear(line, level, ports) and all(self.may_turn(end, level) for end in ends)
+
+    def _is_clear(
+        self, line: Sequence[float], level: Level, ports: Sequence[tuple[Point, tuple[int, int]]]
+    ) -> bool:
+        """Whether a straight piece only crosses other lines, and no corner of theirs is near it."""
         piece = _sorted_line(line)
         blocks = self._blocks
         for port, out in ports:
             blocks = blocks[~_owns(blocks, port, out)]
         along = self._level if line[1] == line[3] else self._upright
-        if _meets(_wider(blocks, level.clearance), piece) or _meets(_wider(along, level.gap), piece):
-            return False
-        if _meets(_wider(self._corners, level.gap), piece):
-            return False
-        return self.may_turn((line[0], line[1]), level) and self.may_turn((line[2], line[3]), level)
+        return not (
+            _meets(_wider(blocks, level.clearance), piece)
+            or _meets(_wider(along, level.gap), piece)
+            or _meets(_wider(self._corners, level.gap), piece)
+        )
 
     def is_free(
         self, line: Sequence[float], level: Level, ports: Sequence[tuple[Point, tuple[int, int]]]
@@ -222,7 +231,7 @@ class Surroundings:
         piece = _sorted_line(line)
         if _meets(_wider(self._names, 3.0), piece) or _meets(_wider(self._pieces, _NEAR), piece):
             return False
-        return self.is_legal_between(line, level, ports)
+        return self.is_legal(line, level, ports)
 
     def may_turn(self, point: Point, level: Level) -> bool:
         """Whether a corner or a dot may be at a point."""
@@ -253,26 +262,25 @@ class Surroundings:
         No way begins at one of the ``dots``, or near one of the ``closed`` points.
         """
         grid = self._grid([(goal, (target.x, target.y))], tree, level, None)
-        begins = np.full(grid.turn.shape, np.inf)
-        for (ax, ay), (bx, by) in tree:
-            rows = (grid.ys >= min(ay, by)) & (grid.ys <= max(ay, by))
-            columns = (grid.xs >= min(ax, bx)) & (grid.xs <= max(ax, bx))
-            begins[np.ix_(rows, columns)] = _BRANCH
-        begins[~grid.turn] = np.inf
-        for x, y in closed:
-            begins[self._distances(grid, x, y) < level.stub] = np.inf
-        for x, y in {point for piece in tree for point in piece}:
-            away = self._distances(grid, x, y)
-            begins[(away < level.gap) & (away > 0.0)] = np.inf
-        for dot in dots:
-            begins[grid.node(dot)] = np.inf
-        away = self._distances(grid, *goal)[np.isfinite(begins)]
-        most = level.most(_BRANCH + float(np.min(away, initial=np.inf)))
-        return grid.cheapest(begins, begins, grid.node(goal), most, flat=target.dx != 0)
+        on_tree = np.zeros(grid.turn.shape, dtype=np.bool_)
+        for a, b in tree:
+            (top, left), (bottom, right) = sorted((grid.node(a), grid.node(b)))
+            on_tree[top : bottom + 1, left : right + 1] = True
+        rows, columns = np.nonzero(on_tree & grid.turn)
 
-    @staticmethod
-    def _distances(grid: Grid, x: float, y: float) -> Floats:
-        return np.abs(grid.ys - y)[:, None] + np.abs(grid.xs - x)[None, :]
+        def distances(points: Sequence[Point]) -> Floats:
+            xs, ys = np.array(points).reshape(-1, 2).T
+            return np.abs(grid.xs[columns][:, None] - xs) + np.abs(grid.ys[rows][:, None] - ys)
+
+        away = distances([point for piece in tree for point in piece])
+        free = np.all(distances(closed) >= level.stub, axis=1) & np.all(distances(dots) > 0.0, axis=1)
+        free &= np.all((away == 0.0) | (away >= level.gap), axis=1)
+        if not np.any(free):
+            return []
+        begins = np.full(grid.turn.shape, np.inf)
+        begins[rows[free], columns[free]] = _BRANCH
+        most = level.most(_BRANCH + float(np.min(distances([goal])[free])))
+        return grid.cheapest(begins, begins, grid.node(goal), most, flat=target.dx != 0)
 
     # -- the grid --------------------------------------------------------------------------------------------
 
