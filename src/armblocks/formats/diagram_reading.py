@@ -1,0 +1,173 @@
+"""Builds diagrams from the objects of a document; see :mod:`armblocks.formats.diagram_json`."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import cast
+
+from armblocks.diagram import (
+    Block,
+    BlockLibrary,
+    Diagram,
+    DiagramBuilder,
+    Parameter,
+    PortRef,
+    check_block_count,
+    formula,
+)
+from armblocks.equations import SimulationOptions
+from armblocks.errors import UnknownNameError
+from armblocks.formats.json_document import Node
+from armblocks.formats.layout_json import Layout, connection_from
+from armblocks.formats.located_errors import located
+from armblocks.formats.mask_json import mask_parameter_from
+from armblocks.formats.parameter_json import is_diagram, parameter_from
+from armblocks.formats.robot_references import RobotReader
+from armblocks.formats.subsystem_libraries import Libraries
+from armblocks.formats.unknown_members import Extras, split_extras
+
+INNER_KEYS = ("name", "description", "mask", "blocks", "connections", "logged", "layout", "settings")
+"""The keys of a diagram inside another one."""
+_SETTINGS = {field.name: field.default for field in dataclasses.fields(SimulationOptions)}
+
+
+class DiagramReader:
+    """Builds the diagrams of one document."""
+
+    def __init__(
+        self, library: BlockLibrary, robots: RobotReader, libraries: Libraries, *, draft: bool
+    ) -> None:
+        self.library = library
+        self.robots = robots
+        self.libraries = libraries
+        self.draft = draft
+
+    def diagram(self, node: Node, known: tuple[str, ...], name: str) -> Diagram:
+        """The diagram of an object, checked unless it is a draft; ``name`` is used if the object has none."""
+        extras: Extras = {}
+        members = split_extras(node, known, extras, "")
+        settings = _settings(members["settings"], extras) if "settings" in members else SimulationOptions()
+        block_nodes = members["blocks"].members() if "blocks" in members else {}
+        with located(node):
+            check_block_count(len(block_nodes), "")  # checked first, because reading many blocks takes long
+        blocks = {key: self._block(key, entry, extras) for key, entry in block_nodes.items()}
+        layout = Layout()
+        for key, entry in (members["layout"].members() if "layout" in members else {}).items():
+            layout.read(key, entry, set(blocks), extras)
+        builder = DiagramBuilder(
+            members["name"].text() if "name" in members else name,
+            settings=settings,
+            extras=extras,
+            description=members["description"].text() if "description" in members else "",
+        )
+        given = members["parameters"].members() if "parameters" in members else {}
+        self._declare(builder, members["mask"].elements() if "mask" in members else [], given)
+        for key, block in blocks.items():
+            with located(block_nodes[key]):
+                builder.add(key, block)
+        for entry in members["connections"].elements() if "connections" in members else []:
+            source, target = connection_from(entry)
+            with located(entry):
+                builder.connect(source, target)
+        for entry in members["logged"].elements() if "logged" in members else []:
+            with located(entry):
+                builder.log(_port(entry))
+        for key, place in layout.places.items():
+            builder.place(key, **dataclasses.asdict(place))
+        for wire, bends in layout.bends.items():
+            builder.bend(wire, bends)
+        for key, note in layout.notes.items():
+            builder.note(key, note)
+        with located(node):
+            return builder.draft() if self.draft else builder.build()
+
+    def _block(self, key: str, node: Node, extras: Extras) -> Block:
+        if "type" not in node.members():
+            raise node.error("the key 'type' is missing", allowed="a block type", fix='add "type": "Gain"')
+        with located(node.members()["type"]):
+            kind = self.library[node.members()["type"].text()]
+        rules = {rule.name: rule for rule in kind.parameters()}
+        inside = [name for name, rule in rules.items() if is_diagram(rule)]
+        linked = ("library",) if inside else ()
+        members = split_extras(
+            node, ("type", "parameters", "formulas", *inside, *linked), extras, "blocks", key
+        )
+        values: dict[str, object] = {
+            name: self.diagram(members[name], INNER_KEYS, key) for name in inside if name in members
+        }
+        if linked and "library" in members:
+            if values:
+                raise members["library"].error(
+                    "the block has a diagram and a library", allowed="one of the two", fix="remove one"
+                )
+            values[inside[0]] = self.libraries.linked(members["library"])
+        mask = {rule.name: rule for value in values.values() for rule in cast("Diagram", value).mask}
+        known = {**mask, **{name: rule for name, rule in rules.items() if name not in inside}}
+        masked: dict[str, object] = {}
+        for name, given in self._given(members, known, kind).items():
+            (masked if name in mask else values)[name] = given
+        missing = [name for name, rule in rules.items() if rule.required and name not in values]
+        if missing:
+            raise node.error(
+                f"a {kind.type_name()} needs the parameter '{missing[0]}'",
+                allowed=rules[missing[0]].describe(),
+                fix=f"add '{missing[0]}': {rules[missing[0]].doc}",
+            )
+        with located(node):
+            return kind(**values).with_parameters(**masked)  # pyright: ignore[reportArgumentType]
+
+    def _given(
+        self, members: Mapping[str, Node], rules: Mapping[str, Parameter], kind: type[Block]
+    ) -> dict[str, object]:
+        """The values and formulas of a block's parameters."""
+        found: dict[str, object] = {}
+        for key in ("parameters", "formulas"):
+            for name, member in (members[key].members() if key in members else {}).items():
+                if name not in rules:
+                    what = f"parameter of {kind.type_name()}"
+                    raise UnknownNameError(what, name, rules, where=member.where)
+                if name in found:
+                    raise member.error(f"'{name}' has a value and a formula", allowed="one of the two")
+                if key == "parameters":
+                    found[name] = parameter_from(rules[name], member, self.robots)
+                else:
+                    with located(member):
+                        found[name] = formula(member.text())
+        return found
+
+    def _default(self, rule: Parameter, node: Node) -> object:
+        return parameter_from(rule, node, self.robots)
+
+    def _declare(self, builder: DiagramBuilder, mask: Sequence[Node], given: Mapping[str, Node]) -> None:
+        """The declared parameters of a diagram, and for the outermost diagram their values."""
+        rules: list[Parameter] = []
+        for node in mask:
+            with located(node):
+                rules.append(mask_parameter_from(node, self._default))
+        for name, member in given.items():
+            if name not in [rule.name for rule in rules]:
+                known = [rule.name for rule in rules]
+                raise UnknownNameError("mask parameter", name, known, where=member.where)
+        for rule, node in zip(rules, mask):
+            value = parameter_from(rule, given[rule.name], self.robots) if rule.name in given else None
+            with located(node):
+                builder.declare(rule, value)
+
+
+def _settings(node: Node, extras: Extras) -> SimulationOptions:
+    values: dict[str, object] = {}
+    for name, member in split_extras(node, tuple(_SETTINGS), extras, "settings").items():
+        default = _SETTINGS[name]
+        if isinstance(default, str):
+            values[name] = member.text()
+        else:
+            values[name] = None if member.value is None and default is None else member.number()
+    return dataclasses.replace(SimulationOptions(), **values)  # pyright: ignore[reportArgumentType]
+
+
+def _port(node: Node) -> PortRef:
+    block, _, port = node.text().rpartition("/")
+    if not block or not port:
+        raise node.error(f"'{node.text()[:80]}' is not an output", allowed='"block/output"')
+    return PortRef(block, port)

@@ -1,0 +1,91 @@
+"""The layout of a diagram as JSON: positions of blocks, routes of connections, and notes.
+
+The key of an entry is the name of the block, the text of the connection, or for notes a name that begins with
+``/``. Entries of other programs are preserved among the extras.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Mapping
+
+from armblocks.diagram import ROTATIONS, Connection, Diagram, Note, Placement, PortRef
+from armblocks.formats.json_document import Node
+from armblocks.formats.unknown_members import Extras, members_of, split_extras
+
+_PLACEMENT = {field.name: field.default for field in dataclasses.fields(Placement)}
+_CONNECTION = re.compile(r"([^/]+)/([^/]+?) -> ([^/]+)/([^/]+)")
+
+
+def connection_from(node: Node) -> tuple[PortRef, PortRef]:
+    """The two ends of a connection from its text."""
+    found = _CONNECTION.fullmatch(node.text())
+    if found is None:
+        raise node.error(f"'{node.text()[:80]}' is not a connection", allowed='"block/output -> block/input"')
+    return PortRef(found[1], found[2]), PortRef(found[3], found[4])
+
+
+class Layout:
+    """The layout of an object: positions of blocks, routes of wires, and notes."""
+
+    def __init__(self) -> None:
+        self.places: dict[str, Placement] = {}
+        self.bends: dict[Connection, list[float]] = {}
+        self.notes: dict[str, Note] = {}
+
+    def read(self, key: str, node: Node, blocks: set[str], extras: Extras) -> None:
+        """Add one entry. An entry that is not a block, wire or note belongs to another program and is
+        preserved."""
+        stated = _members_if_any(node)
+        if key in blocks:
+            self.places[key] = _placement(key, node, extras)
+        elif "bends" in stated and (found := _CONNECTION.fullmatch(key)):
+            members = split_extras(node, ("bends",), extras, "layout", key)
+            wire = Connection(PortRef(found[1], found[2]), PortRef(found[3], found[4]))
+            self.bends[wire] = [entry.number() for entry in members["bends"].elements()]
+        elif key.startswith("/") and {"x", "y", "text"} <= stated.keys():
+            members = split_extras(node, ("x", "y", "text"), extras, "layout", key)
+            x, y = members["x"].number(), members["y"].number()
+            self.notes[key] = Note(x=x, y=y, text=members["text"].text())
+        else:
+            extras.setdefault("layout", {})[key] = node.value
+
+
+def layout_to(diagram: Diagram, extras: Mapping[str, object]) -> dict[str, object]:
+    """The layout of a diagram as plain values; ``extras`` are the unknown members of its entries."""
+    layout = dict(extras)
+    for key, place in diagram.layout.items():
+        stated = {
+            name: value for name, default in _PLACEMENT.items() if (value := getattr(place, name)) != default
+        }
+        layout[key] = {**members_of(extras.get(key)), **stated}
+    for wire, bends in diagram.bends.items():
+        layout[str(wire)] = {**members_of(extras.get(str(wire))), "bends": list(bends)}
+    for key, note in diagram.notes.items():
+        layout[key] = {**members_of(extras.get(key)), **dataclasses.asdict(note)}
+    return layout
+
+
+def _placement(key: str, node: Node, extras: Extras) -> Placement:
+    members = split_extras(node, tuple(_PLACEMENT), extras, "layout", key)
+    if not {"x", "y"} <= members.keys():
+        raise node.error(f"block '{key}' is placed without x or y", allowed="x and y in pixels")
+    rotation = members["rotation"].number() if "rotation" in members else 0
+    if rotation not in ROTATIONS:
+        allowed = ", ".join(map(str, ROTATIONS))
+        raise members["rotation"].error(f"block '{key}' is turned by {rotation:g} degrees", allowed=allowed)
+    extents = {name: members[name].number() for name in ("width", "height") if name in members}
+    return Placement(
+        x=members["x"].number(),
+        y=members["y"].number(),
+        width=extents.get("width"),
+        height=extents.get("height"),
+        flipped="flipped" in members and members["flipped"].boolean(),
+        rotation=int(rotation),
+    )
+
+
+def _members_if_any(node: Node) -> Mapping[str, Node]:
+    value: object = node.value
+    return node.members() if isinstance(value, dict) else {}

@@ -1,0 +1,61 @@
+"""Values of parameters as JSON: numbers, arrays and texts; references to robots, functions and tables.
+
+Infinite numbers are the texts ``"inf"`` and ``"-inf"``.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import cast
+
+from armblocks.diagram import Parameter, ParameterKind, TimeTable, UserFunction
+from armblocks.formats.json_document import Node
+from armblocks.formats.located_errors import located
+from armblocks.formats.robot_references import RobotReader, RobotWriter
+from armblocks.robot import Robot
+
+_INFINITIES = {"inf": math.inf, "-inf": -math.inf}
+_NUMERIC = (ParameterKind.NUMBER, ParameterKind.ARRAY)
+
+
+def parameter_from(rule: Parameter, node: Node, robots: RobotReader) -> object:
+    """The checked value of one parameter; errors have its line."""
+    if rule.kind is ParameterKind.ROBOT:
+        return robots.robot(node)
+    if rule.kind is ParameterKind.FUNCTION:
+        return robots.function(node) if node.value else rule.default
+    if rule.kind is ParameterKind.TABLE and isinstance(node.value, str):
+        return robots.table(node)
+    value = _with_infinities(node.value) if rule.kind in _NUMERIC else node.value
+    with located(node):
+        return rule.check(value, "")
+
+
+def parameter_to(rule: Parameter, value: object, robots: RobotWriter) -> object:
+    """The value of one parameter as a plain value. Raises ``FormatError`` if a file cannot represent it."""
+    if isinstance(value, Robot):
+        return robots.reference(value)
+    if isinstance(value, UserFunction):
+        return "" if value == rule.check(rule.default, "") else robots.function_reference(value)
+    if isinstance(value, TimeTable):
+        return robots.table_reference(value)
+    return _with_texts_for_infinities(value) if rule.kind in _NUMERIC else value
+
+
+def is_diagram(rule: Parameter) -> bool:
+    """Whether the value of a parameter is the inner diagram of a subsystem."""
+    return rule.kind is ParameterKind.DIAGRAM
+
+
+def _with_infinities(value: object) -> object:
+    if isinstance(value, list):
+        return [_with_infinities(entry) for entry in cast("list[object]", value)]
+    return _INFINITIES.get(value, value) if isinstance(value, str) else value
+
+
+def _with_texts_for_infinities(value: object) -> object:
+    if isinstance(value, tuple):
+        return [_with_texts_for_infinities(entry) for entry in cast("tuple[object, ...]", value)]
+    if isinstance(value, float) and math.isinf(value):
+        return "inf" if value > 0 else "-inf"
+    return value

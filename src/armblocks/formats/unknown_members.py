@@ -1,0 +1,29 @@
+"""Members of a document that this version does not know: of another program, or of a newer armblocks.
+
+They are stored in ``Diagram.extras`` and written again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import cast
+
+from armblocks.formats.json_document import Node, split_members
+
+Extras = dict[str, dict[str, object]]
+"""Unknown members by location: ``""``, ``"blocks"``, ``"layout"``, ``"settings"``."""
+
+
+def split_extras(
+    node: Node, known: tuple[str, ...], extras: Extras, place: str, key: str = ""
+) -> dict[str, Node]:
+    """The known members; the others are stored in ``extras[place]``, under ``key`` if it is given."""
+    members, unknown = split_members(node, known)
+    if unknown:
+        extras.setdefault(place, {}).update({key: unknown} if key else unknown)
+    return members
+
+
+def members_of(extra: object) -> Mapping[str, object]:
+    """The unknown members of an entry; none where the entry has no extras."""
+    return cast("Mapping[str, object]", extra or {})
