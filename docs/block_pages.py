@@ -213,6 +213,8 @@ def default_text(rule: Parameter) -> str:
 def behaviour(diagram: Diagram) -> list[str]:
     """The states and events of the block, with the shapes of the example."""
     block = diagram.blocks[diagram.name]
+    if block.virtual:
+        return []  # without equations; the flat diagram does not contain it
     shapes = infer_shapes(diagram).inputs[diagram.name]
     kept: list[tuple[str, State]] = [
         *(("continuous state", state) for state in block.states(shapes)),
