@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 from armblocks.robot import Robot
 from robots_for_tests import LAW_ROBOTS, build_kr180, build_puma560
@@ -25,8 +25,14 @@ FULL_EFFORT = (
 ALLOCATIONS_BEFORE_COLLECTION = 10_000
 """With Python's default of 700, garbage collection takes a tenth of the test time."""
 
-# The same examples in every run, without a deadline that a busy machine could exceed.
-settings.register_profile("seeded", derandomize=True, deadline=None, database=None)
+# The same examples in every run, without limits of time that a busy machine could exceed.
+settings.register_profile(
+    "seeded",
+    derandomize=True,
+    deadline=None,
+    database=None,
+    suppress_health_check=[HealthCheck.too_slow],
+)
 settings.load_profile("seeded")
 
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
+import re
 from collections.abc import Iterator
+from pathlib import Path
 from types import ModuleType
 from typing import TypeVar
 
@@ -17,6 +19,23 @@ def modules_in(package: str) -> Iterator[ModuleType]:
     for file in pkgutil.iter_modules(folder.__path__, f"{package}."):
         if not file.ispkg:
             yield importlib.import_module(file.name)
+
+
+def classes_with(package: str, attribute: str) -> Iterator[tuple[str, str]]:
+    """The name and the module of each class in a package that assigns a class attribute.
+
+    The source text is searched instead of imported: importing all blocks takes a fifth of a second, and a
+    program needs few of them. The attribute is indented by four spaces, as everywhere in this project.
+    """
+    folder = importlib.import_module(package)
+    line = re.compile(rb"^class (\w+)|^    %b(?::[^=\n]*)? = " % attribute.encode(), re.MULTILINE)
+    for path in sorted(file for place in folder.__path__ for file in Path(place).glob("*.py")):
+        name = b""
+        for found in line.finditer(path.read_bytes()):
+            if found[1]:
+                name = found[1]
+            elif name:
+                yield name.decode(), f"{package}.{path.stem}"
 
 
 def values_in(package: str, kind: type[Kind] | tuple[type[Kind], ...]) -> list[Kind]:

@@ -73,7 +73,7 @@ def test_nan_is_parsed_and_left_to_the_check_of_the_parameter() -> None:
 @pytest.mark.parametrize("text", ["__import__('os')", "٣", "2pi", "", "{}", "a b", "2*k", "u.v*2"])
 def test_text_outside_the_grammar_is_refused(text: str) -> None:
     with pytest.raises(
-        InputError, match=r"--set: .*'.*Allowed: a number, a vector.*correct it, or put quotes around a text"
+        InputError, match=r"--set: .*Allowed: a number, a vector.*correct it, or put quotes around a text"
     ):
         parse_value(text)
 
@@ -84,7 +84,7 @@ def test_the_message_names_the_entry_of_a_vector_that_is_not_a_number() -> None:
 
 
 def test_a_vector_with_a_missing_number_is_refused() -> None:
-    with pytest.raises(InputError, match="a number is missing before a comma"):
+    with pytest.raises(InputError, match=r"',' is not understood here, .* in column 4: \[1,»,3\]"):
         parse_value("1,,3")
 
 

@@ -15,7 +15,7 @@ import pytest
 from casadi import SX, Function, vertcat, vertsplit
 
 from armblocks import blocks
-from armblocks.blocks import BLOCKS, Constant, Derivative
+from armblocks.blocks import BLOCKS, FAMILIES, Constant, Derivative
 from armblocks.diagram import (
     Block,
     DiagramBuilder,
@@ -32,6 +32,7 @@ from armblocks.diagram.implicit import steps_with
 from armblocks.equations import Slot
 from armblocks.errors import InputError
 from armblocks.face.model import compile_diagram
+from armblocks.package_folder import classes_in
 from armblocks.robot import Robot, serial_chain, standard_dh
 from armblocks.spatial import Transform
 from worked_examples import worked_example
@@ -138,6 +139,13 @@ def test_every_block_is_exported_by_its_name() -> None:
 def test_the_type_stub_lists_all_block_names() -> None:
     script = runpy.run_path(str(Path(__file__).parents[2] / "scripts" / "block_names.py"))
     assert script["STUB"].read_text(encoding="utf-8") == script["stub"](), "run scripts/block_names.py"
+
+
+def test_the_library_finds_every_class_with_a_title_without_importing_it() -> None:
+    for family in FAMILIES:
+        package = f"armblocks.blocks.{family}"
+        titled = {kind for kind in classes_in(package, Block) if "title" in vars(kind)}
+        assert titled == {kind for kind in BLOCKS.families[family] if kind.__module__.startswith(package)}
 
 
 def test_the_folder_of_every_block_is_its_family() -> None:

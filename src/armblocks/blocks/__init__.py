@@ -7,7 +7,7 @@ checkers and editors read the names from ``__init__.pyi``, which ``scripts/block
 
 from collections.abc import Iterator
 
-from armblocks.diagram import Block, BlockLibrary
+from armblocks.diagram import Block, BlockLibrary, UnimportedBlock
 from armblocks.diagram.conditional import (
     ActionSubsystem,
     EnabledSubsystem,
@@ -18,7 +18,7 @@ from armblocks.diagram.conditional import (
 )
 from armblocks.diagram.structure import Inport, Outport, Subsystem
 from armblocks.diagram.virtual_wiring import BusAssignment, BusCreator, BusSelector, From, Goto
-from armblocks.package_folder import classes_in
+from armblocks.package_folder import classes_with
 
 FAMILIES = (
     "sources",
@@ -54,10 +54,11 @@ _KNOWN_TO_THE_DIAGRAM: dict[str, tuple[type[Block], ...]] = {
 """The block types that the diagram layer defines, because its passes over a diagram process them."""
 
 
-def _kinds_of(family: str) -> Iterator[type[Block]]:
+def _kinds_of(family: str) -> Iterator[type[Block] | UnimportedBlock]:
     """The block types of one family. A base class that several types share has no title."""
     yield from _KNOWN_TO_THE_DIAGRAM.get(family, ())
-    yield from (kind for kind in classes_in(f"{__name__}.{family}", Block) if "title" in vars(kind))
+    for name, module in classes_with(f"{__name__}.{family}", "title"):
+        yield UnimportedBlock(name, module)
 
 
 BLOCKS = BlockLibrary(
@@ -65,5 +66,12 @@ BLOCKS = BlockLibrary(
 )
 """Every block type by type name."""
 
-globals().update(BLOCKS)
 globals()["__all__"] = ["BLOCKS", *BLOCKS]
+
+
+def __getattr__(name: str) -> type[Block]:
+    """A block type, imported at its first use (PEP 562)."""
+    if name not in BLOCKS:
+        raise AttributeError(f"module '{__name__}' has no attribute '{name}'", name=name)
+    globals()[name] = kind = BLOCKS[name]
+    return kind

@@ -24,7 +24,7 @@ from armblocks.diagram.hierarchy import (
     flatten_hierarchy,
 )
 from armblocks.diagram.levels import levels_of
-from armblocks.diagram.library import BlockLibrary
+from armblocks.diagram.library import BlockLibrary, UnimportedBlock
 from armblocks.diagram.mask import ParameterFormula, formula, mask_parameter
 from armblocks.diagram.model import sampling_of
 from armblocks.diagram.names import check_block_name
@@ -109,6 +109,7 @@ __all__ = [
     "Subsystem",
     "TimeTable",
     "TriggeredSubsystem",
+    "UnimportedBlock",
     "UserFunction",
     "View",
     "ViewKind",

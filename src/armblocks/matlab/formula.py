@@ -11,7 +11,7 @@ from armblocks.matlab.evaluation import Evaluator
 from armblocks.matlab.functions import TABLE
 from armblocks.matlab.operators import COMPARISONS
 from armblocks.matlab.parser import parse_formula
-from armblocks.matlab.source import formula_source
+from armblocks.matlab.source import Position, formula_source
 from armblocks.matlab.symbols import Symbol, Symbols
 from armblocks.matlab.syntax import Chain, Expression, Name, Parentheses, Postfix, levels, parts_of
 
@@ -37,6 +37,8 @@ class Formula:
                 fix="split it, or draw it as blocks",
             )
         self._source = formula_source(text, where)
+        if not text.strip():
+            raise self._source.place(Position(1, 0)).error("the formula is empty", fix="write an expression")
         self._tree = parse_formula(self._source)
 
     @property
