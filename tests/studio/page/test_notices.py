@@ -9,7 +9,7 @@ import pytest
 
 import armblocks as ab
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 WEB = Path(ab.__file__).parent / "studio" / "web"
 sys.path.insert(0, str(ROOT / "frontend"))
 

@@ -22,7 +22,7 @@ from armblocks.studio.protocol.messages.documents import MOST_DROPPED
 from armblocks.studio.robots.readings import readings, singularity
 from armblocks.studio.server.hub import Hub, Page
 
-PRINTED = Path(__file__).parents[1] / "formats" / "kr180_as_printed.m"
+PRINTED = Path(__file__).parents[2] / "formats" / "kr180_as_printed.m"
 
 
 class Talk:

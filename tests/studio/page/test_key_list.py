@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-SOURCE = Path(__file__).parents[2] / "frontend" / "src"
+SOURCE = Path(__file__).parents[3] / "frontend" / "src"
 COMMANDS = ("commands.ts", "command_palette.tsx")
 """Source files that contain the list itself: their key names are data."""
 WRITTEN = {"escape": "esc", "delete": "del", " ": "space"}

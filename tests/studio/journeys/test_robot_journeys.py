@@ -15,7 +15,7 @@ import armblocks as ab
 from armblocks.formats import load_robot, read_robots
 from conftest import Studio
 
-PRINTED = Path(__file__).parents[1] / "formats" / "kr180_as_printed.m"
+PRINTED = Path(__file__).parents[2] / "formats" / "kr180_as_printed.m"
 DROP = """([name, content]) => {
     const bytes = Uint8Array.from(atob(content), (letter) => letter.charCodeAt(0))
     const brought = new DataTransfer()

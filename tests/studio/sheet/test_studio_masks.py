@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from test_studio_hub import Told, talk
+from page_requests import Told, talk
 
 import armblocks as ab
 from armblocks.blocks import BLOCKS

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_studio_hub import Told, talk
+from page_requests import Told, talk
 
 import armblocks as ab
 from armblocks.blocks import BLOCKS, Constant, Gain, Scope

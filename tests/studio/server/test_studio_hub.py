@@ -9,17 +9,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from page_requests import Told, talk
 
 from armblocks.blocks import BLOCKS
 from armblocks.errors import ArmblocksError, FormatError, InputError
 from armblocks.formats import load_diagram
 from armblocks.studio.built_page import built_page
-from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.runs import worker as run_worker
-from armblocks.studio.server.hub import Hub, Page
+from armblocks.studio.server.hub import Hub
 from armblocks.studio.server.launch import serve
 
-Told = list[dict[str, Any]]
 PATIENCE_SECONDS = 180
 
 
@@ -28,41 +27,6 @@ async def until(true: Callable[[], bool]) -> None:
     async with asyncio.timeout(PATIENCE_SECONDS):
         while not true():
             await asyncio.sleep(0.005)
-
-
-def talk(
-    folder: Path, talking: Callable[[Hub, Callable[..., Awaitable[Any]], Told], Awaitable[None]]
-) -> Told:
-    """Let a page send requests to a hub; return the events that it received."""
-    told: Told = []
-
-    async def going() -> None:
-        hub = Hub(ProjectFolder(folder))
-
-        async def hear(text: str) -> None:
-            told.append(json.loads(text))
-
-        async def hear_bytes(data: bytes) -> None:
-            raise AssertionError("samples arrived without a run")
-
-        page = Page(hear, hear_bytes)
-        await hub.welcome(page)
-        number = 0
-
-        async def ask(kind: str, **values: Any) -> Any:
-            nonlocal number
-            number += 1
-            await hub.answer(page, json.dumps({"number": number, "request": {"kind": kind, **values}}))
-            reply = next(event for event in told if event["kind"] == "reply" and event["number"] == number)
-            if reply["fault"]:
-                raise InputError(reply["fault"]["what"], fix=reply["fault"]["fix"])
-            return reply["value"]
-
-        await talking(hub, ask, told)
-        hub.close()
-
-    asyncio.run(going())
-    return told
 
 
 GAIN = {"name": "gain", "type": "Gain", "place": {"x": 0, "y": 0}}

@@ -1,0 +1,50 @@
+"""A page that sends requests to a hub, without a network."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+from armblocks.errors import InputError
+from armblocks.studio.documents.project_folder import ProjectFolder
+from armblocks.studio.server.hub import Hub, Page
+
+Told = list[dict[str, Any]]
+
+
+def talk(
+    folder: Path, talking: Callable[[Hub, Callable[..., Awaitable[Any]], Told], Awaitable[None]]
+) -> Told:
+    """Let a page send requests to a hub; return the events that it received."""
+    told: Told = []
+
+    async def going() -> None:
+        hub = Hub(ProjectFolder(folder))
+
+        async def hear(text: str) -> None:
+            told.append(json.loads(text))
+
+        async def hear_bytes(data: bytes) -> None:
+            raise AssertionError("samples arrived without a run")
+
+        page = Page(hear, hear_bytes)
+        await hub.welcome(page)
+        number = 0
+
+        async def ask(kind: str, **values: Any) -> Any:
+            nonlocal number
+            number += 1
+            await hub.answer(page, json.dumps({"number": number, "request": {"kind": kind, **values}}))
+            reply = next(event for event in told if event["kind"] == "reply" and event["number"] == number)
+            if reply["fault"]:
+                raise InputError(reply["fault"]["what"], fix=reply["fault"]["fix"])
+            return reply["value"]
+
+        await talking(hub, ask, told)
+        hub.close()
+
+    asyncio.run(going())
+    return told
