@@ -88,7 +88,7 @@ def test_sampled_systems(zeros: list[complex], poles: list[complex]) -> None:
 
 
 def response(block: Block, points: np.ndarray) -> np.ndarray:
-    system = block._system  # type: ignore[attr-defined]
+    system = block.system  # type: ignore[attr-defined]
     return np.array(
         [
             system.C @ np.linalg.solve(s * np.eye(len(system.B)) - system.A, system.B) + system.D

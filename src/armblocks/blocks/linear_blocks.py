@@ -1,7 +1,8 @@
-"""Base classes of linear blocks in continuous and discrete time: matrices, coefficients, roots."""
+"""Base classes of linear blocks in continuous and discrete time: matrices, coefficients, roots, filters."""
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +15,7 @@ from armblocks.blocks.linear_systems import (
     ZeroPoleGain,
     check_proper,
     complex_roots,
+    low_pass,
     realised,
 )
 from armblocks.diagram import (
@@ -25,7 +27,11 @@ from armblocks.diagram import (
     parameter,
     shape_of,
 )
+from armblocks.diagram.signs import BANDS, FaceSign
 from armblocks.errors import InputError
+
+_FILTER_DESIGNS = ("butterworth", "chebyshev1", "chebyshev2")
+_FILTER_TYPES = ("low_pass", "high_pass", "band_pass", "band_stop")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,12 +140,6 @@ class RationalBlock(Block):
         return {"x": vertcat(u["u"] - dot(a[1:], x["x"]), x["x"])[: self.degree]}
 
 
-FILTER_DESIGNS = ("butterworth", "chebyshev1", "chebyshev2")
-
-
-FILTER_TYPES = ("low_pass", "high_pass", "band_pass", "band_stop")
-
-
 @dataclass(frozen=True, kw_only=True)
 class SectionsByRoots(Block):
     """A cascade of sections from zeros, poles and a gain; continuous or sampled."""
@@ -187,12 +187,58 @@ def section_change(system: LinearSystem, x: SX, u: SX) -> SX:
     return mtimes(SX(np.asarray(system.A)), x) + SX(np.asarray(system.B)) * u
 
 
-def check_band(block: Block, filter_type: str, edge: float, upper_edge: float) -> None:
-    """Raise ``InputError`` unless the lower edge of a band is below the upper edge."""
-    if filter_type.startswith("band") and upper_edge <= edge:
-        raise InputError(
-            f"edge is {edge} and upper_edge is {upper_edge}",
-            where=block.type_name(),
-            allowed="edge < upper_edge",
-            fix="exchange them",
-        )
+@dataclass(frozen=True, kw_only=True)
+class FilterByBand(Block):
+    """A scalar filter from a design, an order and edge frequencies; analog or digital, initially at rest.
+
+    Subclasses define ``system``, and ``edge`` and ``upper_edge`` in their own units.
+    """
+
+    design: str = parameter("butterworth", choices=_FILTER_DESIGNS, doc="the design of the filter")
+    filter_type: str = parameter("low_pass", choices=_FILTER_TYPES, doc="what passes")
+    order: int = parameter(2, minimum=1, maximum=20, doc="order of the low-pass prototype")
+    edge: float = parameter(1.0, above=0.0, tunable=False, doc="edge frequency; of a band, the lower one")
+    upper_edge: float = parameter(2.0, above=0.0, tunable=False, doc="upper edge frequency of a band")
+    ripple: float = parameter(1.0, above=0.0, tunable=False, doc="ripple in the pass band (chebyshev1), dB")
+    attenuation: float = parameter(
+        40.0, above=0.0, tunable=False, doc="attenuation in the stop band (chebyshev2), dB"
+    )
+
+    def face_sign(self) -> FaceSign:
+        return BANDS[self.filter_type]
+
+    def check(self) -> None:
+        if self.filter_type.startswith("band") and self.upper_edge <= self.edge:
+            raise InputError(
+                f"edge is {self.edge} and upper_edge is {self.upper_edge}",
+                where=self.type_name(),
+                allowed="edge < upper_edge",
+                fix="exchange them",
+            )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the input", shape=()),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the filtered input", shape=()),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": section_output(self.system, x["x"], u["u"])}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"x": SX(0.0)}
+
+    @property
+    @abstractmethod
+    def system(self) -> LinearSystem:
+        """The sections of the filter."""
+
+    @property
+    def prototype(self) -> ZeroPoleGain:
+        """The low-pass filter with its edge at 1 rad/s."""
+        return low_pass(self.design, self.order, self.ripple, self.attenuation)
+
+    @property
+    def section_states(self) -> State:
+        """The states of all sections."""
+        return State("x", (len(self.system.B),), "the states of the sections")

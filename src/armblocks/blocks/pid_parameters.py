@@ -34,14 +34,14 @@ def bandwidth_parameter() -> Any:
     return gain_parameter(100.0, "bandwidth of the derivative filter", "rad/s", above=0.0)
 
 
-def lower_limit_parameter() -> Any:
+def lower_limit_parameter(doc: str = "lower limit of the output") -> Any:
     """The lower limit of the output."""
-    return gain_parameter(-math.inf, "lower limit of the output", finite=False)
+    return gain_parameter(-math.inf, doc, finite=False)
 
 
-def upper_limit_parameter() -> Any:
+def upper_limit_parameter(doc: str = "upper limit of the output") -> Any:
     """The upper limit of the output."""
-    return gain_parameter(math.inf, "upper limit of the output", finite=False)
+    return gain_parameter(math.inf, doc, finite=False)
 
 
 def limit_output_parameter() -> Any:
@@ -77,6 +77,13 @@ def method_parameter(doc: str) -> Any:
 
 
 TWO_INPUTS = (Port("r", "the reference"), Port("u", "the measured output of the plant"))
+
+
+def further_inputs(external_reset: str, tracking: bool) -> tuple[Port, ...]:
+    """The inputs that these parameters enable."""
+    reset = (Port("reset", "the trigger", shape=()),) if external_reset != "none" else ()
+    tracked = (Port("tracking", "signal that the output should track"),) if tracking else ()
+    return (*reset, *tracked)
 
 
 def pid_example(kind: str, **parameters: Any) -> WorkedExample:

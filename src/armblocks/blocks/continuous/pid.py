@@ -24,6 +24,7 @@ from armblocks.blocks.pid_parameters import (
     check_limits,
     external_reset_parameter,
     form_parameter,
+    further_inputs,
     gain_parameter,
     limit_output_parameter,
     lower_limit_parameter,
@@ -69,9 +70,7 @@ class ContinuousPidBlock(Block):
 
     def further_ports(self) -> tuple[Port, ...]:
         """The inputs that the parameters enable."""
-        reset = (Port("reset", "the trigger", shape=()),) if self.external_reset != "none" else ()
-        tracking = (Port("tracking", "signal that the output should track"),) if self.tracking else ()
-        return (*reset, *tracking)
+        return further_inputs(self.external_reset, self.tracking)
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the control action"),)

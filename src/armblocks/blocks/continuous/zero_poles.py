@@ -8,22 +8,16 @@ from typing import ClassVar
 from casadi import SX
 
 from armblocks.blocks.linear_blocks import (
-    FILTER_DESIGNS,
-    FILTER_TYPES,
+    FilterByBand,
     SectionsByRoots,
-    check_band,
     section_change,
-    section_output,
 )
 from armblocks.blocks.linear_systems import (
     LinearSystem,
-    low_pass,
     realised,
     shifted,
 )
 from armblocks.diagram import (
-    Block,
-    Port,
     Shapes,
     Signals,
     State,
@@ -32,7 +26,7 @@ from armblocks.diagram import (
     parameter,
     shape_of,
 )
-from armblocks.diagram.signs import BANDS, FaceSign, ratio_of_roots
+from armblocks.diagram.signs import FaceSign, ratio_of_roots
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,7 +56,7 @@ class ZeroPole(SectionsByRoots):
 
 
 @dataclass(frozen=True, kw_only=True)
-class AnalogFilter(Block):
+class AnalogFilter(FilterByBand):
     """An analog filter; the Butterworth low pass has |y / u| = 1 / sqrt(1 + (w / edge)^(2 order)).
 
     ``chebyshev1`` falls faster and has ripple in the pass band. ``chebyshev2`` has ripple in the stop band,
@@ -77,45 +71,19 @@ class AnalogFilter(Block):
         inputs={"u": made("SignalGenerator", waveform="square", frequency=0.25)},
     )
 
-    design: str = parameter("butterworth", choices=FILTER_DESIGNS, doc="the design of the filter")
-    filter_type: str = parameter("low_pass", choices=FILTER_TYPES, doc="what passes")
-    order: int = parameter(2, minimum=1, maximum=20, doc="order of the low-pass prototype")
     edge: float = parameter(
         1.0, above=0.0, tunable=False, doc="edge frequency; of a band, the lower one", unit="rad/s"
     )
     upper_edge: float = parameter(
         2.0, above=0.0, tunable=False, doc="upper edge frequency of a band", unit="rad/s"
     )
-    ripple: float = parameter(1.0, above=0.0, tunable=False, doc="ripple in the pass band (chebyshev1), dB")
-    attenuation: float = parameter(
-        40.0, above=0.0, tunable=False, doc="attenuation in the stop band (chebyshev2), dB"
-    )
-
-    def face_sign(self) -> FaceSign:
-        return BANDS[self.filter_type]
-
-    def check(self) -> None:
-        check_band(self, self.filter_type, self.edge, self.upper_edge)
-
-    def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "the input", shape=()),)
-
-    def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the filtered input", shape=()),)
 
     def states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("x", (len(self._system.B),), "the states of the sections"),)
-
-    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": section_output(self._system, x["x"], u["u"])}
+        return (self.section_states,)
 
     def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"x": section_change(self._system, x["x"], u["u"])}
-
-    def initial_states(self, p: Signals) -> Signals:
-        return {"x": SX(0.0)}
+        return {"x": section_change(self.system, x["x"], u["u"])}
 
     @property
-    def _system(self) -> LinearSystem:
-        base = low_pass(self.design, self.order, self.ripple, self.attenuation)
-        return realised(shifted(base, self.filter_type, self.edge, self.upper_edge))
+    def system(self) -> LinearSystem:
+        return realised(shifted(self.prototype, self.filter_type, self.edge, self.upper_edge))

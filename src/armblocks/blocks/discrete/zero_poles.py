@@ -9,24 +9,18 @@ from casadi import SX
 from numpy.typing import ArrayLike
 
 from armblocks.blocks.linear_blocks import (
-    FILTER_DESIGNS,
-    FILTER_TYPES,
+    FilterByBand,
     SectionsByRoots,
-    check_band,
     section_change,
-    section_output,
 )
 from armblocks.blocks.linear_systems import (
     LinearSystem,
-    low_pass,
     realised,
     sampled,
     shifted,
     warped,
 )
 from armblocks.diagram import (
-    Block,
-    Port,
     Shapes,
     Signals,
     State,
@@ -36,7 +30,7 @@ from armblocks.diagram import (
     sample_time_parameter,
     shape_of,
 )
-from armblocks.diagram.signs import BANDS, FaceSign, ratio_of_roots
+from armblocks.diagram.signs import FaceSign, ratio_of_roots
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,7 +68,7 @@ class DiscreteZeroPole(SectionsByRoots):
 
 
 @dataclass(frozen=True, kw_only=True)
-class DigitalFilter(Block):
+class DigitalFilter(FilterByBand):
     """A digital filter: the analog filter under the bilinear transformation z = (1 + s) / (1 - s).
 
     Edge frequencies are fractions of half the sampling frequency, as in MATLAB and SciPy (``butter(order,
@@ -93,9 +87,6 @@ class DigitalFilter(Block):
         },
     )
 
-    design: str = parameter("butterworth", choices=FILTER_DESIGNS, doc="the design of the filter")
-    filter_type: str = parameter("low_pass", choices=FILTER_TYPES, doc="what passes")
-    order: int = parameter(2, minimum=1, maximum=20, doc="order of the low-pass prototype")
     edge: float = parameter(
         0.2,
         above=0.0,
@@ -106,37 +97,16 @@ class DigitalFilter(Block):
     upper_edge: float = parameter(
         0.4, above=0.0, maximum=0.9999, tunable=False, doc="upper edge frequency of a band"
     )
-    ripple: float = parameter(1.0, above=0.0, tunable=False, doc="ripple in the pass band (chebyshev1), dB")
-    attenuation: float = parameter(
-        40.0, above=0.0, tunable=False, doc="attenuation in the stop band (chebyshev2), dB"
-    )
     sample_time: ArrayLike = sample_time_parameter()
 
-    def face_sign(self) -> FaceSign:
-        return BANDS[self.filter_type]
-
-    def check(self) -> None:
-        check_band(self, self.filter_type, self.edge, self.upper_edge)
-
-    def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "the input", shape=()),)
-
-    def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the filtered input", shape=()),)
-
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("x", (len(self._system.B),), "the states of the sections"),)
-
-    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": section_output(self._system, x["x"], u["u"])}
+        return (self.section_states,)
 
     def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"x": section_change(self._system, x["x"], u["u"])}
-
-    def initial_states(self, p: Signals) -> Signals:
-        return {"x": SX(0.0)}
+        return {"x": section_change(self.system, x["x"], u["u"])}
 
     @property
-    def _system(self) -> LinearSystem:
-        base = low_pass(self.design, self.order, self.ripple, self.attenuation)
-        return realised(sampled(shifted(base, self.filter_type, warped(self.edge), warped(self.upper_edge))))
+    def system(self) -> LinearSystem:
+        return realised(
+            sampled(shifted(self.prototype, self.filter_type, warped(self.edge), warped(self.upper_edge)))
+        )

@@ -5,13 +5,13 @@ Source: Siciliano et al., Robotics, 2009, 8.3; Åström, Hägglund, Advanced PID
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import ClassVar
 
 from casadi import SX, fmax, fmin, if_else, logic_and
 from numpy.typing import ArrayLike
 
+from armblocks.blocks.pid_parameters import lower_limit_parameter, upper_limit_parameter
 from armblocks.blocks.switching import limits_in_order, zone, zone_after
 from armblocks.diagram import (
     Block,
@@ -45,7 +45,36 @@ _LOOP = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class JointPID(Block):
+class JointPidBlock(Block):
+    """Base class of the PID controllers of joints; subclasses have ``lower``, ``upper`` and ``initial``."""
+
+    Kp: ArrayLike = parameter(100.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="position gains")
+    Ki: ArrayLike = parameter(50.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="integral gains")
+    Kd: ArrayLike = parameter(20.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="speed gains")
+
+    def check(self) -> None:
+        limits_in_order(self, "lower", "upper")
+        self._shape({})
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return _PORTS
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("tau", "torque or force at the joints"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"tau": self._shape(inputs)}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"integral": p["initial"]}
+
+    def _shape(self, inputs: Shapes) -> Shape:
+        names = [rule.name for rule in self.parameters() if rule.name != "sample_time"]
+        return broadcast({**inputs, **{name: shape_of(self.parameter_value(name)) for name in names}})
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointPID(JointPidBlock):
     """PID of joints: tau = limit(Kp (qr - q) + Kd (qdr - qd) + i), i' = Ki (qr - q) + Kb (tau - unlimited).
 
     Each joint has its own controller. The last term, back-calculation, prevents windup of the integral at the
@@ -61,32 +90,12 @@ class JointPID(Block):
         shown=("q", "tau"),
     )
 
-    Kp: ArrayLike = parameter(100.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="position gains")
-    Ki: ArrayLike = parameter(50.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="integral gains")
-    Kd: ArrayLike = parameter(20.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="speed gains")
     Kb: ArrayLike = parameter(
         1.0, kind=ParameterKind.ARRAY, minimum=0.0, doc="back-calculation gain", unit="1/s"
     )
-    lower: ArrayLike = parameter(
-        -math.inf, kind=ParameterKind.ARRAY, finite=False, doc="lower limit of the torque"
-    )
-    upper: ArrayLike = parameter(
-        math.inf, kind=ParameterKind.ARRAY, finite=False, doc="upper limit of the torque"
-    )
+    lower: ArrayLike = lower_limit_parameter("lower limit of the torque")
+    upper: ArrayLike = upper_limit_parameter("upper limit of the torque")
     initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the integral action at t = 0")
-
-    def check(self) -> None:
-        limits_in_order(self, "lower", "upper")
-        self._shape({})
-
-    def input_ports(self) -> tuple[Port, ...]:
-        return _PORTS
-
-    def output_ports(self) -> tuple[Port, ...]:
-        return (Port("tau", "torque or force at the joints"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"tau": self._shape(inputs)}
 
     def states(self, inputs: Shapes) -> tuple[State, ...]:
         return (State("integral", self._shape(inputs), "the integral action"),)
@@ -108,9 +117,6 @@ class JointPID(Block):
         excess = _free(x, u, p) - self._limited(x, u, p)
         return {"integral": p["Ki"] * (u["qr"] - u["q"]) - p["Kb"] * excess}
 
-    def initial_states(self, p: Signals) -> Signals:
-        return {"integral": p["initial"]}
-
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         free = _free(x, u, p)
         return {"upper": free - p["upper"], "lower": free - p["lower"]}
@@ -125,12 +131,9 @@ class JointPID(Block):
         below = if_else(x["mode"] < 0.0, p["lower"], _free(x, u, p))
         return if_else(x["mode"] > 0.0, p["upper"], below)
 
-    def _shape(self, inputs: Shapes) -> Shape:
-        return _common_shape(self, inputs)
-
 
 @dataclass(frozen=True, kw_only=True)
-class SampledJointPID(Block):
+class SampledJointPID(JointPidBlock):
     """PID of joints at ticks: tau(k) = limit(Kp e + Kd (qdr - qd) + i(k)), i(k+1) = i(k) + T Ki e.
 
     e = qr - q. Each joint has its own controller. Clamping: the integral stops while the torque is at a limit
@@ -153,30 +156,10 @@ class SampledJointPID(Block):
         shown=("q", "tau"),
     )
 
-    Kp: ArrayLike = parameter(100.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="position gains")
-    Ki: ArrayLike = parameter(50.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="integral gains")
-    Kd: ArrayLike = parameter(20.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="speed gains")
-    lower: ArrayLike = parameter(
-        -math.inf, kind=ParameterKind.ARRAY, finite=False, doc="lower limit of the torque"
-    )
-    upper: ArrayLike = parameter(
-        math.inf, kind=ParameterKind.ARRAY, finite=False, doc="upper limit of the torque"
-    )
+    lower: ArrayLike = lower_limit_parameter("lower limit of the torque")
+    upper: ArrayLike = upper_limit_parameter("upper limit of the torque")
     initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="initial integral action")
     sample_time: ArrayLike = sample_time_parameter(1e-3)
-
-    def check(self) -> None:
-        limits_in_order(self, "lower", "upper")
-        self._shape({})
-
-    def input_ports(self) -> tuple[Port, ...]:
-        return _PORTS
-
-    def output_ports(self) -> tuple[Port, ...]:
-        return (Port("tau", "torque or force at the joints"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"tau": self._shape(inputs)}
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         return (State("integral", self._shape(inputs), "the integral action"),)
@@ -191,18 +174,7 @@ class SampledJointPID(Block):
         outwards = logic_and(excess != 0.0, excess * rate > 0.0)
         return {"integral": x["integral"] + p["T"] * if_else(outwards, 0.0, rate)}
 
-    def initial_states(self, p: Signals) -> Signals:
-        return {"integral": p["initial"]}
-
-    def _shape(self, inputs: Shapes) -> Shape:
-        return _common_shape(self, inputs)
-
 
 def _free(x: Signals, u: Signals, p: Signals) -> SX:
     """The torque without limits."""
     return p["Kp"] * (u["qr"] - u["q"]) + p["Kd"] * (u["qdr"] - u["qd"]) + x["integral"]
-
-
-def _common_shape(block: Block, inputs: Shapes) -> Shape:
-    names = [rule.name for rule in block.parameters() if rule.name != "sample_time"]
-    return broadcast({**inputs, **{name: shape_of(block.parameter_value(name)) for name in names}})
