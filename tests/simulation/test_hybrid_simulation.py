@@ -18,7 +18,7 @@ from hybrid_systems import (
 
 from armblocks.equations import HybridSystem, SimulationOptions
 from armblocks.errors import SimulationError
-from armblocks.integration.native_integrator import RunPoint
+from armblocks.integration.run_point import RunPoint
 from armblocks.integration.system import compile_system, recall_system
 from armblocks.simulation import SimulationResult, find_tableau, simulate
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +19,7 @@ from armblocks.integration.linear_equations import LinearSpace
 from armblocks.integration.loop import POINTERS, loop_text
 from armblocks.integration.rosenbrock_method import STABLE_CHECKS
 from armblocks.integration.rosenbrock_tableau import Tableau
+from armblocks.integration.run_point import Checkpoint, RunPoint
 from armblocks.integration.workspace import Count, LoopSizes, Scalar, Stage, Status, Workspace
 
 if TYPE_CHECKING:
@@ -34,24 +34,6 @@ SAME_INSTANT = 1.0 + 2.0**-50
 
 FIRST_ROOM = 2 * ROWS_OF_A_STEP
 """Initial capacity of the delay history, rows."""
-NO_NUMBERS: Vector = np.empty(0)
-
-
-@dataclass(frozen=True, kw_only=True)
-class RunPoint:
-    """The state of a run: time (s), states, discrete variables, unknowns of the implicit equations, and the
-    history of delayed signals (rows of :mod:`armblocks.integration.delay_history`; none at the start of a
-    run).
-
-    ``begun``: the ticks at this time are already processed.
-    """
-
-    time: float
-    x: Vector
-    begun: bool = False
-    z: Vector = field(default_factory=lambda: NO_NUMBERS)
-    w: Vector = field(default_factory=lambda: NO_NUMBERS)
-    past: Vector = field(default_factory=lambda: NO_NUMBERS)
 
 
 class NativeIntegrator:
@@ -184,15 +166,6 @@ def needed_tapes(sizes: LoopSizes) -> tuple[str, ...]:
     names += ["guards", "reset"] if sizes.directions else []
     names += ["delay_bounds", "delay_times", "delay_inputs"] if sizes.delays else []
     return tuple(names)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Checkpoint:
-    """The arrays of a run before the step that its end shortened, and the name of the method."""
-
-    reals: Vector
-    counts: Integers
-    method: str
 
 
 class Integration:

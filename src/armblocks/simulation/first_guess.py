@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.integration.native_integrator import RunPoint
+from armblocks.integration.run_point import RunPoint
 from armblocks.integration.system import CompiledSystem
 
 Array = NDArray[np.float64]

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from armblocks.equations import SimulationOptions
 from armblocks.errors import SimulationError
-from armblocks.integration.native_integrator import Checkpoint, Integration, NativeIntegrator, RunPoint
+from armblocks.integration.native_integrator import Integration, NativeIntegrator
 from armblocks.integration.rosenbrock_tableau import Tableau
+from armblocks.integration.run_point import Checkpoint, RunPoint
 from armblocks.integration.system import CompiledSystem
 from armblocks.simulation.first_guess import first_guess
 from armblocks.simulation.plan import DEFAULT_INSTANTS, Plan

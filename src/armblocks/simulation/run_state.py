@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from armblocks.equations import Signature
 from armblocks.errors import FormatError, InputError
 from armblocks.files import read_bounded, write_atomically
-from armblocks.integration.native_integrator import Checkpoint
+from armblocks.integration.run_point import Checkpoint
 from armblocks.integration.system import CompiledSystem
 
 Array = NDArray[np.float64]

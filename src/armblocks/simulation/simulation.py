@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armblocks.equations import Signature, SimulationOptions
 from armblocks.errors import InputError, SimulationError
-from armblocks.integration.native_integrator import RunPoint
+from armblocks.integration.run_point import RunPoint
 from armblocks.integration.system import CompiledSystem
 from armblocks.integration.workspace import Status
 from armblocks.simulation.calls import CalledFunction, Calls

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.integration.native_integrator import Checkpoint, Integration
+from armblocks.integration.native_integrator import Integration
+from armblocks.integration.run_point import Checkpoint
 from armblocks.integration.system import CompiledSystem
 from armblocks.integration.workspace import Status
 from armblocks.simulation.plan import Instants
