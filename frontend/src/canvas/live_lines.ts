@@ -12,9 +12,15 @@ interface Dragged {
   passed: string | null
 }
 
+/** Lines that differ from those of the document, which were `base`. */
+interface Routed {
+  base: Lines
+  lines: Lines
+}
+
 /** The next request, and whether a request is pending. */
 interface Asking {
-  wanted: RouteWires | null
+  wanted: { request: RouteWires; base: Lines } | null
   busy: boolean
   dragging: boolean
 }
@@ -30,45 +36,47 @@ export function useLiveLines(dragged: Dragged | null): { lines: Lines; late: boo
   const kept = useStudio((s) => s.document!.lines)
   const document = useStudio((s) => s.document!.state.document)
   const inside = useStudio((s) => s.document!.inside)
-  const [routed, setRouted] = useState<Lines | null>(null)
+  const [routed, setRouted] = useState<Routed | null>(null)
   const [late, setLate] = useState(false)
   const asking = useRef<Asking>({ wanted: null, busy: false, dragging: false })
   useEffect(() => {
     const now = asking.current
     now.dragging = dragged !== null
-    now.wanted = dragged && {
+    const request = (of: Dragged): RouteWires => ({
       kind: 'route',
       document,
       inside,
-      places: spots(dragged.places),
-      wires: dragged.wires,
-      passed: dragged.passed,
-    }
+      places: spots(of.places),
+      wires: of.wires,
+      passed: of.passed,
+    })
+    now.wanted = dragged && { request: request(dragged), base: kept }
     if (!dragged) {
       setRouted(null)
       setLate(false)
     } else if (!now.busy) void follow(now, setRouted, setLate)
-  }, [dragged, document, inside])
-  const lines = dragged && routed ? { ...kept, ...routed } : kept
+  }, [dragged, document, inside, kept])
+  // Lines that were routed before the last change of the document are outdated, as at the end of a drag.
+  const lines = dragged && routed?.base === kept ? { ...kept, ...routed.lines } : kept
   return { lines, late: late && dragged !== null }
 }
 
 /** Request the lines of the latest layout, until no newer layout is waiting. */
 async function follow(
   now: Asking,
-  answer: (lines: Lines) => void,
+  answer: (routed: Routed) => void,
   setLate: (late: boolean) => void,
 ): Promise<void> {
   now.busy = true
   while (now.wanted) {
-    const { wanted } = now
+    const { request, base } = now.wanted
     now.wanted = null
     const timer = setTimeout(() => setLate(true), LATE_MS)
     // The request is refused if the sheet has changed meanwhile: its lines are sent with the change.
-    const lines = await line.ask(wanted).catch(() => null)
+    const lines = await line.ask(request).catch(() => null)
     clearTimeout(timer)
     setLate(false)
-    if (lines && now.dragging) answer(lines)
+    if (lines && now.dragging) answer({ base, lines })
   }
   now.busy = false
 }
