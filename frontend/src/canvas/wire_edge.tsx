@@ -121,29 +121,30 @@ function Piece({
     if (index < 0 || index > whole.length - 2) return
     const [source, target] = [id.slice(0, id.indexOf(' -> ')), id.slice(id.indexOf(' -> ') + 4)]
     const start = { x: event.clientX, y: event.clientY }
-    const element = event.currentTarget
-    element.setPointerCapture(event.pointerId)
+    const sheet = event.currentTarget.closest<HTMLElement>('.react-flow')!
     const move = (at: PointerEvent) => {
       const gone = flat ? at.clientY - start.y : at.clientX - start.x
       if (Math.abs(gone) < 3 && !useBending.getState().wire) return
+      // The sheet captures the pointer: this segment may disappear while the route is being drawn.
+      sheet.setPointerCapture(event.pointerId)
       const place = flow.screenToFlowPosition({ x: at.clientX, y: at.clientY }, { snapToGrid: false })
       useBending.setState({
         wire: { source, target, bends: dragged(whole, index, level(whole, index, flat ? place.y : place.x)) },
       })
     }
     const end = (at: PointerEvent) => {
-      element.removeEventListener('pointermove', move)
-      element.removeEventListener('pointerup', end)
-      element.removeEventListener('pointercancel', end)
+      window.removeEventListener('pointermove', move)
+      window.removeEventListener('pointerup', end)
+      window.removeEventListener('pointercancel', end)
       const { wire } = useBending.getState()
       if (!wire) return
       if (at.type === 'pointerup')
         void change({ kind: 'bend', wires: [wire] }).finally(() => useBending.setState({ wire: null }))
       else useBending.setState({ wire: null })
     }
-    element.addEventListener('pointermove', move)
-    element.addEventListener('pointerup', end)
-    element.addEventListener('pointercancel', end)
+    window.addEventListener('pointermove', move)
+    window.addEventListener('pointerup', end)
+    window.addEventListener('pointercancel', end)
   }
   return (
     <line
