@@ -32,7 +32,10 @@ def sheet(shared: Page) -> Iterator[Page]:
     """The page shared by this file, with a fresh copy of an example."""
     page = shared
     page.keyboard.press("Escape")
+    before = page.evaluate("sessionStorage.getItem('armblocks-shown')")
     menu(page, re.compile("^van_der_pol_pid a van der Pol"))
+    # The title does not tell: the document of the test before has the same.
+    page.wait_for_function("before => sessionStorage.getItem('armblocks-shown') !== before", arg=before)
     expect(page.locator(".title")).to_have_text("van_der_pol_pid")
     expect(block(page, "PID")).to_be_visible()
     keep_view(page)
