@@ -13,6 +13,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
+from crashed_disk import Disk
 from firefox_bidi import firefox_path
 from playwright._impl._api_structures import SetCookieParam
 from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, expect, sync_playwright
@@ -182,6 +183,13 @@ class SharedStudio:
 
 
 SHARED_STUDIO = SharedStudio()
+
+
+@pytest.fixture
+def disk(tmp_path: Path) -> Disk:
+    """A project folder and its state folder, before the first start of a studio."""
+    (tmp_path / "first" / "project").mkdir(parents=True)
+    return Disk(tmp_path / "first")
 
 
 @pytest.fixture(scope="module")

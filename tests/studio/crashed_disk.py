@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import shutil
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Iterable
 from pathlib import Path
 from typing import Any
 
+from armblocks.errors import ArmblocksError
 from armblocks.formats import load_robot
+from armblocks.studio.documents.open_files import OpenedT, OpenFiles
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.documents.state_folder import StateFolder
+from armblocks.studio.protocol.messages.documents import Alteration
 from armblocks.studio.robots.open_robots import OpenRobots
 from armblocks.studio.sheet.open_documents import OpenDocuments
 
@@ -40,3 +43,12 @@ class Disk:
 
 def going(talking: Callable[[], Coroutine[Any, Any, None]]) -> None:
     asyncio.run(talking())
+
+
+def carry_out(files: OpenFiles[OpenedT], found: OpenedT, requests: Iterable[Alteration]) -> None:
+    """Perform requests; those that are refused change nothing."""
+    for request in requests:
+        try:
+            files.perform(found, request)
+        except ArmblocksError:
+            continue

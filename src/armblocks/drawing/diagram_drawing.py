@@ -172,7 +172,7 @@ def _end(spots: tuple[PortSpot, ...], port: str) -> WireEnd:
 
 
 def wire_label(diagram: Diagram, source: PortRef) -> str:
-    """What stands at both ends of a wire without a line: the block, and its port where it has several."""
+    """The label at both ends of a wire without a line: the source block, with its port if it has several."""
     return source.block if len(diagram.blocks[source.block].output_ports()) == 1 else str(source)
 
 

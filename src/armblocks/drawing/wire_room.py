@@ -140,7 +140,7 @@ class Room:
         self._count = end
 
     def around(self, extent: Extent, number: int) -> Surroundings:
-        """What stands and lies in an area that is not of one net."""
+        """The blocks in an area, and the lines in it of all nets but one (``number``)."""
         pieces = self._pieces[: self._count]
         foreign = _inside(pieces, extent, _NEAR) & (self._owners[: self._count] != number)
         blocks = _inside(self._extents, extent, 0.0)

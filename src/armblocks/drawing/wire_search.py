@@ -3,7 +3,7 @@
 The grid has lines through every place where a wire may turn: beside blocks and beside other wires (Hanan
 1966 shows that such a grid contains a shortest rectilinear tree). The search counts bends: sweep *k* finds,
 for all nodes at once, the cheapest way that arrives with *k* bends. A sweep is a running minimum along every
-grid line, so its time depends on the size of the grid alone and not on what stands in the way.
+grid line, so its time depends on the size of the grid alone, not on the number of obstacles.
 """
 
 from __future__ import annotations

@@ -47,7 +47,7 @@ class EventSearch:
         has fired.
         """
         f, r = self.frame, self.frame.r
-        low, high, doubt = r.real(time), r.real(time), r.integer(0)
+        low, high, reason = r.real(time), r.real(time), r.integer(0)
         before = r.real(time)
         self._keep_start()
         with r.part() as search:
@@ -60,15 +60,15 @@ class EventSearch:
                     with r.part() as found:
                         self._scan(time, h, low, high, found)
                         search.leave_unless(divisible & r.call(self.functions.any_returned, f.reals))
-                        doubt.value = UNDECIDED
+                        reason.value = UNDECIDED
                         judged.leave()
                     self._bisect(low, high, time, h)
                     before.value = low.value
-                    doubt.value = 0
+                    reason.value = 0
                     with r.when(high.value < end):
-                        self._judge(doubt, high.value, time, h)
-                with r.when((doubt.value != 0) & divisible):
-                    self._take_shorter(high.value, doubt.value == UNDECIDED, time, h, attempt)
+                        self._judge(reason, high.value, time, h)
+                with r.when((reason.value != 0) & divisible):
+                    self._take_shorter(high.value, reason.value == UNDECIDED, time, h, attempt)
                     before.value = (f.new_time.value.bits() - 1).from_bits()
                 with r.otherwise(), r.when(high.value < end):
                     self.method.interpolate(high.value, time, h, self.y)
@@ -142,8 +142,8 @@ class EventSearch:
         with r.when(self.watch_inside(maximum(instant, time), time, h) == 0):
             r.call(self.functions.take_signs, f.reals, r.constant_boolean(False))
 
-    def _judge(self, doubt: IntegerVariable, instant: Real, time: Real, h: Real) -> None:
-        """Set ``doubt`` to the reason why an event on the dense output is doubtful, or to 0.
+    def _judge(self, reason: IntegerVariable, instant: Real, time: Real, h: Real) -> None:
+        """Set ``reason`` to the reason why an event on the dense output is doubtful, or to 0.
 
         An event is doubtful near the start of the step, and where its guard is near zero at the start. A
         guard that leaves zero like a high power of time, such as the position of a mass that starts from
@@ -155,8 +155,8 @@ class EventSearch:
         self.events.evaluation.solve(t, self.y)
         functions.evaluate(r, t, self.y, f.reals, f.p)
         early = instant - time < NEAR_START * h
-        found = r.call(functions.doubt, f.reals)
-        doubt.value = select(early & (found == 0), NEXT_TO_ZERO, found)
+        found = r.call(functions.doubtful, f.reals)
+        reason.value = select(early & (found == 0), NEXT_TO_ZERO, found)
 
     def _take_shorter(self, instant: Real, undecided: Boolean, time: Real, h: Real, attempt: Part) -> None:
         """Take a step to the time of a doubtful event and evaluate the guards at its end.

@@ -53,7 +53,7 @@ class GuardFunctions:
         self.note_events = program.define(self._note_events, "note_events")
         self.dips = program.define(self._dips, "dips")
         self.note_slopes = program.define(self._note_slopes, "note_slopes")
-        self.doubt = program.define(self._doubt, "doubt")
+        self.doubtful = program.define(self._doubtful, "doubtful")
         self.any_returned = program.define(self._any_returned, "any_returned")
         self.any_fired = program.define(self._any_fired, "any_fired")
         self.any_contradicts = program.define(self._any_contradicts, "any_contradicts")
@@ -96,7 +96,7 @@ class GuardFunctions:
             total.value = total.value + found.count()
         return total.value
 
-    def _doubt(self, r: Routine, reals: Reals) -> Integer:
+    def _doubtful(self, r: Routine, reals: Reals) -> Integer:
         """The reason why a marked guard is doubtful, or 0: it had no sign at the start of the step, or was
         near zero there. The values in ``guards`` are those at the end of the step."""
         places, found = self.places, r.integer(0)

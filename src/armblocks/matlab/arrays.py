@@ -60,12 +60,12 @@ class Described(Protocol):
 
     @property
     def kind(self) -> str:
-        """What it is, in words for messages."""
+        """The name of this kind of value in messages."""
         ...
 
 
 def kind_of(value: object) -> str:
-    """What a value is, in words for messages."""
+    """The name of a kind of value in messages, such as ``a 2x3 matrix``."""
     if is_array(value):
         return "a number" if value.size == 1 else f"a {value.shape[0]}x{value.shape[1]} matrix"
     if isinstance(value, Described):

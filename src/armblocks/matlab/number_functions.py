@@ -45,19 +45,30 @@ def _greatest(by: Arithmetic, x: Any, *other: Any) -> Any:
     return by.greatest(x, *other) if other else by.folded(by.greatest, x)
 
 
+INFINITY = constant(math.inf, "Infinity.", reserved=True)
+NOT_A_NUMBER = constant(math.nan, "Not a number.")
 CONSTANTS_BY_NAME: Mapping[str, Function] = {
     "pi": constant(math.pi, "π", reserved=True),
     "e": constant(math.e, "Euler's number, 2.718…", reserved=True),
-    "inf": constant(math.inf, "Infinity.", reserved=True),
-    "Inf": constant(math.inf, "Infinity.", reserved=True),
-    "nan": constant(math.nan, "Not a number."),
-    "NaN": constant(math.nan, "Not a number."),
+    "inf": INFINITY,
+    "Inf": INFINITY,
+    "nan": NOT_A_NUMBER,
+    "NaN": NOT_A_NUMBER,
     "eps": constant(2.0**-52, "The distance from 1 to the next larger number."),
     "deg": constant(math.pi / 180.0, "One degree in rad: `45*deg`.", reserved=True),
     "rad": constant(1.0, "One radian: `0.5*rad`.", reserved=True),
     "true": constant(1.0, "1"),
     "false": constant(0.0, "0"),
 }
+LOGARITHM = rounded("log", "Natural logarithm.", POWERS, 0.0)
+POWER = elementwise(
+    "x, y",
+    "x to the power of y, as `x.^y`.",
+    POWERS,
+    lambda by, x, y: by.elementary("power", x, y),
+    reserved=True,
+    elementary=True,
+)
 FUNCTIONS_OF_NUMBERS: Mapping[str, Function] = {
     "sin": rounded("sin", "Sine of an angle in rad.", TRIGONOMETRY),
     "cos": rounded("cos", "Cosine of an angle in rad.", TRIGONOMETRY),
@@ -87,27 +98,13 @@ FUNCTIONS_OF_NUMBERS: Mapping[str, Function] = {
     ),
     "exp": rounded("exp", "e to the power of x.", POWERS),
     "expm1": rounded("expm1", "exp(x) - 1, exact for small x.", POWERS),
-    "log": rounded("log", "Natural logarithm.", POWERS, 0.0),
-    "ln": rounded("log", "Natural logarithm.", POWERS, 0.0),
+    "log": LOGARITHM,
+    "ln": LOGARITHM,
     "log10": rounded("log10", "Decimal logarithm.", POWERS, 0.0),
     "log1p": rounded("log1p", "log(1 + x), exact for small x.", POWERS, -1.0),
     "sqrt": elementwise("x", "Square root.", POWERS, lambda by, x: by.sqrt(x), reserved=True, real_from=0.0),
-    "power": elementwise(
-        "x, y",
-        "x to the power of y, as `x.^y`.",
-        POWERS,
-        lambda by, x, y: by.elementary("power", x, y),
-        reserved=True,
-        elementary=True,
-    ),
-    "pow": elementwise(
-        "x, y",
-        "x to the power of y, as `x.^y`.",
-        POWERS,
-        lambda by, x, y: by.elementary("power", x, y),
-        reserved=True,
-        elementary=True,
-    ),
+    "power": POWER,
+    "pow": POWER,
     "hypot": elementwise(
         "x, y",
         "The square root of x² + y².",

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from crashed_disk import Disk, going
+from crashed_disk import Disk, carry_out, going
 
 from armblocks.errors import ArmblocksError, FormatError, InputError
 from armblocks.formats import diagram_to_bytes, load_robot
@@ -25,12 +25,6 @@ from armblocks.studio.protocol.messages.sheet_edits import (
 )
 from armblocks.studio.sheet.document import Document
 from armblocks.studio.sheet.open_documents import OpenDocument, OpenDocuments
-
-
-@pytest.fixture
-def disk(tmp_path: Path) -> Disk:
-    (tmp_path / "first" / "project").mkdir(parents=True)
-    return Disk(tmp_path / "first")
 
 
 def change(key: str, edit: DiagramEdit, **more: Any) -> say.Change:
@@ -67,14 +61,6 @@ def random_requests(seed: int, count: int) -> list[Any]:
             )
         )
     return requests
-
-
-def carry_out(documents: OpenDocuments, found: OpenDocument, requests: list[Any]) -> None:
-    for request in requests:
-        try:
-            documents.perform(found, request)
-        except ArmblocksError:
-            continue
 
 
 @pytest.mark.parametrize("seed", range(12))

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from crashed_disk import Disk, going
+from crashed_disk import Disk, carry_out, going
 
 from armblocks.errors import ArmblocksError, FormatError, InputError
 from armblocks.formats import load_robot, write_robot
@@ -16,13 +16,7 @@ from armblocks.studio.documents.older_journals import as_of_today
 from armblocks.studio.protocol.messages import documents as say
 from armblocks.studio.protocol.messages.robot_edits import AddJoint, RenameLink, SetCell
 from armblocks.studio.protocol.messages.sheet_edits import ArrangeBlocks, Rename
-from armblocks.studio.robots.open_robots import OpenRobot, OpenRobots
-
-
-@pytest.fixture
-def disk(tmp_path: Path) -> Disk:
-    (tmp_path / "first" / "project").mkdir(parents=True)
-    return Disk(tmp_path / "first")
+from armblocks.studio.robots.open_robots import OpenRobot
 
 
 def content(found: OpenRobot) -> bytes:
@@ -72,14 +66,6 @@ def requests(seed: int, count: int) -> list[Any]:
             for _ in range(random_.randrange(3)):
                 made.append(kind(document="", key=f"{seed} {len(made)}"))
     return made
-
-
-def carry_out(robots: OpenRobots, found: OpenRobot, asked: list[Any]) -> None:
-    for request in asked:
-        try:
-            robots.perform(found, request)
-        except ArmblocksError:
-            continue
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -45,7 +45,7 @@ class LinkRecord:
 
     @property
     def kind(self) -> str:
-        """What it is, in words for messages."""
+        """The name of this kind of value in messages."""
         return "a link"
 
     def assigned(self) -> LinkRecord:
@@ -69,7 +69,7 @@ class RobotRecord:
 
     @property
     def kind(self) -> str:
-        """What it is, in words for messages."""
+        """The name of this kind of value in messages."""
         return "a robot"
 
     def assigned(self) -> RobotRecord:

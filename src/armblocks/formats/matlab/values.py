@@ -23,7 +23,7 @@ class Cell:
 
     @property
     def kind(self) -> str:
-        """What it is, in words for messages."""
+        """The name of this kind of value in messages."""
         return "a cell array"
 
 
@@ -35,7 +35,7 @@ class LinkArray:
 
     @property
     def kind(self) -> str:
-        """What it is, in words for messages."""
+        """The name of this kind of value in messages."""
         return "an array of links"
 
 
