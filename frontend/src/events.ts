@@ -4,7 +4,7 @@ import type { Checked, DocumentState, Wire } from './protocol'
 import { attachAgain, leaveEditor, robotChanged, robotOpened, toFront } from './robot/editor/desk'
 import { isFree } from './run/pace'
 import * as runs from './run/runs'
-import { ask, bringToFront, line, refuse, useStudio, type OpenDocument } from './store'
+import { ask, bringToFront, line, refuse, showState, useStudio, type OpenDocument } from './store'
 
 const wireKey = (wire: Wire) => `${wire.source} -> ${wire.target}`
 
@@ -99,14 +99,14 @@ function diagramOpened({ state, in_front }: EventOf<'opened'>, content: ContentO
   if (same && run && (run.state === 'running' || run.state === 'paused') && content.run !== run.run)
     useStudio.setState({ run: { ...run, state: 'failed', message: 'The studio ended during this run.' } })
   useStudio.setState({
-    document: {
+    ...showState({
       state,
       inside,
       settings,
       ...sheet,
       findings: same ? document.findings : [],
       wireKinds: same ? document.wireKinds : {},
-    },
+    }),
     ...(same ? {} : { run: null, selection: new Set<string>(), editing: null }),
   })
   if (!same) {
@@ -137,7 +137,7 @@ function diagramChanged(event: EventOf<'changed'>, change: ChangeOf<'diagram'>):
   if (event.before !== document.state.version && event.state.version !== document.state.version)
     void ask({ kind: 'look', document: event.state.document, inside: document.inside })
   else {
-    useStudio.setState({ document: changed(document, event.state, change) })
+    useStudio.setState(showState(changed(document, event.state, change)))
     remember(event.state, document.inside)
   }
 }

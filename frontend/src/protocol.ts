@@ -1095,6 +1095,7 @@ export interface BlockType {
   height: number;
   face: string;
   inputs: string[];
+  input_y: number[];
   outputs: string[];
   parameters: ParameterRule[];
 }

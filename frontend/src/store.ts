@@ -2,6 +2,7 @@ import { create } from 'zustand'
 import { Connection, Refusal, type Line } from './connection'
 import { changed as viewsChanged } from './frames'
 import { newKey } from './keys'
+import { outstanding, pathOf, withMoves, type SentMove } from './model/ahead'
 import type { Edit, EventOf, ReplyTo, Request } from './messages'
 import type {
   BlockType,
@@ -75,6 +76,8 @@ interface Studio {
   welcome: EventOf<'welcome'> | null
   library: Map<string, BlockType>
   document: OpenDocument | null
+  /** Moves of this page that the displayed state of the server does not contain yet. */
+  sent: SentMove[]
   run: RunView | null
   selection: ReadonlySet<string>
   editing: string | null
@@ -94,6 +97,7 @@ export const useStudio = create<Studio>((set) => ({
   welcome: null,
   library: new Map(),
   document: null,
+  sent: [],
   run: null,
   selection: new Set(),
   editing: null,
@@ -142,14 +146,48 @@ export function alteration({ document, version }: DocumentState) {
   return { document, key: newKey(), base: version, author }
 }
 
-/** Apply an edit to the displayed diagram; if it is refused, the sheet is restored. */
+/**
+ * Apply an edit to the displayed diagram; if it is refused, the sheet is restored. Moves are shown before the
+ * reply, so that the next move starts from the new positions.
+ */
 export async function change(edit: Edit): Promise<number | undefined> {
   const { document } = useStudio.getState()
   if (!document) return undefined
   const { inside, state } = document
-  const version = await ask({ kind: 'change', ...alteration(state), inside, edit })
+  const request = { kind: 'change' as const, ...alteration(state), inside, edit }
+  if (edit.kind !== 'move') {
+    const version = await ask(request)
+    if (version === undefined) look(inside)
+    return version
+  }
+  const { places = {}, notes = {} } = edit
+  const { key } = request
+  showAhead({ key, document: state.document, inside: pathOf(inside), version: null, places, notes })
+  const version = await ask(request)
+  useStudio.setState((s) => ({
+    sent: s.sent.flatMap((move) =>
+      move.key !== key
+        ? [move]
+        : version === undefined || version <= (s.document?.state.version ?? 0)
+          ? []
+          : [{ ...move, version }],
+    ),
+  }))
   if (version === undefined) look(inside)
   return version
+}
+
+function showAhead(move: SentMove): void {
+  useStudio.setState((s) => ({
+    sent: [...s.sent, move],
+    document: s.document && withMoves(s.document, [move]),
+  }))
+}
+
+/** Show a state of the document from the server, with the moves that it does not contain yet. */
+export function showState(document: OpenDocument): Pick<Studio, 'document' | 'sent'> {
+  const sent = outstanding(useStudio.getState().sent, document)
+  return { document: withMoves(document, sent), sent }
 }
 
 /** Apply an edit to the sheet at a path of subsystems; a refusal is thrown to the caller. */

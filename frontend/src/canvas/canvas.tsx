@@ -28,7 +28,7 @@ import { useSheetDrawing } from './sheet_drawing'
 import type { SheetGraph, SheetNode } from './sheet_graph'
 import { useSheetKeys } from './sheet_keys'
 import { FIT } from './sheet_layout'
-import { useFitted, useSought } from './sheet_view'
+import { useFitted, useSheetView, useSought } from './sheet_view'
 import { useSteady } from './steady'
 import { Welcome } from './welcome'
 import { WireEdge, type WireEdgeType } from './wire_edge'
@@ -108,17 +108,24 @@ function Sheet() {
   const mouse = useSheetDrag(blocks, notes)
   const { graph, nodes, edges } = useSheetDrawing(mouse, chosenWires)
   useSought(sheet, flow, blocks)
-  useSheetKeys(sheet, flow, chosenWires, setChosenWires)
+  useSheetKeys(sheet, chosenWires, setChosenWires)
+  useSheetView(sheet, flow)
   useFitted(sheet, flow)
   const handlers = useSteady({
     onNodesChange: (changes: NodeChange<SheetNode>[]) => nodesChanged(changes, graph, mouse),
     onEdgesChange: (changes: EdgeChange<WireEdgeType>[]) => setChosenWires(chosenAfter(changes, chosenWires)),
     ...dragHandlers(mouse, blocks, wires, edges),
+    onNodeClick: (event: React.MouseEvent, node: SheetNode) => {
+      if (!chooseAlone(event, node.id)) return
+      setChosenWires(new Set())
+    },
     onNodeDoubleClick: (_: unknown, node: SheetNode) => node.type === 'block' && openBlock(node.data.block),
     onConnect: connect,
   })
   const chosenEdge = chosenWires.size === 1 ? edges.find(({ selected }) => selected) : undefined
   const empty = Object.keys(blocks).length === 0 && Object.keys(notes).length === 0
+  // An empty sheet would be fitted to the first block that is dropped on it, which would then jump.
+  const [begunWithBlocks] = useState(!empty)
   return (
     <div
       className="canvas"
@@ -149,8 +156,9 @@ function Sheet() {
         zoomOnPinch
         minZoom={0.1}
         maxZoom={4}
-        fitView
+        fitView={begunWithBlocks}
         fitViewOptions={FIT}
+        elevateNodesOnSelect={false}
         aria-label="Diagram"
       >
         <Background variant={BackgroundVariant.Dots} gap={20} size={1} />
@@ -180,6 +188,14 @@ function selectFocused({ target }: React.FocusEvent): void {
 function insertAt(event: React.MouseEvent): void {
   if ((event.target as Element).classList.contains('react-flow__pane'))
     show('insert', '', { x: event.clientX, y: event.clientY })
+}
+
+/** A click on one of several selected blocks selects it alone; whether it has changed the selection. */
+function chooseAlone({ ctrlKey, metaKey, shiftKey }: React.MouseEvent, id: string): boolean {
+  const { selection, select } = useStudio.getState()
+  if (ctrlKey || metaKey || shiftKey || selection.size < 2) return false
+  select([id])
+  return true
 }
 
 function connect({ source, sourceHandle, target, targetHandle }: Connection): void {
@@ -216,22 +232,30 @@ function chosenAfter(changes: EdgeChange<WireEdgeType>[], before: ReadonlySet<st
   return chosen
 }
 
-/** The arrow head that all wires share. */
+const WIRE_HEADS = [
+  ['wire-head', 'f-wire'],
+  ['selected-wire-head', 'f-accent'],
+] as const
+
+/** The arrow heads that all wires share. */
 function WireHead() {
   return (
     <svg className="defs" width="0" height="0" aria-hidden>
-      <marker
-        id="wire-head"
-        viewBox="0 0 8 8"
-        refX="8"
-        refY="4"
-        markerWidth="8"
-        markerHeight="8"
-        markerUnits="userSpaceOnUse"
-        orient="auto"
-      >
-        <path d="M0 0.300L8 4L0 7.700Z" className="f-wire" />
-      </marker>
+      {WIRE_HEADS.map(([id, tone]) => (
+        <marker
+          key={id}
+          id={id}
+          viewBox="0 0 8 8"
+          refX="8"
+          refY="4"
+          markerWidth="8"
+          markerHeight="8"
+          markerUnits="userSpaceOnUse"
+          orient="auto"
+        >
+          <path d="M0 0.300L8 4L0 7.700Z" className={tone} />
+        </marker>
+      ))}
     </svg>
   )
 }

@@ -1,18 +1,26 @@
+import type { Rectangle } from '../model/free_place'
 import type { Place, SheetBlock, SheetNote, Wire } from '../protocol'
 import { change, look, useStudio } from '../store'
 import { writeNote } from './note_node'
 import type { Places } from '../model/wires'
 
 /** Commands of the visible sheet; `null` while there is none. */
-export const sheetView: { fit: (() => void) | null; middle: (() => { x: number; y: number }) | null } = {
+export const sheetView: {
+  fit: (() => void) | null
+  /** The visible part of the sheet. */
+  visible: (() => Rectangle) | null
+  /** Move the view so that a block is visible. */
+  reveal: ((block: Rectangle) => void) | null
+} = {
   fit: null,
-  middle: null,
+  visible: null,
+  reveal: null,
 }
 
 /** Start a note in the centre of the visible part. */
 export function addNote(): void {
-  const at = sheetView.middle?.()
-  if (at) writeNote(at.x, at.y)
+  const view = sheetView.visible?.()
+  if (view) writeNote(view.x + view.width / 2, view.y + view.height / 2)
 }
 
 /** Handle a double click: open a subsystem without a mask, otherwise the parameters of the block. */

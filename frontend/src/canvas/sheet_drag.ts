@@ -3,6 +3,7 @@ import { useEffect, useRef, useState } from 'react'
 import { isLoose, levelled, putInto, rewired, takenOut, wireAt } from '../model/rewiring'
 import { wireKey, type Places } from '../model/wires'
 import type { SheetBlock, SheetNote, Wire } from '../protocol'
+import { useStudio } from '../store'
 import { BLOCK_TYPE, insertBlock } from './insert'
 import { move } from './sheet_actions'
 import type { SheetNode } from './sheet_graph'
@@ -25,8 +26,11 @@ export function useSheetDrag(blocks: Record<string, SheetBlock>, notes: Record<s
   const held = useRef(NOTHING_HELD)
   /** The wire into which a dragged block would be inserted. */
   const [into, setInto] = useState<string | null>(null)
+  const settled = useStudio((s) => s.sent.length === 0)
   // When the server has applied the new positions, the displacements of the drag are discarded.
-  useEffect(() => setDrag((now) => (Object.keys(now).length ? {} : now)), [blocks, notes])
+  useEffect(() => {
+    if (settled) setDrag((now) => (Object.keys(now).length ? {} : now))
+  }, [blocks, notes, settled])
   return { drag, setDrag, freed, loose, held, setHeld, into, setInto }
 }
 
@@ -85,7 +89,7 @@ export function dropHandlers(
     const at = flow.screenToFlowPosition({ x: event.clientX, y: event.clientY }, { snapToGrid: false })
     const found = wireAt(at, edges, wires)
     setInto(null)
-    if (found) insertBlock(type, { x: at.x, y: found.y }, found.wire)
+    if (found) insertBlock(type, { x: at.x, y: found.y }, { wire: found.wire, level: found.y })
     else insertBlock(type, at)
   }
   const hover = (event: React.DragEvent) => {

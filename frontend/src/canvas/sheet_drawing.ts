@@ -1,6 +1,6 @@
 import { useMemo, useState } from 'react'
 import { takenOut } from '../model/rewiring'
-import { wireKey } from '../model/wires'
+import { wireKey, type Places } from '../model/wires'
 import { useStudio } from '../store'
 import { present, type SheetDrag } from './sheet_drag'
 import { SheetGraph } from './sheet_graph'
@@ -16,6 +16,7 @@ export function useSheetDrawing({ drag, freed, loose, into }: SheetDrag, chosenW
   const kinds = useStudio((s) => s.document!.wireKinds)
   const level = useStudio((s) => s.document!.inside.map((name) => `${name}/`).join(''))
   const selection = useStudio((s) => s.selection)
+  const sent = useStudio((s) => s.sent)
   const bending = useBending((s) => s.wire)
   const [graph] = useState(() => new SheetGraph())
   const shown = useMemo(() => {
@@ -34,9 +35,25 @@ export function useSheetDrawing({ drag, freed, loose, into }: SheetDrag, chosenW
     () => graph.nodes(blocks, notes, findings, level, drag, selection),
     [graph, blocks, notes, findings, level, drag, selection],
   )
+  /** Blocks whose wires the server has not routed again yet. */
+  const moved = useMemo(
+    () => Object.assign({}, ...sent.map(({ places }) => places), drag) as Places,
+    [sent, drag],
+  )
   const edges = useMemo(
-    () => graph.edges({ blocks, wires: shown, drag, lines, late, kinds, level, chosen: chosenWires, into }),
-    [graph, blocks, shown, drag, lines, late, kinds, level, chosenWires, into],
+    () =>
+      graph.edges({
+        blocks,
+        wires: shown,
+        drag: moved,
+        lines,
+        late,
+        kinds,
+        level,
+        chosen: chosenWires,
+        into,
+      }),
+    [graph, blocks, shown, moved, lines, late, kinds, level, chosenWires, into],
   )
   return { graph, nodes, edges }
 }

@@ -1,4 +1,3 @@
-import type { ReactFlowInstance } from '@xyflow/react'
 import { useEffect, type RefObject } from 'react'
 import { commandOf } from '../commands'
 import { show, useDialogs } from '../dialogs'
@@ -6,10 +5,7 @@ import { change, look, useStudio } from '../store'
 import { chosenBlocks } from './arranging'
 import { editNote } from './note_node'
 import { addNote, move, openBlock, sheetView } from './sheet_actions'
-import type { SheetNode } from './sheet_graph'
-import { FIT } from './sheet_layout'
 import { wireKey, type Places } from '../model/wires'
-import type { WireEdgeType } from './wire_edge'
 
 const NUDGE = 5
 
@@ -18,6 +14,14 @@ function typedSoFar(): string {
   const { open, typed } = useDialogs.getState()
   return open === 'insert' ? typed : ''
 }
+
+/** Keys that press a button or leave it; all others are keys of the sheet also after a button was pressed. */
+const PRESSING = new Set(['Enter', ' ', 'Tab'])
+
+/** Whether an element is a button whose group does not use the arrow keys. */
+const isButton = (element: Element | null): boolean =>
+  element instanceof HTMLButtonElement &&
+  !element.closest('[role="tablist"], [role="radiogroup"], [role="listbox"], .timeline, .stage')
 
 /** Delete the selected blocks, notes and wires. */
 function removeChosen(chosenWires: ReadonlySet<string>): void {
@@ -32,7 +36,6 @@ function removeChosen(chosenWires: ReadonlySet<string>): void {
 /** The keys of the sheet: active while the sheet or nothing has the focus. */
 export function useSheetKeys(
   sheet: RefObject<HTMLDivElement | null>,
-  flow: ReactFlowInstance<SheetNode, WireEdgeType>,
   chosenWires: ReadonlySet<string>,
   chooseWires: (keys: ReadonlySet<string>) => void,
 ): void {
@@ -84,8 +87,9 @@ export function useSheetKeys(
       focused?.closest('textarea, [role="dialog"], [role="menu"], [role="slider"], [role="tree"]')
     )
       return
+    if (event.defaultPrevented) return
     const ours = focused === window.document.body || sheet.current?.contains(focused)
-    if (!ours && (event.key === 'Enter' || event.key === ' ' || event.key.length > 1)) return
+    if (!ours && (PRESSING.has(event.key) || (event.key.length > 1 && !isButton(focused)))) return
     const command = commandOf(event, true)
     if (command) {
       if (command.possible?.() ?? true) command.run()
@@ -98,15 +102,4 @@ export function useSheetKeys(
     addEventListener('keydown', onKeyDown)
     return () => removeEventListener('keydown', onKeyDown)
   })
-  useEffect(() => {
-    sheetView.fit = () => void flow.fitView({ ...FIT, duration: 150 })
-    sheetView.middle = () => {
-      const box = sheet.current!.getBoundingClientRect()
-      return flow.screenToFlowPosition({ x: box.x + box.width / 2, y: box.y + box.height / 2 })
-    }
-    return () => {
-      sheetView.fit = null
-      sheetView.middle = null
-    }
-  }, [flow, sheet])
 }

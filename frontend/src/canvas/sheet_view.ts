@@ -1,12 +1,16 @@
 import type { ReactFlowInstance } from '@xyflow/react'
 import { useEffect, type RefObject } from 'react'
+import type { Rectangle } from '../model/free_place'
 import type { SheetBlock } from '../protocol'
 import { useStudio } from '../store'
 import type { SheetNode } from './sheet_graph'
+import { sheetView } from './sheet_actions'
 import { FIT } from './sheet_layout'
 import type { WireEdgeType } from './wire_edge'
 
 const SETTLE_MS = 120
+/** Height of the name below a block, px. */
+const NAME_ROOM = 18
 
 type Sheet = RefObject<HTMLDivElement | null>
 type Flow = ReactFlowInstance<SheetNode, WireEdgeType>
@@ -32,6 +36,25 @@ export function useSought(sheet: Sheet, flow: Flow, blocks: Record<string, Sheet
   }, [sheet, sought, blocks, flow])
 }
 
+/** Distance from the edge of the panel within which a new block is moved farther into view, px. */
+const MARGIN = 24
+
+/** Move the view, without zooming, so that all of a block is visible. */
+function bringIntoView(
+  flow: Pick<Flow, 'getViewport' | 'setViewport'>,
+  panel: { width: number; height: number },
+  block: Rectangle,
+): void {
+  const { x, y, zoom } = flow.getViewport()
+  const shift = (from: number, size: number, room: number) => {
+    const [low, high] = [from - MARGIN, from + size + MARGIN - room]
+    return low < 0 ? -low : Math.min(0, -Math.min(high, low))
+  }
+  const dx = shift(block.x * zoom + x, block.width * zoom, panel.width)
+  const dy = shift(block.y * zoom + y, (block.height + NAME_ROOM) * zoom, panel.height)
+  if (dx || dy) void flow.setViewport({ x: x + dx, y: y + dy, zoom }, { duration: 150 })
+}
+
 /** The sheet is fitted to its panel, at every panel size, until the user moves it. */
 export function useFitted(sheet: Sheet, flow: Flow): void {
   useEffect(() => {
@@ -40,15 +63,37 @@ export function useFitted(sheet: Sheet, flow: Flow): void {
     let timer = 0
     const sized = new ResizeObserver(() => {
       clearTimeout(timer)
-      timer = window.setTimeout(() => void flow.fitView(FIT), SETTLE_MS)
+      // React Flow would fit an empty sheet to the first block that is dropped on it, which would then jump.
+      timer = window.setTimeout(() => flow.getNodes().length && void flow.fitView(FIT), SETTLE_MS)
     })
     const leave = () => {
       clearTimeout(timer)
       sized.disconnect()
     }
     sized.observe(element)
-    for (const kind of ['pointerdown', 'wheel', 'keydown'])
+    for (const kind of ['pointerdown', 'wheel', 'keydown', 'drop'])
       element.addEventListener(kind, leave, { once: true })
     return leave
   }, [sheet, flow])
+}
+
+/** The commands of the visible sheet act on this view. */
+export function useSheetView(sheet: Sheet, flow: Flow): void {
+  useEffect(() => {
+    sheetView.fit = () => void flow.fitView({ ...FIT, duration: 150 })
+    sheetView.visible = () => {
+      const { clientWidth: width, clientHeight: height } = sheet.current!
+      const { x, y, zoom } = flow.getViewport()
+      return { x: -x / zoom, y: -y / zoom, width: width / zoom, height: height / zoom }
+    }
+    sheetView.reveal = (block) => {
+      const { clientWidth: width, clientHeight: height } = sheet.current!
+      bringIntoView(flow, { width, height }, block)
+    }
+    return () => {
+      sheetView.fit = null
+      sheetView.visible = null
+      sheetView.reveal = null
+    }
+  }, [flow, sheet])
 }

@@ -60,7 +60,7 @@ export const WireEdge = memo(function WireEdge({ id, data, selected }: EdgeProps
         id={id}
         path={line}
         className={`line rank${rank}`}
-        markerEnd="url(#wire-head)"
+        markerEnd={selected ? 'url(#selected-wire-head)' : 'url(#wire-head)'}
         interactionWidth={0}
       />
       {rank >= 2 && <path d={line} className={rank === 3 ? 'core wide' : 'core'} />}

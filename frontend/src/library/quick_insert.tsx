@@ -1,5 +1,5 @@
 import { useMemo } from 'react'
-import { insertBlock } from '../canvas/insert'
+import { addBlock, insertBlock } from '../canvas/insert'
 import { show, useDialogs } from '../dialogs'
 import { useStudio } from '../store'
 import { Face } from './palette'
@@ -33,7 +33,8 @@ export function QuickInsert() {
       }))}
       onPick={(index) => {
         const kind = found[index]
-        if (kind) insertBlock(kind.type, at ? place(at) : freePlace())
+        if (kind && at) insertBlock(kind.type, place(at))
+        else if (kind) addBlock(kind)
       }}
     />
   )
@@ -47,29 +48,4 @@ function place(at: { x: number; y: number }): { x: number; y: number } {
     x: (at.x - (corner?.x ?? 0) - matrix.e) / matrix.a,
     y: (at.y - (corner?.y ?? 0) - matrix.f) / matrix.a,
   }
-}
-
-/** Right of the selected block, or right of all blocks: a new block never overlaps another. */
-function freePlace(): { x: number; y: number } {
-  const { document: open, selection } = useStudio.getState()
-  const blocks = Object.values(open?.blocks ?? {})
-  const [last] = blocks.filter(({ name }) => selection.has(name))
-  let at = last
-    ? { x: last.place.x + last.width + 90, y: last.place.y + last.height / 2 }
-    : { x: 120, y: 120 }
-  if (!last && blocks.length)
-    at = {
-      x: Math.min(...blocks.map((b) => b.place.x)) + 40,
-      y: Math.max(...blocks.map((b) => b.place.y + b.height)) + 80,
-    }
-  const taken = (x: number, y: number) =>
-    blocks.some(
-      (b) =>
-        x > b.place.x - 60 &&
-        x < b.place.x + b.width + 60 &&
-        y > b.place.y - 45 &&
-        y < b.place.y + b.height + 45,
-    )
-  while (taken(at.x, at.y)) at = { x: at.x, y: at.y + 20 }
-  return at
 }

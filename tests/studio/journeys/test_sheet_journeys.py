@@ -81,6 +81,17 @@ def way(page: Page, wire: str) -> str | None:
     return edge(page, wire).locator("path.line").first.get_attribute("d")
 
 
+SELECTED_LINE = ".wire.selected path.line"
+AS_RGB = """(colour) => {
+    const probe = document.createElement('i')
+    probe.style.color = colour
+    document.body.append(probe)
+    const found = getComputedStyle(probe).color
+    probe.remove()
+    return found
+}"""
+
+
 def test_a_user_drawn_route_follows_its_block_and_can_be_reset(sheet: Page) -> None:
     wire = "PID/y -> u/u1"
     before = way(sheet, wire)
@@ -101,6 +112,9 @@ def test_a_user_drawn_route_follows_its_block_and_can_be_reset(sheet: Page) -> N
     sheet.keyboard.press("Control+z")
     expect(line).to_have_attribute("d", led or "")
     edge(sheet, wire).locator(".piece").nth(2).click(force=True)
+    accent = sheet.evaluate("getComputedStyle(document.documentElement).getPropertyValue('--accent')")
+    shown = f"getComputedStyle(document.querySelector('{SELECTED_LINE}')).stroke"
+    assert sheet.evaluate(shown) == sheet.evaluate(AS_RGB, accent.strip())
     sheet.get_by_role("button", name="Reset the route").click()
     expect(line).to_have_attribute("d", before or "")
 
@@ -254,6 +268,22 @@ def test_blocks_are_rotated_and_aligned(sheet: Page) -> None:
     sheet.keyboard.press("Control+z")
     command(sheet, "equal gaps from left")
     expect(sheet.get_by_role("button", name=re.compile("Undo move"))).to_be_enabled()
+    block(sheet, "x1").click()  # one of several selected blocks is then selected alone
+    expect(sheet.locator(".react-flow__node.selected")).to_have_count(1)
+    sheet.get_by_role("button", name="Menu").click()
+    sheet.keyboard.press("Escape")
+    expect(sheet.get_by_role("menu")).to_be_hidden()
+    _, before = position(sheet, "x1")
+    for _ in range(10):
+        sheet.keyboard.press("ArrowDown")
+    wait_until(sheet, lambda: position(sheet, "x1")[1] == before + 50)
+    expect(sheet.get_by_role("button", name="Undo move x1 (Ctrl+Z)")).to_be_enabled()
+
+
+def position(page: Page, name: str) -> tuple[float, float]:
+    """The position of a block on the sheet."""
+    x, y = re.findall(r"-?[\d.]+(?=px)", block(page, name).get_attribute("style") or "")[:2]
+    return float(x), float(y)
 
 
 def test_a_note_is_written_moved_saved_and_deleted(sheet: Page) -> None:

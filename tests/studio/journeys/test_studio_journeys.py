@@ -87,6 +87,11 @@ def test_the_first_example_is_shown_run_and_played_back(shared: Page) -> None:
 def test_a_diagram_is_built_with_the_mouse_run_and_saved(page: Page, folder: Path) -> None:
     new_diagram(page)
     drag_from_library(page, "SineWave", 150, 150)
+    sheet = page.locator(".canvas").bounding_box()
+    dropped = block(page, "Sine Wave").locator(".face").bounding_box()
+    assert sheet is not None and dropped is not None
+    centre = (dropped["x"] + dropped["width"] / 2, dropped["y"] + dropped["height"] / 2)
+    assert centre == pytest.approx((sheet["x"] + 150, sheet["y"] + 150), abs=3)  # the grid has 5 px
     drag_from_library(page, "Gain", 300, 150)
     drag_from_library(page, "Scope", 450, 150)
     expect(page.locator(".react-flow__node")).to_have_count(3)
@@ -119,6 +124,10 @@ def test_a_diagram_is_built_with_the_keyboard_alone_and_undone_completely(page: 
     for typed in ("sine wave", "integrator", "scope"):
         add(page, typed)
     expect(page.locator(".react-flow__node")).to_have_count(3)
+    ports = page.locator('[data-handleid="y"], .source, [data-id="Scope"] .target')
+    tops = [box["y"] for port in ports.all() if (box := port.bounding_box())]
+    assert len(tops) == 3
+    assert max(tops) - min(tops) < 0.01  # the wires between them are straight
     for source, target in (("Sine", "Integrator"), ("Integrator", "Scope")):
         page.keyboard.press(">")
         for label, typed in (("From the output", source), ("To the input", target)):

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import logging
 import logging.config
+import socket
+import struct
 import urllib.error
 import urllib.request
 from pathlib import Path
@@ -46,6 +48,18 @@ def test_the_terminal_shows_no_key_after_the_login_and_no_file_content(tmp_path:
         rest, secrets = _said_after_the_login(studio)
     for secret in secrets:
         assert secret not in rest
+    assert "Exception in ASGI application" not in rest  # of the aborted connections
+
+
+def _abort(address: str, headers: dict[str, str]) -> None:
+    """End a connection abruptly, as a killed browser does, while replies are due."""
+    opening = {"kind": "open_shipped", "document_kind": "diagram", "name": "kr180model"}
+    with connect(address, additional_headers=headers, max_size=None) as page:
+        for number in range(20):
+            page.send(json.dumps({"number": number, "request": opening}))
+        page.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        page.socket.shutdown(socket.SHUT_RD)
+        page.socket.close()
 
 
 def _said_after_the_login(studio: Studio) -> tuple[str, tuple[str, ...]]:
@@ -61,6 +75,8 @@ def _said_after_the_login(studio: Studio) -> tuple[str, tuple[str, ...]]:
     assert status(studio.address, {"cookie": cookie, "host": "evil.com"})[0] == 403
     headers = {"cookie": cookie, "origin": studio.address.rstrip("/")}
     address = studio.address.replace("http", "ws") + "ws"
+    for _ in range(3):
+        _abort(address, headers)
     with connect(address, additional_headers=headers, max_size=None) as page:
         for number, path in enumerate(("bad.json", "script.m", CONTENT + ".json")):
             page.send(json.dumps({"number": number, "request": {"kind": "open", "path": path}}))

@@ -162,13 +162,19 @@ class Answers:
 
 
 async def _received(socket: WebSocket, sending: asyncio.Task[None]) -> str | None:
-    """Return the next message of the page; ``None`` if nothing can be sent to the page any more."""
+    """Return the next message of the page; ``None`` if nothing can be sent to the page any more.
+
+    After a failed transmission, ``receive_text`` raises an error that is not a ``WebSocketDisconnect``, also
+    while messages of the page are left.
+    """
     receiving = asyncio.create_task(socket.receive_text())
     try:
         await asyncio.wait((receiving, sending), return_when=asyncio.FIRST_COMPLETED)
-        return receiving.result() if receiving.done() else None
+        return None if sending.done() else receiving.result()
     finally:
-        if not receiving.done():
+        if receiving.done():
+            receiving.exception()  # an error of an ended connection is not reported
+        else:
             receiving.cancel()
 
 

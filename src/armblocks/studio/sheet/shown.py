@@ -99,6 +99,7 @@ def _block_type(kind: type[Block]) -> BlockType:
         height=box.height,
         face=_face(box),
         inputs=[port.name for port in block.input_ports()],
+        input_y=[spot.y for spot in box.inputs],
         outputs=[port.name for port in block.output_ports()],
         parameters=[
             _rule(rule, block) for rule in kind.parameters() if rule.kind is not ParameterKind.DIAGRAM

@@ -154,6 +154,8 @@ class BlockType(Message):
     height: float
     face: str
     inputs: list[str]
+    input_y: list[float]
+    """Positions of the inputs below the upper edge, px."""
     outputs: list[str]
     """Ports with default parameters."""
     parameters: list[ParameterRule]

@@ -1,0 +1,60 @@
+/** Positions of new blocks that are added by name. */
+
+export interface Rectangle {
+  x: number
+  y: number
+  width: number
+  height: number
+}
+
+/** Distance of a new block from the other blocks, with room for names and port labels, px. */
+const APART = { x: 30, y: 25 }
+const STEP = 20
+
+const overlap = (a: Rectangle, b: Rectangle): boolean =>
+  a.x < b.x + b.width + APART.x &&
+  b.x < a.x + a.width + APART.x &&
+  a.y < b.y + b.height + APART.y &&
+  b.y < a.y + a.height + APART.y
+
+const isFree = (place: Rectangle, blocks: readonly Rectangle[]): boolean =>
+  !blocks.some((block) => overlap(place, block))
+
+/** The first free place for a block at or below a position. */
+export function freeBelow(wanted: Rectangle, blocks: readonly Rectangle[]): Rectangle {
+  let at = wanted
+  while (!isFree(at, blocks)) at = { ...at, y: at.y + STEP }
+  return at
+}
+
+/**
+ * The free place for a block of a size that is nearest to the middle of the visible part; below all blocks if
+ * no place in the visible part is free.
+ */
+export function freeInView(
+  size: { width: number; height: number },
+  view: Rectangle,
+  blocks: readonly Rectangle[],
+): Rectangle {
+  const [x, y] = [view.x + (view.width - size.width) / 2, view.y + (view.height - size.height) / 2]
+  const [most, up] = [Math.floor(Math.max(x - view.x, 0) / STEP), Math.floor(Math.max(y - view.y, 0) / STEP)]
+  const near = blocks.filter((block) => overlap(view, block))
+  let best: Rectangle | null = null
+  let least = Infinity
+  for (let row = -up; row <= up; row++)
+    for (let column = -most; column <= most; column++) {
+      const distance = row * row + column * column
+      if (distance >= least) continue
+      const place = { ...size, x: x + STEP * column, y: y + STEP * row }
+      if (!isFree(place, near)) continue
+      best = place
+      least = distance
+    }
+  return (
+    best ?? {
+      ...size,
+      x: Math.min(...blocks.map((block) => block.x)),
+      y: Math.max(...blocks.map((block) => block.y + block.height)) + 2 * APART.y,
+    }
+  )
+}
