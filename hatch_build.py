@@ -10,10 +10,12 @@ documentation: everything else works without.
 from __future__ import annotations
 
 import os
+import re
 import sys
 from pathlib import Path
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+from hatchling.metadata.plugin.interface import MetadataHookInterface
 
 ROOT = Path(__file__).resolve().parent
 FRONTEND = ROOT / "frontend"
@@ -57,6 +59,28 @@ class PageBuild(BuildHookInterface):
                 build_site.build()
             if _docs_wanted():
                 build_data["force_include"]["docs/_build/html"] = DOCS_IN_WHEEL
+
+
+class ReadmeOfThePackage(MetadataHookInterface):
+    """The hook that hatchling calls for the metadata of a package: it sets the text for a package index."""
+
+    PLUGIN_NAME = "custom"
+
+    def update(self, metadata: dict[str, object]) -> None:
+        """Set the readme."""
+        text = (ROOT / "README.md").read_text(encoding="utf-8")
+        metadata["readme"] = {"content-type": "text/markdown", "text": for_package_index(text)}
+
+
+def for_package_index(readme: str) -> str:
+    """The README without pictures and links to files of the repository, which a package index does not have.
+
+    The text of a link stays. Links to web sites are unchanged.
+    """
+    without_pictures = re.sub(
+        r"<picture>.*?</picture>\n+|!\[[^\]]*\]\([^)]*\)\n+", "", readme, flags=re.DOTALL
+    )
+    return re.sub(r"\[([^\]]+)\]\((?!https?:)[^)]*\)", r"\1", without_pictures)
 
 
 def _page_needed() -> bool:

@@ -299,5 +299,8 @@ article table.docutils{margin-left:0}
 .block-entry p{margin:.2rem 0;line-height:1.35;font-size:.92em}
 .block-entry .symbol{justify-self:center}
 @media(max-width:46em){article table.docutils td:not(:first-child) code{overflow-wrap:anywhere}}
+@media(max-width:46em){article table.docutils:has(th:nth-child(5)){min-width:44rem}}
+@media(max-width:46em){article table.docutils:has(th:nth-child(7)){min-width:72rem}}
+@media(max-width:46em){article table.docutils:has(th:nth-child(5)) td code{overflow-wrap:normal!important}}
 @media(max-width:46em){article figure.wide{overflow-x:auto}article figure.wide svg{min-width:560px}}
 """

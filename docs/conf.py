@@ -36,12 +36,13 @@ html_theme_options = {
 }
 html_show_sourcelink = False
 html_copy_source = False
+html_domain_indices = False  # modules are described on the pages of their classes
 html_show_search_summary = False  # summaries are fetched, which browsers do not allow for pages from the disk
 html_static_path = ["reference/static"]
 html_css_files = ["pictures.css"]
 
 smartquotes = False  # formulas contain straight quotes and double minus signs
-myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
+myst_enable_extensions = ["attrs_inline", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 
 autodoc_member_order = "bysource"

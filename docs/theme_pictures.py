@@ -10,8 +10,8 @@ from __future__ import annotations
 import re
 
 _PICTURE = re.compile(
-    r'<picture>\n  <source media="\(prefers-color-scheme: dark\)" srcset="([^"]+)">\n'
-    r'  <img alt="([^"]+)" src="([^"]+)">\n</picture>\n'
+    r'<picture>\s*<source media="\(prefers-color-scheme: dark\)" srcset="([^"]+)">\s*'
+    r'<img alt="([^"]+)" src="([^"]+)">\s*</picture>'
 )
 
 
@@ -22,8 +22,4 @@ def show_by_theme(_app: object, _page: str, source: list[str]) -> None:
 
 def _both(found: re.Match[str]) -> str:
     dark, alternative, light = found.groups()
-    return _image(light, alternative, "light") + "\n" + _image(dark, alternative, "dark")
-
-
-def _image(path: str, alternative: str, theme: str) -> str:
-    return f"```{{image}} {path}\n:alt: {alternative}\n:class: only-{theme}\n```\n"
+    return f"![{alternative}]({light}){{.only-light}}![{alternative}]({dark}){{.only-dark}}"

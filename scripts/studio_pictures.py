@@ -8,18 +8,20 @@ from __future__ import annotations
 
 import base64
 import io
+import math
 import re
 import shutil
 import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Literal
 
 from PIL import Image
-from playwright.sync_api import Browser, Locator, Page, sync_playwright
+from playwright.sync_api import Browser, FloatRect, Locator, Page, sync_playwright
 
 import armblocks as ab
 
@@ -29,6 +31,9 @@ SCRIPT = ROOT / "tests" / "formats" / "kr180_as_printed.m"
 """The script of the paper as printed."""
 FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 PATIENCE_MS = 180_000
+THEMES: tuple[Literal["light", "dark"], ...] = ("light", "dark")
+THEME_MS = 2000
+"""Time in which the page draws its views and curves in another theme, ms."""
 MOMENTS = (0, 2.5, 5, 10)
 """Instants of the motion at which the arm is shown, s."""
 DROP = """([name, content]) => {
@@ -41,6 +46,7 @@ DROP = """([name, content]) => {
         )
 }"""
 
+NOTEBOOK = '<!doctype html><meta name="color-scheme" content="light dark"><body></body>'
 SHOW_WIDGET = """async ([script, state, samples]) => {
     const file = URL.createObjectURL(new Blob([script], { type: 'text/javascript' }))
     const { default: widget } = await import(file)
@@ -72,12 +78,11 @@ def studio(model: str) -> Generator[str]:
 
 
 @contextmanager
-def shown(browser: Browser, theme: str, size: tuple[int, int], model: str = "kr180model") -> Generator[Page]:
+def shown(browser: Browser, size: tuple[int, int], model: str = "kr180model") -> Generator[Page]:
     """Open a page of a studio that shows a model with its arm."""
     with studio(model) as link:
         page = browser.new_page(
             viewport={"width": size[0], "height": size[1]},
-            color_scheme=theme,  # pyright: ignore[reportArgumentType]
             device_scale_factor=1.5,
             reduced_motion="reduce",
         )
@@ -115,34 +120,75 @@ def taller(page: Page, by: int) -> None:
     edges = [one.bounding_box() for one in page.locator(".dv-sash").all()]
     flat = [one for one in edges if one and one["width"] > one["height"] and one["x"] <= top["x"] + 9]
     edge = min(flat, key=lambda one: abs(one["y"] - top["y"] + 30))
+    drag(page, edge, up=by)
+
+
+def wider(page: Page, by: int) -> None:
+    """Drag the right edge of the library by some pixels."""
+    library = page.locator(".palette").bounding_box()
+    assert library is not None
+    edges = [one.bounding_box() for one in page.locator(".dv-sash").all()]
+    upright = [one for one in edges if one and one["height"] > one["width"]]
+    right = library["x"] + library["width"]
+    edge = min(upright, key=lambda one: abs(one["x"] - right))
+    drag(page, edge, right=by)
+
+
+def drag(page: Page, edge: FloatRect, *, right: int = 0, up: int = 0) -> None:
+    """Drag an edge between two panels by some pixels."""
     x, y = edge["x"] + edge["width"] / 2, edge["y"] + edge["height"] / 2
     page.mouse.move(x, y)
     page.mouse.down()
-    page.mouse.move(x, y - by, steps=8)
+    page.mouse.move(x + right, y - up, steps=8)
     page.mouse.up()
 
 
-def keep(shot: Page | Locator, name: str) -> None:
-    """Write a picture with 256 colours, in double resolution."""
-    PICTURES.mkdir(exist_ok=True)
-    shown = Image.open(io.BytesIO(shot.screenshot(animations="disabled"))).convert("RGB")
-    # 256 colours look the same, and the file, which is part of the wheel, is half as large.
-    shown.quantize(256).save(PICTURES / f"{name}.png", optimize=True)
-    print(f"docs/pictures/{name}.png")
+def keep(page: Page, name: str, part: Locator | None = None) -> None:
+    """Write a picture of the page, or of a part of it, in each theme, in 1.5 times the resolution."""
+    for theme in THEMES:
+        page.emulate_media(color_scheme=theme, reduced_motion="reduce")
+        page.wait_for_timeout(THEME_MS)
+        shot = page.screenshot(animations="disabled", clip=part and inside(part))
+        taken = Image.open(io.BytesIO(shot)).convert("RGB")
+        path = PICTURES / f"{name}-{theme}.webp"
+        path.write_bytes(min(_lossless(taken), _lossy(taken), key=len))  # the pictures are part of the wheel
+        print(f"{path.relative_to(ROOT)}: {path.stat().st_size / 1000:.0f} kB", flush=True)
 
 
-def whole(browser: Browser, theme: str) -> None:
+def inside(part: Locator) -> FloatRect:
+    """The area of a part without its border; a dialog starts at a fraction of a pixel."""
+    box = part.bounding_box()
+    assert box is not None
+    left, top = math.ceil(box["x"]) + 1, math.ceil(box["y"]) + 1
+    right, bottom = math.floor(box["x"] + box["width"]) - 1, math.floor(box["y"] + box["height"]) - 1
+    return FloatRect(x=left, y=top, width=right - left, height=bottom - top)
+
+
+def _lossless(picture: Image.Image) -> bytes:
+    """The picture in 256 colours, which look the same; the smaller file without a view of a robot."""
+    data = io.BytesIO()
+    picture.quantize(256).convert("RGB").save(data, "WEBP", lossless=True, method=6)
+    return data.getvalue()
+
+
+def _lossy(picture: Image.Image) -> bytes:
+    data = io.BytesIO()
+    picture.save(data, "WEBP", quality=90, method=6, use_sharp_yuv=True)
+    return data.getvalue()
+
+
+def whole(browser: Browser) -> None:
     """The model of the paper after its run, with canvas, arm and scopes."""
-    with shown(browser, theme, (1440, 860)) as page:
+    with shown(browser, (1440, 860)) as page:
         run(page)
         at(page, 4.5)
         page.mouse.move(2, 2)
-        keep(page, f"studio-{theme}")
+        keep(page, "studio")
 
 
 def script(browser: Browser) -> None:
     """Figures 5 and 6: the script of the paper dropped on the page, and the window of the new model."""
-    with shown(browser, "light", (1440, 820)) as page:
+    with shown(browser, (1440, 820)) as page:
         page.evaluate(DROP, ["kr180.m", base64.b64encode(SCRIPT.read_bytes()).decode()])
         editor = page.locator(".robot-editor")
         editor.locator("canvas").wait_for()
@@ -154,9 +200,9 @@ def script(browser: Browser) -> None:
         keep(page, "paper-6-model")
 
 
-def robot_editor(browser: Browser, theme: str) -> None:
+def robot_editor(browser: Browser) -> None:
     """The robot editor with the dynamics of the Puma and moved joints."""
-    with shown(browser, theme, (1440, 860)) as page:
+    with shown(browser, (1440, 860)) as page:
         page.get_by_role("button", name="Menu").click()
         page.get_by_role("menuitem", name="puma560", exact=True).click()
         editor = page.locator(".robot-editor")
@@ -167,58 +213,60 @@ def robot_editor(browser: Browser, theme: str) -> None:
         editor.get_by_role("button", name="Show all of the arm").click()
         page.mouse.move(5, 850)
         page.wait_for_timeout(3000)
-        keep(page, f"robot-editor-{theme}")
+        keep(page, "robot-editor")
 
 
 def library(browser: Browser) -> None:
     """Figure 7: the blocks of the library roblocks, in the palette."""
-    with shown(browser, "light", (1440, 860)) as page:
+    with shown(browser, (1440, 640)) as page:
+        wider(page, 420)
         page.get_by_role("textbox", name="Search the library").fill("robot")
         page.wait_for_timeout(400)
-        keep(page.locator(".palette"), "paper-7-library")
+        keep(page, "paper-7-library", page.locator(".palette"))
 
 
 def dialog(browser: Browser) -> None:
     """Figure 8: the parameters of jtraj, and the configuration parameters of a slide of the paper."""
-    with shown(browser, "light", (1280, 900)) as page:
+    with shown(browser, (1280, 900)) as page:
+        page.add_style_tag(content="[role=dialog] { border-radius: 0 !important }")  # nothing in the corners
         page.locator('.react-flow__node[data-id="jtraj"]').dblclick()
         opened = page.get_by_role("dialog")
         opened.wait_for()
         page.wait_for_timeout(600)
-        keep(opened, "paper-8-jtraj")
+        keep(page, "paper-8-jtraj", opened)
         page.keyboard.press("Escape")
         opened.wait_for(state="hidden")
         page.keyboard.press("Control+e")
         opened.wait_for()
         page.wait_for_timeout(600)
-        keep(opened, "paper-configuration")
+        keep(page, "paper-configuration", opened)
 
 
-def model(browser: Browser, theme: str) -> None:
+def model(browser: Browser) -> None:
     """Figure 9: the model, alone on the sheet."""
-    with shown(browser, theme, (1440, 860)) as page:
+    with shown(browser, (1440, 860)) as page:
         page.locator(".react-flow__controls-fitview").click()
         page.wait_for_timeout(600)
-        keep(page.locator(".react-flow"), f"paper-9-model-{theme}")
+        keep(page, "paper-9-model", page.locator(".react-flow"))
 
 
 def moments(browser: Browser) -> None:
     """Figure 10: the robot view at some instants of the motion."""
-    with shown(browser, "light", (1440, 860)) as page:
+    with shown(browser, (1440, 860)) as page:
         run(page)
         for seconds in MOMENTS:
             at(page, seconds)
-            keep(page.locator(".robot"), f"paper-10-{seconds:g}s")
+            keep(page, f"paper-10-{seconds:g}s", page.locator(".robot"))
 
 
 def scopes(browser: Browser) -> None:
     """Figure 11: the three projections of the path, angles, speeds, accelerations, torques."""
-    with shown(browser, "light", (1900, 1100)) as page:
-        taller(page, 220)
+    with shown(browser, (1745, 1300)) as page:
+        taller(page, 440)
         run(page)
         at(page, 5)
         page.mouse.move(2, 2)
-        keep(page.locator(".scopes-panel"), "paper-11-scopes")
+        keep(page, "paper-11-scopes", page.locator(".scopes-panel"))
 
 
 def notebook(browser: Browser) -> None:
@@ -229,8 +277,11 @@ def notebook(browser: Browser) -> None:
     samples = base64.b64encode(widget.get_state("_frame")["_frame"]).decode()
     with tempfile.TemporaryDirectory() as folder:
         # A local file, because the widgets need no server.
-        (Path(folder) / "notebook.html").write_text("<!doctype html><body></body>", encoding="utf-8")
-        page = browser.new_page(viewport={"width": 1160, "height": 560}, device_scale_factor=1.5)
+        (Path(folder) / "notebook.html").write_text(NOTEBOOK, encoding="utf-8")
+        page = browser.new_page(
+            viewport={"width": 1160, "height": 560},
+            device_scale_factor=1.5,
+        )
         page.set_default_timeout(PATIENCE_MS)
         page.goto((Path(folder) / "notebook.html").as_uri())
         page.evaluate(SHOW_WIDGET, [str(widget._esm), {**state, "time": 4.5}, samples])
@@ -240,16 +291,13 @@ def notebook(browser: Browser) -> None:
         page.close()
 
 
-SHOTS: dict[str, Callable[[Browser], None]] = {
-    "light": lambda browser: whole(browser, "light"),
-    "dark": lambda browser: whole(browser, "dark"),
-    "editor light": lambda browser: robot_editor(browser, "light"),
-    "editor dark": lambda browser: robot_editor(browser, "dark"),
+SHOTS = {
+    "studio": whole,
+    "editor": robot_editor,
     "script": script,
     "library": library,
     "dialog": dialog,
-    "model light": lambda browser: model(browser, "light"),
-    "model dark": lambda browser: model(browser, "dark"),
+    "model": model,
     "moments": moments,
     "scopes": scopes,
     "notebook": notebook,
@@ -257,7 +305,7 @@ SHOTS: dict[str, Callable[[Browser], None]] = {
 
 
 def main(names: Sequence[str]) -> None:
-    """Take the named pictures, or all."""
+    """Take the named pictures, or all, in both themes."""
     path = shutil.which("chromium") or shutil.which("google-chrome")
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=path, args=FLAGS)

@@ -4,14 +4,14 @@
 
     ArmblocksError(ValueError)
     ├── InputError            a call was given a wrong shape, dtype, value or option
-    ├── UnknownNameError a name that is not in a list of known names; suggests the nearest
+    ├── UnknownNameError      a name that is not in a list of known names; suggests the nearest
     ├── RobotError            a robot description that contradicts itself
     ├── DiagramError          a diagram that cannot be built
     │   └── AlgebraicLoopError
     ├── FormatError           a file that cannot be read or written (file:line)
-    ├── MissingLibraryError a library of an optional extra is not installed
+    ├── MissingLibraryError   a library of an optional extra is not installed
     ├── CompileError          equations that the compiler cannot translate
-    └── SimulationError a run that failed (it keeps the results up to that time)
+    └── SimulationError       a run that failed (it keeps the results up to that time)
 
     ArmblocksWarning(UserWarning)
     ├── InertiaWarning        an inertia that no body can have
@@ -42,8 +42,8 @@ def compose_message(what: str, where: str = "", allowed: str = "", fix: str = ""
 class ArmblocksError(ValueError):
     """Base class of all errors. A message has the parts what, where, allowed and fix.
 
-    ``what`` one sentence with the user's own names and the value found; ``where`` a file:line, block
-    path, robot/link or parameter; ``allowed`` the rule or the valid names; ``fix`` one action.
+    ``what`` is one sentence with the user's own names and the value found. ``where`` is a file and line, a
+    block path, robot/link or a parameter. ``allowed`` is the rule or the valid names, and ``fix`` one action.
     """
 
     def __init__(self, what: str, *, where: str = "", allowed: str = "", fix: str = "") -> None:
@@ -182,7 +182,7 @@ class AlgebraicLoopError(DiagramError):
 
 
 class FormatError(ArmblocksError):
-    """A file that cannot be read or written; ``where`` is file:line."""
+    """A file that cannot be read or written; ``where`` is ``file:line``."""
 
 
 class MissingLibraryError(ArmblocksError):

@@ -5,11 +5,16 @@ import io
 import json
 import os
 import re
+import runpy
+import shlex
 import warnings
 from pathlib import Path
+from typing import Any
 
 import pytest
+from typer.main import get_command
 
+from armblocks.cli.main import app
 from armblocks.errors import InertiaWarning
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -45,6 +50,32 @@ def test_the_code_of_a_page_runs(page: Path, tmp_path: Path) -> None:
         os.chdir(before)
 
 
+TEXT = re.compile(r"^```text\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+INLINE = re.compile(r"`(armblocks [^`\n]+)`")
+
+
+def commands(page: Path) -> list[str]:
+    """Lines of examples, and code inside sentences and tables, that begin with ``armblocks``."""
+    text = page.read_text(encoding="utf-8")
+    lines = "".join(TEXT.findall(text)).splitlines()
+    return [line for line in lines if line.startswith("armblocks ")] + INLINE.findall(text)
+
+
+def test_commands_of_the_documents_exist_with_their_options() -> None:
+    """Commands of the examples and of the text are parsed, not run."""
+    group: Any = get_command(app)
+    context = group.make_context("armblocks", ["blocks"], resilient_parsing=True)
+    for page in PAGES:
+        for line in commands(page):
+            words = [word.strip("[]") for word in shlex.split(line, comments=True)[1:]]
+            command = group if words[0].startswith("-") else group.get_command(context, words.pop(0))
+            assert command is not None, f"{page.name}: {line}"
+            try:
+                command.make_parser(type(context)(command)).parse_args(words)
+            except Exception as error:
+                pytest.fail(f"{page.name}: {line}: {error}")
+
+
 def test_the_readme_begins_with_the_two_commands() -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     first = re.search(r"^```\w*\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
@@ -73,3 +104,20 @@ def test_rows_of_tables_have_a_cell_for_each_column() -> None:
             rows = [re.sub(r"`[^`]*`", "", row).replace("\\|", "") for row in table.splitlines()]
             wrong += [f"{page.name}: {row}" for row in rows if row.count("|") != rows[0].count("|")]
     assert wrong == []
+
+
+def test_pictures_of_the_studio_are_shown_in_both_themes() -> None:
+    """Each picture has a light and a dark file, and a page that shows both; Sphinx shows one by the theme."""
+    shown = " ".join(page.read_text(encoding="utf-8") for page in PAGES)
+    pictures = ROOT / "docs" / "pictures"
+    for path in pictures.glob("*.webp"):
+        assert f'pictures/{path.name}">' in shown, path.name
+        assert {f"{path.stem.rpartition('-')[0]}-{theme}.webp" for theme in ("light", "dark")} <= {
+            other.name for other in pictures.iterdir()
+        }
+    namespace = runpy.run_path(str(ROOT / "docs" / "theme_pictures.py"))
+    for page in PAGES:
+        source = [page.read_text(encoding="utf-8")]
+        namespace["show_by_theme"](None, page.stem, source)
+        assert "<picture>" not in source[0]
+        assert source[0].count("{.only-light}") == source[0].count("{.only-dark}")

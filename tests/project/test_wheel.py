@@ -2,11 +2,13 @@
 
 import inspect
 import os
+import re
 import subprocess
 import sys
 import zipfile
 import zlib
 from collections.abc import Iterator
+from email import message_from_bytes
 from enum import Enum
 from functools import cached_property
 from pathlib import Path
@@ -29,6 +31,15 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_wheel_is_platform_independent(wheel: Path) -> None:
     assert wheel.name.endswith("-py3-none-any.whl")
+
+
+def test_the_description_for_a_package_index_has_no_links_to_files(wheel: Path) -> None:
+    with zipfile.ZipFile(wheel) as content:
+        (name,) = (name for name in content.namelist() if name.endswith(".dist-info/METADATA"))
+        description = message_from_bytes(content.read(name)).get_payload()
+    assert isinstance(description, str)
+    assert description.startswith("# armblocks\n") and "## A short tour" in description
+    assert re.findall(r"\]\((?!https?:)|(?:src|srcset)=", description) == []
 
 
 def test_the_wheel_contains_the_shipped_files(wheel: Path) -> None:

@@ -60,9 +60,12 @@ function show(told: Shown): void {
 function draw(): void {
   if (!shown) return
   const { dark, run, scopes, arm } = shown
+  const scheme = dark ? 'dark' : 'light'
+  // The provider sets the attribute after the effects of its children, in which the plots read their colours.
+  document.documentElement.dataset['mantineColorScheme'] = scheme
   root.render(
     <StrictMode>
-      <MantineProvider theme={theme} forceColorScheme={dark ? 'dark' : 'light'}>
+      <MantineProvider theme={theme} defaultColorScheme={scheme} forceColorScheme={scheme}>
         <main className="notebook-views">
           <div className="beside">
             {run && scopes && <Scopes />}

@@ -267,7 +267,9 @@ function useFloor(
     }
     low -= 0.06 * scene.reach
     const floor = low < foot ? step * Math.floor(low / step) : Infinity
-    if (lowest.name !== scene.name || floor < lowest.floor - 1e-9) setLowest({ name: scene.name, floor })
+    const lower = (than: typeof lowest) => than.name !== scene.name || floor < than.floor - 1e-9
+    // Several frames may come before the state changes; a later one does not raise the floor again.
+    if (lower(lowest)) setLowest((before) => (lower(before) ? { name: scene.name, floor } : before))
   })
   return lowest.name === scene.name ? Math.min(foot, lowest.floor) : foot
 }

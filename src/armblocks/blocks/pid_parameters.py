@@ -96,7 +96,7 @@ def pid_example(kind: str, **parameters: Any) -> WorkedExample:
         else {"u": made("Sum", signs="+-").by(u1=step, u2=plant.by(u="y"))}
     )
     return WorkedExample(
-        shows="The plant follows a step of the reference; below, the output of the controller.",
+        shows="The plant follows a step of the reference; the controller acts most at the step.",
         parameters=parameters,
         inputs=feeds,
         shown=(step, "plant/y", "y"),

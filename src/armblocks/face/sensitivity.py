@@ -81,7 +81,7 @@ def sensitivity(
     The traced equations are differentiated. The derivatives are integrated together with the equations,
     natively, with the same error control. The times of events, of jumps at known times and of the arrival of
     delayed jumps are differentiated too, and so are implicit equations. ``values``: other values of
-    parameters. ``settings``: settings of the run, as in :func:`simulate`.
+    parameters. The settings of the run are as in :func:`simulate`.
 
     Raises ``UnknownNameError`` for unknown names. Raises ``InputError`` for a table that is read by index,
     for a parameter of which only the integer part has an effect, for a parameter that shifts an event at the

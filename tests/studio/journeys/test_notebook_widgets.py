@@ -116,10 +116,18 @@ def test_the_widgets_of_a_result_share_their_time_cursor(notebook: Page) -> None
         return new Set(new Uint32Array(data.buffer)).size
     }"""
     assert scopes.locator(".chart canvas").first.evaluate(inked) > 8
+    in_grid_tone = """(canvas) => {
+        const tone = getComputedStyle(document.documentElement).getPropertyValue('--grid').trim()
+        const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height)
+        const hex = (k) => '#' + [0, 1, 2].map((n) => data[k + n].toString(16).padStart(2, '0')).join('')
+        for (let k = 0; k < data.length; k += 4) if (data[k + 3] === 255 && hex(k) === tone) return true
+        return false
+    }"""
     pages = [frame.locator("html") for frame in (scopes, arm)]
     notebook.emulate_media(color_scheme="dark")
     for page in pages:
         expect(page).to_have_attribute("data-mantine-color-scheme", "dark")
+    wait_until(notebook, lambda: scopes.locator(".chart canvas").first.evaluate(in_grid_tone))
     notebook.evaluate("document.body.dataset.jpThemeLight = 'true'")  # as JupyterLab sets its theme
     for page in pages:
         expect(page).to_have_attribute("data-mantine-color-scheme", "light")
