@@ -1,10 +1,9 @@
-"""Builds the page of the studio and the documentation while a wheel of armblocks is built, which brings both.
+"""Builds the page of the studio and the documentation for wheels of armblocks, which contain both.
 
-An editable installation builds neither: there ``armblocks studio`` and ``armblocks docs`` build what they
-show when they are first asked for. Nothing is built either where it is there and its sources are as they
-were, or where the sources are not there. A source distribution brings both as they were built, or builds
-them again. ``ARMBLOCKS_SKIP_WEB=1`` leaves the page of the studio out, ``ARMBLOCKS_SKIP_DOCS=1`` the
-documentation: everything else works without.
+An editable installation builds neither: ``armblocks studio`` and ``armblocks docs`` build them at the first
+use. Nothing is built if the result is up to date or the sources are missing. A source distribution contains
+the built page and the sources of the documentation. ``ARMBLOCKS_SKIP_WEB=1`` omits the page of the studio,
+``ARMBLOCKS_SKIP_DOCS=1`` the documentation; everything else works without them.
 """
 
 from __future__ import annotations
@@ -25,13 +24,13 @@ sys.path[:0] = [str(FRONTEND), str(DOCS)]
 
 
 class PageBuild(BuildHookInterface):
-    """The hook that hatchling calls for every wheel, editable ones too, and every source distribution."""
+    """The hook of hatchling for all wheels, including editable ones, and for source distributions."""
 
     PLUGIN_NAME = "custom"
 
     def dependencies(self) -> list[str]:
-        """What the builds need: Node.js as a wheel where the system has none, Sphinx, and armblocks' own."""
-        # Of an editable build hatchling tells this method nothing; pip calls the hook by this name.
+        """Build dependencies: Node.js as a wheel if the system has none, Sphinx, and those of armblocks."""
+        # This method has no argument for editable builds; pip calls the hook with this name.
         if "get_requires_for_build_editable" in sys.argv:
             return []
         needed: list[str] = []
@@ -40,12 +39,12 @@ class PageBuild(BuildHookInterface):
 
             needed += [] if system_npm() else [NODE_WHEEL]
         if self.target_name == "wheel" and _docs_needed():
-            # The pages are written from the code: it is imported, and the examples of the blocks run.
+            # The pages are generated from the imported code and from runs of the blocks' examples.
             needed += [*self.metadata.core.dependencies, *self.metadata.core.optional_dependencies["docs"]]
         return needed
 
     def initialize(self, version: str, build_data: dict[str, dict[str, str]]) -> None:
-        """Build what is not there as it should be, and put the documentation into the wheel."""
+        """Build what is missing or outdated, and add the documentation to the wheel."""
         if version == "editable":
             return
         if _page_needed():
@@ -84,7 +83,7 @@ def for_package_index(readme: str) -> str:
 
 
 def _page_needed() -> bool:
-    """Whether the page of the studio is to be built."""
+    """Whether the page of the studio must be built."""
     if os.environ.get("ARMBLOCKS_SKIP_WEB") == "1" or not FRONTEND.is_dir():
         return False
     from build_page import needed
@@ -93,12 +92,12 @@ def _page_needed() -> bool:
 
 
 def _docs_wanted() -> bool:
-    """Whether the wheel gets the documentation."""
+    """Whether the wheel contains the documentation."""
     return os.environ.get("ARMBLOCKS_SKIP_DOCS") != "1" and DOCS.is_dir()
 
 
 def _docs_needed() -> bool:
-    """Whether the documentation is to be built."""
+    """Whether the documentation must be built."""
     if not _docs_wanted():
         return False
     import build_site

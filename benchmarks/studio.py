@@ -392,7 +392,7 @@ def studio_part(repeats: int) -> list[str]:
     late = sorted(waits)[int(0.95 * len(waits))]
     rows.append(
         [
-            f"the same: an edit answered, 95th percentile of {len(waits)} (largest {max(waits):.3f} s)",
+            f"the same: reply to an edit, 95th percentile of {len(waits)} (largest {max(waits):.3f} s)",
             f"{late:.3f} s",
             f"{min(waits):.3f} s",
             "0.2 s",
@@ -408,7 +408,7 @@ def run_rows(browser: Browser, repeats: int) -> list[list[str]]:
     firsts, lasts, arrivals = zip(*run_times(browser, repeats))
     return [
         median_row("Run on `kr180model`, cached → first samples drawn", list(firsts), 0.3),
-        median_row("of that, until they had come to the page", list(arrivals), 0.3),
+        median_row("of that, until their arrival in the page", list(arrivals), 0.3),
         median_row("the same → whole 10 s run streamed and drawn", list(lasts), 1.5),
     ]
 

@@ -280,7 +280,7 @@ def figure_html(figure: Figure) -> str:
 def style_sheet() -> str:
     """CSS: colours of the figures by the switch of the theme, and the rules of the block pages.
 
-    A picture in a file of its own has the colours of both themes and follows ``color-scheme`` of the page.
+    A picture in a separate file contains the colours of both themes and follows ``color-scheme`` of the page.
     """
     light, dark = (f"color-scheme:{theme};{theme_variables(theme)}" for theme in ("light", "dark"))
     return (

@@ -31,7 +31,7 @@ def _lighter(mark: Mark) -> Mark:
 
 
 def kept_points(points: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """A mask (N,) of the points of a line (N, 2) that are kept: its ends, and the points where it bends.
+    """A mask (N,) of the points of a line (N, 2) that remain: its ends and its corners.
 
     Source: Douglas and Peucker, "Algorithms for the reduction of the number of points", 1973.
     """

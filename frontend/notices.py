@@ -1,7 +1,8 @@
-"""The notices of the packages whose code, styles or fonts the page of the studio contains.
+"""The third-party notices of the packages in the page of the studio.
 
-The bundler lists the packages (``bundled_packages.ts``). Their licence texts come from their folders in
-``node_modules``, or from ``frontend/licences`` for packages that are published without one.
+The bundler lists packages with code, styles or fonts in the page (``bundled_packages.ts``). Their licence
+texts come from their folders in ``node_modules``, or from ``frontend/licences`` for packages without a
+licence file.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from pathlib import Path
 
 FRONTEND = Path(__file__).resolve().parent
 LICENCES = FRONTEND / "licences"
-"""Texts of packages that bring none, by the name of the package with ``-`` for ``/``."""
+"""Licence texts of packages without a licence file, by package name with ``-`` for ``/``."""
 FILE = "THIRD-PARTY-NOTICES.txt"
 LIST = "bundled-packages.json"
 LICENCE_FILES = ("licence", "license", "copying", "notice", "unlicense")
@@ -40,7 +41,7 @@ def write_notices(web: Path) -> None:
 
 
 def notices(packages: Iterable[Package]) -> str:
-    """The file of notices: each package once, under a rule."""
+    """The file of notices: each package once, after a horizontal rule."""
     once = {(package.name, package.version): package for package in packages}
     rule = "-" * 80
     parts = [
@@ -51,7 +52,7 @@ def notices(packages: Iterable[Package]) -> str:
 
 
 def package(folder: str, root: Path = FRONTEND) -> Package:
-    """The package of a folder of ``node_modules``; exits with a message where its licence text is missing."""
+    """The package of a folder of ``node_modules``; exits with a message if its licence text is missing."""
     described = json.loads((root / folder / "package.json").read_text(encoding="utf-8"))
     name = described["name"]
     own = LICENCES / f"{name.replace('/', '-')}.txt"
@@ -61,7 +62,7 @@ def package(folder: str, root: Path = FRONTEND) -> Package:
     ]
     if not texts:
         raise SystemExit(
-            f"the package {name} is part of the page of the studio and brings no licence text:\n"
-            f"put the text of its repository into {own}"
+            f"the package {name} is part of the page of the studio and has no licence text:\n"
+            f"copy the text from its repository to {own}"
         )
     return Package(name, described["version"], described.get("license", "see below"), "\n\n".join(texts))

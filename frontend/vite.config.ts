@@ -4,12 +4,12 @@ import { defineConfig, type Plugin, type UserConfig } from 'vite'
 
 import { bundledPackages } from './bundled_packages'
 
-/** Themes of the dock layout that the page does not offer: they are most of its styles. */
+/** Unused themes of the dock layout, which are most of its styles. */
 const OTHER_THEME = /\.dockview-theme-(?!(light|dark)(?![\w-]))/
-/** A font for browsers that are too old for the page anyway. */
+/** A font format for browsers that do not support the page. */
 const OLD_FONT = /,\s*url\([^)]*\.woff\)\s*format\('woff'\)/
 
-/** Takes styles away that nobody sees. */
+/** Removes unused styles. */
 const unseen: Exclude<NonNullable<NonNullable<UserConfig['css']>['postcss']>, string>['plugins'] = [
   {
     postcssPlugin: 'unseen',
@@ -26,7 +26,7 @@ const unseen: Exclude<NonNullable<NonNullable<UserConfig['css']>['postcss']>, st
   },
 ]
 
-/** What the style sheet of the font says that this part of it has: `unicode-range` of the Latin part. */
+/** The `unicode-range` of the Latin part, from the style sheet of the font. */
 const LATIN =
   'U+20-7E,U+A0-FF,U+131,U+152-153,U+2BB-2BC,U+2C6,U+2DA,U+2DC,U+304,U+308,U+329,U+2000-206F,' +
   'U+20AC,U+2122,U+2191,U+2193,U+2212,U+2215,U+FEFF,U+FFFD'
@@ -45,8 +45,7 @@ function characters(ranges: string): string {
 }
 
 /**
- * The part of the sans that every page needs, without the weights and the alternates that none shows: half
- * the size.
+ * The Latin part of the sans-serif font without unused weights and alternates: half the size.
  */
 function lighterSans(): Plugin {
   return {
@@ -70,7 +69,7 @@ export default defineConfig({
   build: {
     outDir: process.env['ARMBLOCKS_OUT'] ?? '../src/armblocks/studio/web',
     emptyOutDir: true,
-    assetsInlineLimit: 0, // the page's security policy allows no fonts and pictures but the server's own
+    assetsInlineLimit: 0, // the security policy of the page allows only fonts and pictures of the server
     chunkSizeWarningLimit: 1200,
   },
 })

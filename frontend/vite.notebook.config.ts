@@ -4,8 +4,7 @@ import { defineConfig } from 'vite'
 import { bundledPackages } from './bundled_packages'
 
 /**
- * The views that a notebook shows, as one script and one style sheet: `studio/notebook.py` puts them into a
- * frame.
+ * Bundles the notebook views as one script and one style sheet; `studio/notebook.py` embeds them in a frame.
  */
 export default defineConfig({
   plugins: [react(), bundledPackages()],

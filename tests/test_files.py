@@ -79,7 +79,7 @@ def test_writing_to_the_path_of_a_folder_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_path_with_a_nul_character_is_refused() -> None:
-    with pytest.raises(FormatError, match="the path holds a NUL character"):
+    with pytest.raises(FormatError, match="the path contains a NUL character"):
         write_atomically("a\0b", b"")
 
 

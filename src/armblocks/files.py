@@ -135,7 +135,9 @@ def sync_folder(folder: Path) -> None:
 def _writable_target(path: str | Path) -> Path:
     """The path to write: the target, if ``path`` is a symbolic link."""
     if "\0" in str(path):
-        raise FormatError("the path holds a NUL character", where=repr(str(path)), fix="choose another name")
+        raise FormatError(
+            "the path contains a NUL character", where=repr(str(path)), fix="choose another name"
+        )
     target = Path(os.path.realpath(path))
     folder = target.parent
     if not folder.is_dir():

@@ -1,6 +1,6 @@
 """Lazy imports of exported names, so that ``import armblocks`` is fast.
 
-A package states its names twice: for type checkers as plain imports under ``TYPE_CHECKING``, and for the
+A package lists its names twice: for type checkers as plain imports under ``TYPE_CHECKING``, and for the
 interpreter as a table for :func:`lazy_exports`. A test compares the two.
 """
 

@@ -1,4 +1,4 @@
-"""What the modules in the folder of a package define: a new file there needs no list to be known."""
+"""Finds the definitions in the modules of a package's folder, so that a new file needs no registration."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def classes_with(package: str, attribute: str) -> Iterator[tuple[str, str]]:
     """The name and the module of each class in a package that assigns a class attribute.
 
     The source text is searched instead of imported: importing all blocks takes a fifth of a second, and a
-    program needs few of them. The attribute is indented by four spaces, as everywhere in this project.
+    program uses few of them. The attribute is indented by four spaces, as everywhere in this project.
     """
     folder = importlib.import_module(package)
     line = re.compile(rb"^class (\w+)|^    %b(?::[^=\n]*)? = " % attribute.encode(), re.MULTILINE)

@@ -378,13 +378,13 @@ def test_connections_of_inconsistent_sizes_or_sample_times_are_refused() -> None
 
 def test_responses_with_inconsistent_times_or_shapes_are_refused() -> None:
     system = random_system(0)
-    with pytest.raises(InputError, match="the instants do not rise"):
+    with pytest.raises(InputError, match="the times are not ascending"):
         system.response([0.0, 0.0], np.zeros((2, 2)))
     with pytest.raises(InputError, match="the inputs have shape"):
         system.response([0.0, 1.0], np.zeros((2, 3)))
     with pytest.raises(InputError, match="the start has shape"):
         system.response([0.0, 1.0], np.zeros((2, 2)), [1.0])
-    with pytest.raises(InputError, match=r"the instants are not 0.1 s apart"):
+    with pytest.raises(InputError, match=r"the times are not 0.1 s apart"):
         random_system(0, dt=0.1).response([0.0, 1.0], np.zeros((2, 2)))
 
 

@@ -80,7 +80,7 @@ def test_samples_before_begin_are_ignored_and_several_signals_are_columns() -> N
 def test_unsuitable_signals_and_unknown_options_are_refused() -> None:
     with pytest.raises(InputError, match=r"3 segments of 6 samples are requested"):
         signal_spectrum(np.arange(7.0), np.arange(7.0), averages=3)
-    with pytest.raises(InputError, match=r"there are fewer than two instants"):
+    with pytest.raises(InputError, match=r"there are fewer than two recorded times"):
         signal_spectrum([1.0], [1.0])
     with pytest.raises(InputError, match=r"a signal is not finite"):
         signal_spectrum([0.0, 1.0, 2.0], [1.0, np.nan, 2.0])

@@ -86,7 +86,8 @@ def test_a_file_names_the_function_and_needs_trust(tmp_path: Path) -> None:
     assert '"function": ""' in text
     document.write_text(text.replace('"function": ""', '"function": "control.py:law"'))
     with pytest.raises(
-        FormatError, match=r"d\.json:\d+.*'control\.py:law' is Python code, and files run no code unasked"
+        FormatError,
+        match=r"d\.json:\d+.*'control\.py:law' is Python code, which is run only for a trusted diagram",
     ):
         ab.load_diagram(document)
     diagram = ab.load_diagram(document, trust=True)

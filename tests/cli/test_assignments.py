@@ -84,7 +84,7 @@ def test_the_message_names_the_entry_of_a_vector_that_is_not_a_number() -> None:
 
 
 def test_a_vector_with_a_missing_number_is_refused() -> None:
-    with pytest.raises(InputError, match=r"',' is not understood here, .* in column 4: \[1,»,3\]"):
+    with pytest.raises(InputError, match=r"',' is not allowed here, .* in column 4: \[1,»,3\]"):
         parse_value("1,,3")
 
 

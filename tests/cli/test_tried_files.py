@@ -1,4 +1,5 @@
-"""Hand-written files for ``armblocks run``: bad files are refused, good files agree with closed forms."""
+"""Hand-written files for ``armblocks run``: invalid files are refused, valid files agree with closed
+forms."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ import pytest
 from small_functions import traced
 
 from armblocks import user_folders
-from armblocks.compiler import Kernel, cache, compile_function, recall
+from armblocks.compiler import Kernel, cache, cached_kernel, compile_function
 from armblocks.compiler.tape import Tape
 from armblocks.equations import TracedFunction
 
@@ -42,7 +42,7 @@ def counting(calls: list[str]) -> TracedFunction:
 def test_a_cached_function_is_not_traced_again(folder: Path) -> None:
     calls: list[str] = []
     for _ in range(3):
-        kernel = recall("my key", lambda: counting(calls))
+        kernel = cached_kernel("my key", lambda: counting(calls))
         np.testing.assert_allclose(kernel(A), EXPECTED, rtol=1e-15)
         np.testing.assert_allclose(kernel(np.tile(A, (9, 1)))[8], EXPECTED, rtol=1e-15)
         assert kernel.inputs == function().inputs
@@ -51,7 +51,7 @@ def test_a_cached_function_is_not_traced_again(folder: Path) -> None:
         assert kernel.name == "cached"
     assert calls == ["traced"]
     assert len(files(folder)) == 4  # record, tape, code for one sample, code for batches
-    recall("another key", lambda: counting(calls))
+    cached_kernel("another key", lambda: counting(calls))
     assert calls == ["traced", "traced"]
 
 
@@ -85,24 +85,24 @@ def flip(data: bytes) -> bytes:
 )
 def test_damaged_files_are_written_again(folder: Path, damage: object) -> None:
     calls: list[str] = []
-    before = recall("key", lambda: counting(calls))(A)
+    before = cached_kernel("key", lambda: counting(calls))(A)
     whole = {path: path.read_bytes() for path in files(folder)}
     for path, data in whole.items():
         path.write_bytes(damage(len(data) if damage is os.urandom else data))  # type: ignore[operator]
-    assert np.array_equal(recall("key", lambda: counting(calls))(A), before)
+    assert np.array_equal(cached_kernel("key", lambda: counting(calls))(A), before)
     assert calls == ["traced", "traced"]
     assert {path: path.read_bytes() for path in files(folder)} == whole
 
 
 def test_a_missing_tape_is_traced_again_when_it_is_needed(folder: Path) -> None:
     calls: list[str] = []
-    recall("key", lambda: counting(calls))(A)
+    cached_kernel("key", lambda: counting(calls))(A)
     for path in files(folder):
         content = cache.load(path.stem)
         assert content is not None
         if content.startswith(b"armblocks tape"):
             path.unlink()
-    kernel = recall("key", lambda: counting(calls))
+    kernel = cached_kernel("key", lambda: counting(calls))
     kernel(A)
     assert calls == ["traced"]
     assert isinstance(kernel.tape, Tape)
@@ -111,7 +111,7 @@ def test_a_missing_tape_is_traced_again_when_it_is_needed(folder: Path) -> None:
 
 def test_a_tape_or_record_of_another_version_is_written_again(folder: Path) -> None:
     calls: list[str] = []
-    kernel = recall("key", lambda: counting(calls))
+    kernel = cached_kernel("key", lambda: counting(calls))
     kernel(A)
     for path in files(folder):
         content = cache.load(path.stem) or b""
@@ -119,7 +119,7 @@ def test_a_tape_or_record_of_another_version_is_written_again(folder: Path) -> N
             cache.store(path.stem, b'{"name": 3}')
         elif content.startswith(b"armblocks tape"):
             cache.store(path.stem, b"old tape")
-    again = recall("key", lambda: counting(calls))
+    again = cached_kernel("key", lambda: counting(calls))
     assert again.tape == kernel.tape
     assert calls == ["traced", "traced"]
 
@@ -130,7 +130,7 @@ def test_a_folder_that_cannot_be_written_does_not_raise_an_error(
     blocked = tmp_path / "file"
     blocked.write_text("not a folder")
     monkeypatch.setenv("ARMBLOCKS_CACHE_DIR", str(blocked / "cache"))
-    np.testing.assert_allclose(recall("key", function)(A), EXPECTED, rtol=1e-15)
+    np.testing.assert_allclose(cached_kernel("key", function)(A), EXPECTED, rtol=1e-15)
     assert blocked.read_text() == "not a folder"
 
 
@@ -139,14 +139,14 @@ def test_a_full_disk_leaves_no_files(folder: Path, monkeypatch: pytest.MonkeyPat
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(Path, "replace", full)
-    np.testing.assert_allclose(recall("key", function)(A), EXPECTED, rtol=1e-15)
+    np.testing.assert_allclose(cached_kernel("key", function)(A), EXPECTED, rtol=1e-15)
     assert files(folder) == []
 
 
 def test_an_empty_variable_switches_the_cache_off(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ARMBLOCKS_CACHE_DIR", "")
     assert cache.folder() is None
-    np.testing.assert_allclose(recall("key", function)(A), EXPECTED, rtol=1e-15)
+    np.testing.assert_allclose(cached_kernel("key", function)(A), EXPECTED, rtol=1e-15)
     cache.store("0" * 64, b"nothing")
     assert cache.load("0" * 64) is None
 
@@ -245,7 +245,7 @@ def test_edits_of_each_package_that_generates_code_change_the_fingerprint(
 
 def _work(folder: str, results: "multiprocessing.Queue[list[float]]") -> None:
     os.environ["ARMBLOCKS_CACHE_DIR"] = folder
-    kernel: Kernel = recall("shared key", function)
+    kernel: Kernel = cached_kernel("shared key", function)
     results.put(kernel(A).tolist())
 
 

@@ -22,7 +22,7 @@ from armblocks.diagram import PortRef, structure
 from armblocks.diagram.structure import MOST_BLOCKS
 from armblocks.errors import AlgebraicLoopError, ArmblocksError, ArmblocksWarning, RobotError
 from armblocks.formats import list_robots, load_robot, write_robot
-from armblocks.robot import JointLimits, Link, Motor, Prismatic, Revolute, Robot, doubts
+from armblocks.robot import JointLimits, Link, Motor, Prismatic, Revolute, Robot, plausibility_findings
 from armblocks.spatial import transl
 
 MOST_CHARACTERS = 400
@@ -253,7 +253,7 @@ DOUBTFUL: list[tuple[dict[str, Any], str]] = [
 def test_a_probable_error_of_unit_or_sign_raises_a_warning(
     fields: dict[str, Any], words: str, tmp_path: Path
 ) -> None:
-    (text,) = map(str, doubts(arm(**fields)))
+    (text,) = map(str, plausibility_findings(arm(**fields)))
     assert words in text
     assert len(text) < MOST_CHARACTERS
     (tmp_path / "arm.json").write_bytes(write_robot(arm(**fields)))
@@ -263,10 +263,10 @@ def test_a_probable_error_of_unit_or_sign_raises_a_warning(
 
 
 def test_plausible_robots_raise_no_warnings() -> None:
-    assert doubts(arm(joint=limited(-2 * math.pi, 2 * math.pi))) == ()
-    assert doubts(arm(length=5.0, gravity=(0.0, 0.0, -1.62))) == ()
-    assert doubts(arm(gravity=np.zeros(3))) == ()
+    assert plausibility_findings(arm(joint=limited(-2 * math.pi, 2 * math.pi))) == ()
+    assert plausibility_findings(arm(length=5.0, gravity=(0.0, 0.0, -1.62))) == ()
+    assert plausibility_findings(arm(gravity=np.zeros(3))) == ()
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         for name in list_robots():
-            assert doubts(load_robot(name)) == ()
+            assert plausibility_findings(load_robot(name)) == ()

@@ -97,7 +97,7 @@ def test_an_initial_state_of_another_diagram_is_refused() -> None:
 
 SAMPLE_TIMES: list[tuple[Any, str]] = [
     (0, "the sample time is [0.0]"),
-    (-1, "but 't' changes all the time"),
+    (-1, "but 't' changes continuously"),
     (-2, "the sample time is [-2.0]"),
     (math.nan, "the value is nan"),
     (math.inf, "the value is inf"),

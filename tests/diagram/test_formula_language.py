@@ -1,4 +1,4 @@
-"""Formulas for values: arrays as MATLAB writes them, the matrix product, and nothing that is code."""
+"""Formulas for values: arrays in MATLAB's syntax, the matrix product, and rejection of Python code."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def test_values_are_those_of_linear_algebra(text: str, expected: object) -> None
         "v % 2",
     ],
 )
-def test_code_is_no_formula(text: str) -> None:
+def test_python_code_is_refused(text: str) -> None:
     with pytest.raises(ArmblocksError) as found:
         value(text)
     assert "block 'b', parameter 'p'" in str(found.value)
@@ -118,28 +118,28 @@ def test_code_is_no_formula(text: str) -> None:
         ("eye(1.5)", "eye: 1.5 is not a number of elements"),
         ("zeros(1000, 1000)", r"zeros: an array would have 1e\+06 elements; the most are 100000"),
         ("eye(1, 2, 3)", "eye is called with 3 arguments.*Allowed: 0 to 2"),
-        ("[0:0:1]", "a range: the steps do not lead"),
+        ("[0:0:1]", "a range: the steps go away"),
         ("eye(v)", "eye: 3 numbers are given as a size"),
         ("{1}", "a cell array is not a number"),
         ("v{1}", "cell arrays are not supported in formulas"),
         ("v.mass", "a number has no field 'mass'"),
         ("k + 'deg'", "the text 'deg' is not a number"),
         ("k % 2", r"'%' starts a comment in MATLAB.*write mod\(a, b\)"),
-        ("k = 2", r"'=' is not understood here, in column 3: k »= 2.*compare with '=='"),
-        ("k if on else n", r"'if' is not understood here.*write if\(condition, yes, no\)"),
-        ("k; n", r"';' is not understood here"),
+        ("k = 2", r"'=' is not allowed here, in column 3: k »= 2.*compare with '=='"),
+        ("k if on else n", r"'if' is not allowed here.*write if\(condition, yes, no\)"),
+        ("k; n", r"';' is not allowed here"),
         ("3i", "'3i' is an imaginary number"),
-        ("2*(k +\n* n)", r"'\*' is not understood here, expected a value, in line 2, column 1: »\* n"),
+        ("2*(k +\n* n)", r"'\*' is not allowed here, expected a value, in line 2, column 1: »\* n"),
         ("a = @sin", "function handles"),
         ("word*2", "'word' is str, which is not a number.*write word alone"),
     ],
 )
-def test_messages_say_what_does_not_fit(text: str, message: str) -> None:
+def test_error_messages_name_position_and_reason(text: str, message: str) -> None:
     with pytest.raises(InputError, match=f"(?s)block 'b', parameter 'p': .*{message}"):
         value(text)
 
 
-def test_kinds_follow_the_parameter() -> None:
+def test_the_value_of_a_formula_has_the_kind_of_its_parameter() -> None:
     def rule(kind: ParameterKind, **more: object) -> Parameter:
         return Parameter(name="p", kind=kind, doc="a value", default=REQUIRED, **more)  # pyright: ignore
 

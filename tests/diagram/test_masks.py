@@ -1,4 +1,4 @@
-"""Masks: a diagram with parameters of its own is the diagram with the numbers put in."""
+"""Masks: a diagram with mask parameters equals the diagram with the numbers in place of the formulas."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from armblocks.formats import diagram_from_bytes, diagram_to_bytes, load_robot
 
 
 def spring() -> Diagram:
-    """A mass on a spring, with what people know of it as its parameters: x'' = F/m - w^2 x."""
+    """A mass on a spring with mass and natural frequency as mask parameters: x'' = F/m - w^2 x."""
     builder = DiagramBuilder("spring")
     m = builder.parameter("m", 2.0, unit="kg", doc="mass", above=0.0)
     builder.parameter("f", 0.5, unit="Hz", doc="natural frequency", above=0.0)
@@ -64,7 +64,7 @@ def oscillator(masked: bool) -> Diagram:
     return builder.build()
 
 
-def test_a_mask_is_the_same_as_the_numbers_put_in() -> None:
+def test_a_diagram_with_masks_equals_the_diagram_with_numbers() -> None:
     plain = DiagramBuilder("plain")
     shake = plain.add("shake", SineWave(amplitude=4.0))
     outs = []
@@ -82,7 +82,7 @@ def test_a_mask_is_the_same_as_the_numbers_put_in() -> None:
     assert masked["one/out"][0] == 0.75
 
 
-def test_values_follow_through_all_levels() -> None:
+def test_formulas_are_evaluated_on_all_levels() -> None:
     diagram = with_parameters(oscillator(masked=True), {"K": 8.0, "one.f": 1.0})
     inner = {name: diagram.blocks[name].parameter_value("diagram") for name in ("one", "two")}
     assert inner["one"].blocks["push"].parameter_value("gain") == 0.125
@@ -93,7 +93,7 @@ def test_values_follow_through_all_levels() -> None:
     assert diagram.blocks["two"].stated_value("m") == ParameterFormula("K/2")
 
 
-def test_tuning_a_mask_parameter_compiles_nothing() -> None:
+def test_mask_parameters_are_tuned_without_compilation() -> None:
     model = ab.compile_diagram(oscillator(masked=True))
     compiled = model.compiled
     run = ab.begin(model, stop_time=2.0, solver="RK4", step=0.01)
@@ -110,9 +110,9 @@ def test_tuning_a_mask_parameter_compiles_nothing() -> None:
     assert whole["one"][0] == 1.5
 
 
-def test_a_mask_parameter_that_decides_the_structure_says_so() -> None:
+def test_a_mask_parameter_of_a_sample_time_cannot_be_tuned() -> None:
     builder = DiagramBuilder("wide")
-    builder.parameter("n", 2, doc="how many")
+    builder.parameter("n", 2, doc="number of inputs")
     builder.parameter("T", 0.5, unit="s", doc="sample time")
     one = builder.add("one", Constant())
     builder.add("delay", UnitDelay(sample_time=formula("T")), builder.add("mux", Mux(inputs=1), one))
@@ -121,13 +121,13 @@ def test_a_mask_parameter_that_decides_the_structure_says_so() -> None:
     with pytest.raises(InputError, match="parameter 'T' cannot take this value during a run"):
         run.set("T", 0.25)
     assert ab.simulate(diagram, parameters={"T": 0.25}, stop_time=1.0).run.ticks > 4
-    run.set("n", 3)  # nothing follows from it
+    run.set("n", 3)  # no formula depends on it
 
 
 def test_arrays_and_choices_pass_through_masks() -> None:
     builder = DiagramBuilder("arrays")
     builder.parameter("A", [[1.0, 2.0], [3.0, 4.0]], doc="a matrix")
-    builder.parameter("signs", "+-", doc="how they are added")
+    builder.parameter("signs", "+-", doc="signs of the sum")
     v = builder.add("v", Constant(value=[1.0, 10.0]))
     product = builder.add("product", MatrixGain(gain=formula("A'*0.5")), v)
     builder.add("sum", Sum(signs=formula("signs")), product, v)
@@ -135,7 +135,7 @@ def test_arrays_and_choices_pass_through_masks() -> None:
     assert result["sum"][-1].tolist() == [14.5, 11.0]
 
 
-def test_reading_undoes_writing() -> None:
+def test_reading_a_written_diagram_gives_the_same_diagram() -> None:
     for diagram in (oscillator(masked=True), oscillator(masked=False)):
         data = diagram_to_bytes(diagram, load_robot)
         again = diagram_from_bytes(data, "oscillator.json", BLOCKS, load_robot)
@@ -143,10 +143,10 @@ def test_reading_undoes_writing() -> None:
         assert diagram_to_bytes(again, load_robot) == data
     text = diagram_to_bytes(oscillator(masked=True), load_robot).decode()
     assert '"m": "K/2"' in text
-    assert '"gain": 0.3333' not in text  # what follows is not written
+    assert '"gain": 0.3333' not in text  # computed values are not written
 
 
-def test_differences_name_masks_and_formulas() -> None:
+def test_differences_list_masks_and_formulas() -> None:
     before = oscillator(masked=True)
     after = with_parameters(before, {"K": 8.0, "two.f": 0.9})
     found = ab.diagram_difference(before, after)
@@ -164,7 +164,7 @@ def test_formulas_of_constants_need_no_mask() -> None:
     assert dict(Gain(gain=formula("2*pi")).formulas) == {"gain": "2*pi"}
 
 
-def mistakes() -> list[tuple[object, type[Exception], str]]:
+def invalid_uses() -> list[tuple[object, type[Exception], str]]:
     def add(block_of: object) -> object:
         def act() -> None:
             builder = DiagramBuilder("d")
@@ -244,14 +244,14 @@ def mistakes() -> list[tuple[object, type[Exception], str]]:
     ]
 
 
-@pytest.mark.parametrize("number", range(len(mistakes())))
-def test_mistakes_are_named(number: int) -> None:
-    act, kind, message = mistakes()[number]
+@pytest.mark.parametrize("number", range(len(invalid_uses())))
+def test_invalid_masks_and_formulas_are_refused(number: int) -> None:
+    act, kind, message = invalid_uses()[number]
     with pytest.raises(kind, match=message):
         act()  # pyright: ignore
 
 
-def test_numbers_over_zero_are_what_floating_point_says() -> None:
+def test_division_by_zero_follows_ieee_754() -> None:
     assert formula_number("-1/0", "here") == -math.inf
     assert formula_number("[1 -2]./[0 0]", "here") == [math.inf, -math.inf]
     assert math.isnan(cast("float", formula_number("0/0", "here")))

@@ -1,4 +1,4 @@
-"""The lines of a sheet: what a reader infers from them is the model, whatever stands where."""
+"""Routed lines: the connections can be inferred from the drawing for any layout of blocks."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Placed:
     output_side: str
 
     def spot(self, side: str, k: int, count: int) -> tuple[float, float]:
-        """Where one of the ports of a side is."""
+        """The position of port ``k`` of ``count`` on a side."""
         share = (k + 0.5) / count
         if side in ("left", "right"):
             return self.x + (self.width if side == "right" else 0.0), self.y + self.height * share
@@ -39,7 +39,7 @@ class Placed:
 
 @dataclass(frozen=True)
 class SheetModel:
-    """Blocks by name, the output that drives each input, and drawn ways by input."""
+    """Blocks by name, the output that drives each input, and user-drawn routes by input."""
 
     blocks: Mapping[str, Placed]
     drivers: Mapping[tuple[str, int], tuple[str, int]]
@@ -66,8 +66,8 @@ class SheetModel:
             bends.setdefault(f"{driver}/y{j}", []).append(self.bends.get((block, k), ()))
 
         def end(port: Port) -> WireEnd:
-            way = 1 if port.is_output else -1
-            return WireEnd(port.x, port.y, way * port.out[0], way * port.out[1])
+            sign = 1 if port.is_output else -1
+            return WireEnd(port.x, port.y, sign * port.out[0], sign * port.out[1])
 
         nets = {
             source: Net(end(ports[source]), tuple(end(ports[t]) for t in driven), tuple(bends[source]))
@@ -76,7 +76,7 @@ class SheetModel:
         return nets, targets
 
     def obstacles(self) -> dict[str, Obstacle]:
-        """The blocks as the router sees them."""
+        """The blocks as obstacles of the router."""
         return {
             name: Obstacle(b.x, b.y, b.width, b.height, (b.x - 5, b.y + b.height + 2, b.width + 10, 16))
             for name, b in self.blocks.items()
@@ -84,7 +84,7 @@ class SheetModel:
 
 
 def drawing(model: SheetModel, routed: Mapping[str, RoutedNet]) -> Drawing:
-    """What is seen of a model."""
+    """The visible elements of a routed sheet."""
     _, targets = model.nets()
     labels: dict[str, str] = {}
     for source, net in routed.items():
@@ -100,13 +100,13 @@ def drawing(model: SheetModel, routed: Mapping[str, RoutedNet]) -> Drawing:
     )
 
 
-def expect_truth(model: SheetModel, routed: Mapping[str, RoutedNet]) -> None:
+def check_connections(model: SheetModel, routed: Mapping[str, RoutedNet]) -> None:
     wanted = {f"{b}/u{k}": f"{d}/y{j}" for (b, k), (d, j) in model.drivers.items()}
     assert read(drawing(model, routed)) == wanted
 
 
 def random_model(draw: random.Random) -> SheetModel:
-    """A sheet as users make them, and worse: dense, turned, overlapping, with fans and drawn ways."""
+    """A random sheet: dense, rotated or overlapping blocks, fan-out, user-drawn routes."""
     kind = draw.choice(["grid", "dense", "anywhere", "fan", "facing"])
     blocks: dict[str, Placed] = {}
     for k in range(draw.randint(2, 14)):
@@ -144,14 +144,14 @@ def random_model(draw: random.Random) -> SheetModel:
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_a_reader_of_the_lines_infers_the_model(seed: int) -> None:
-    """Over random layouts and drags; and what is kept from the sheet before changes no route."""
+def test_the_connections_are_inferred_from_the_lines(seed: int) -> None:
+    """For random layouts and drags. An updated routing equals a new one."""
     draw = random.Random(seed)
     model, routing = random_model(draw), Routing()
     for _ in range(3):
         nets, _ = model.nets()
         routed = routing.update(model.obstacles(), nets)
-        expect_truth(model, routed)
+        check_connections(model, routed)
         moved = dict(model.blocks)
         dx, dy = draw.randint(-120, 120), draw.randint(-90, 90)
         for name in draw.sample(sorted(moved), min(len(moved), draw.choice([1, 1, 1, 2, 4]))):
@@ -161,12 +161,12 @@ def test_a_reader_of_the_lines_infers_the_model(seed: int) -> None:
     assert routing.update(model.obstacles(), nets) == Routing().update(model.obstacles(), nets)
 
 
-# -- ways that somebody has drawn ----------------------------------------------------------------------------
+# -- user-drawn routes ----------------------------------------------------------------------------
 
 SOURCE, NEAR, FAR = WireEnd(0, 0, 1, 0), WireEnd(200, 0, 1, 0), WireEnd(200, 100, 1, 0)
 
 
-def test_a_drawn_way_is_kept_and_branches_leave_it() -> None:
+def test_a_user_drawn_route_is_used_and_other_targets_branch_from_it() -> None:
     bends = (60.0, 50.0, 120.0)
     path = bent(SOURCE, bends, FAR)
     assert path == ((0, 0), (60, 0), (60, 50), (120, 50), (120, 100), (200, 100))
@@ -174,14 +174,14 @@ def test_a_drawn_way_is_kept_and_branches_leave_it() -> None:
     assert laid.paths[1] == path
     assert laid.paths[0] == ((60, 0), (200, 0))
     assert laid.dots == ((60, 0),)
-    # Where the block is turned the way no longer leads into its port, and is chosen anew.
+    # After a rotation of the block the route does not end at its port: the wire is routed automatically.
     assert bent(SOURCE, bends, WireEnd(200, 100, 0, 1)) is None
     assert bent(SOURCE, (), FAR) is None
 
 
 @pytest.mark.parametrize(("source", "bend"), [(0.0, 60.0), (0.0, -40.0), (-60.0, 150.0)])
-def test_a_drawn_way_that_lies_is_given_up(source: float, bend: float) -> None:
-    """One under a block, one that leaves its port backwards, and one along that of a shorter net."""
+def test_an_illegal_user_drawn_route_is_replaced(source: float, bend: float) -> None:
+    """A route under a block, one that leaves its port backwards, and one that overlaps a shorter net."""
     block = Obstacle(45.0, 20.0, 40.0, 60.0, (45.0, 82.0, 40.0, 16.0))
     start, end = WireEnd(0, source, 1, 0), WireEnd(200, 160 if source else 100, 1, 0)
     shorter = Net(WireEnd(120, 20, 1, 0), (WireEnd(200, 60, 1, 0),), ((150.0,),))
@@ -204,7 +204,7 @@ AB, CD = ((0, 0), (100, 0)), ((0, 40), (100, 40))
 
 
 @pytest.mark.parametrize(
-    ("lines", "dots", "lie"),
+    ("lines", "dots", "message"),
     [
         ([AB, ((0, 40), (20, 40), (20, 60), (80, 60), (80, 40), (100, 40))], [], "runs under e"),
         ([AB, ((0, 40), (20, 40), (20, 1), (80, 1), (80, 40), (100, 40))], [], "lines touch"),
@@ -213,13 +213,15 @@ AB, CD = ((0, 0), (100, 0)), ((0, 40), (100, 40))
         ([AB, ((50, 0), (50, 40), (100, 40))], [], "begins nowhere|lines touch"),
         ([AB, ((0, 40), (90, 40))], [], "ends nowhere"),
         ([AB, ((0, 40), (-20, 40), (-20, 20), (80, 20), (80, 40), (100, 40))], [], "outwards"),
-        ([((0, 0), (100, 40))], [], "neither level nor upright"),
+        ([((0, 0), (100, 40))], [], "neither horizontal nor vertical"),
         ([AB, ((0, 40), (50, 40), (50, -3), (98.5, -3), (98.5, 40), (100, 40))], [], "touches b/u|outwards"),
     ],
 )
-def test_the_reader_sees_lies(lines: list[Path], dots: list[tuple[float, float]], lie: str) -> None:
+def test_the_reader_detects_ambiguous_drawings(
+    lines: list[Path], dots: list[tuple[float, float]], message: str
+) -> None:
     seen = Drawing({"e": Block(40, 50, 20, 20)}, PORTS, lines, dots, {})
-    with pytest.raises(AmbiguousError, match=lie):
+    with pytest.raises(AmbiguousError, match=message):
         read(seen)
 
 

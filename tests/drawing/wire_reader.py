@@ -1,6 +1,6 @@
-"""What a reader infers from the lines of a sheet: connections from geometry alone, or why they are ambiguous.
+"""Infers the connections of a sheet from the geometry of its lines, or reports why they are ambiguous.
 
-The reader knows blocks, ports, anonymous lines, dots and labels; of nets and routes it knows nothing.
+The input has blocks, ports, anonymous lines, dots and labels, but neither nets nor routes.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ import numpy as np
 
 Point = tuple[float, float]
 NEAR = 2.0
-"""px: what is nearer to each other cannot be told apart."""
+"""Minimum distance of elements that can be distinguished, px."""
 AT_PORT = 1.5
-"""px from the middle of a port at which a line still enters it."""
+"""Maximum distance from the middle of a port of a line that ends at the port, px."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Block:
     height: float
 
     def meets(self, a: Point, b: Point, margin: float) -> bool:
-        """Whether a straight piece enters the rectangle, or comes nearer to it than ``margin``."""
+        """Whether a segment intersects the rectangle enlarged by ``margin``."""
         return (
             max(a[0], b[0]) > self.x - margin
             and min(a[0], b[0]) < self.x + self.width + margin
@@ -39,7 +39,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Port:
-    """A port: its block, its place, and the direction (outwards) in which its block ends there."""
+    """A port: its block, its position, and the outward direction of its side."""
 
     block: str
     x: float
@@ -50,7 +50,7 @@ class Port:
 
 @dataclass(frozen=True)
 class Drawing:
-    """What can be seen: ``labels`` has the text at a port, where there is one."""
+    """The visible elements of a sheet; ``labels``: texts by port."""
 
     blocks: Mapping[str, Block]
     ports: Mapping[str, Port]
@@ -60,7 +60,7 @@ class Drawing:
 
 
 class AmbiguousError(AssertionError):
-    """A reader cannot tell what is connected."""
+    """The connections cannot be inferred."""
 
 
 def read(drawing: Drawing) -> dict[str, str]:
@@ -104,11 +104,11 @@ def _check_shape(line: Sequence[Point]) -> None:
         raise AmbiguousError(f"no line: {line}")
     for a, b in pairwise(line):
         if (a[0] == b[0]) == (a[1] == b[1]):
-            raise AmbiguousError(f"a piece is neither level nor upright: {a} {b}")
+            raise AmbiguousError(f"a segment is neither horizontal nor vertical: {a} {b}")
     pieces = list(pairwise(line))
     for i, one in enumerate(pieces):
         for j in range(i + 2, len(pieces)):
-            step = j == i + 2 and _same_way(one, pieces[j])
+            step = j == i + 2 and _same_direction(one, pieces[j])
             if _gap(one, pieces[j]) < NEAR and not step:
                 raise AmbiguousError(f"a line meets itself: {line}")
         if i and _backwards(pieces[i - 1], one):
@@ -119,12 +119,13 @@ def _backwards(one: tuple[Point, Point], other: tuple[Point, Point]) -> bool:
     return (one[0][0] == one[1][0]) == (other[0][0] == other[1][0])
 
 
-def _same_way(one: tuple[Point, Point], other: tuple[Point, Point]) -> bool:
+def _same_direction(one: tuple[Point, Point], other: tuple[Point, Point]) -> bool:
     return all((one[1][k] - one[0][k]) * (other[1][k] - other[0][k]) >= 0 for k in (0, 1))
 
 
 def _check_blocks(line: Sequence[Point], drawing: Drawing) -> None:
-    """No piece is near a foreign port or block; the first and the last piece leave their blocks outwards."""
+    """Check the distance to other ports and blocks, and that the outer segments leave their blocks
+    outwards."""
     pieces = list(pairwise(line))
     for name, port in _nearby(line, drawing.ports).items():
         here = (port.x, port.y)
@@ -143,10 +144,10 @@ def _check_blocks(line: Sequence[Point], drawing: Drawing) -> None:
         if not block.meets(hull[0], hull[1], NEAR):
             continue
         for k, (a, b) in enumerate(pieces):
-            at_home = (k == 0 and _is_of(name, a, drawing, is_output=True)) or (
+            at_own_port = (k == 0 and _is_of(name, a, drawing, is_output=True)) or (
                 k == len(pieces) - 1 and _is_of(name, b, drawing, is_output=False)
             )
-            if block.meets(a, b, 0.0 if at_home else NEAR):
+            if block.meets(a, b, 0.0 if at_own_port else NEAR):
                 raise AmbiguousError(f"a line runs under {name}: {line}")
 
 
@@ -168,13 +169,13 @@ def _port_at(point: Point, ports: Mapping[str, Port]) -> str | None:
 
 
 def _is_at(port: Port, point: Point) -> bool:
-    """Whether a point is on the side of a block at a port."""
+    """Whether a point is at a port, on the side of its block."""
     across, along = (point[1] - port.y, point[0] - port.x)[:: 1 if port.out[0] else -1]
     return along == 0.0 and abs(across) <= AT_PORT
 
 
 def _contacts(drawing: Drawing, groups: _Groups) -> set[int]:
-    """Join the lines that meet at dots; gives the lines that begin on another one."""
+    """Join the lines that meet at dots; returns the lines that start on another line."""
     begins: set[int] = set()
     for (i, one), (j, other) in _close_pieces(drawing.lines):
         first, second = drawing.lines[i], drawing.lines[j]
@@ -195,7 +196,7 @@ def _contacts(drawing: Drawing, groups: _Groups) -> set[int]:
 def _close_pieces(
     lines: Sequence[Sequence[Point]],
 ) -> Iterator[tuple[tuple[int, tuple[Point, Point]], tuple[int, tuple[Point, Point]]]]:
-    """Pairs of pieces of two lines that are near each other."""
+    """Pairs of near segments of two different lines."""
     pieces = [(k, piece) for k, line in enumerate(lines) for piece in pairwise(line)]
     if not pieces:
         return
@@ -219,7 +220,7 @@ def _dot_at(point: Point, dots: Sequence[Point]) -> bool:
 
 
 def _crosses(one: tuple[Point, Point], other: tuple[Point, Point]) -> bool:
-    """Whether two pieces cross at a right angle, away from the ends of both."""
+    """Whether two segments cross at a right angle, away from the ends of both."""
     if (one[0][0] == one[1][0]) == (other[0][0] == other[1][0]):
         return False
     point = _crossing(one, other)
@@ -238,20 +239,20 @@ def _crossing(one: tuple[Point, Point], other: tuple[Point, Point]) -> Point:
 
 def _check_dots(drawing: Drawing) -> None:
     for x, y in drawing.dots:
-        ways: set[tuple[bool, bool, bool, bool]] = set()
+        directions: set[tuple[bool, bool, bool, bool]] = set()
         for line in drawing.lines:
             for a, b in pairwise(line):
                 if _gap((a, b), ((x, y), (x, y))) > 0.0:
                     continue
                 for end in (a, b):
                     if end != (x, y):
-                        ways.add((end[0] > x, end[0] < x, end[1] > y, end[1] < y))
-        if len(ways) < 3:
-            raise AmbiguousError(f"a dot at {(x, y)} joins {len(ways)} ways")
+                        directions.add((end[0] > x, end[0] < x, end[1] > y, end[1] < y))
+        if len(directions) < 3:
+            raise AmbiguousError(f"a dot at {(x, y)} joins {len(directions)} lines")
 
 
 def _gap(one: tuple[Point, Point], other: tuple[Point, Point]) -> float:
-    """The distance of two pieces, each level, upright or a point: the larger of those along x and y."""
+    """The maximum norm of the distance of two segments, each horizontal, vertical or a point."""
     along = [
         max(min(one[0][k], one[1][k]), min(other[0][k], other[1][k]))
         - min(max(one[0][k], one[1][k]), max(other[0][k], other[1][k]))
@@ -261,7 +262,7 @@ def _gap(one: tuple[Point, Point], other: tuple[Point, Point]) -> float:
 
 
 class _Groups:
-    """Names that are joined in pairs, and the groups that this gives."""
+    """Disjoint sets of names (union-find)."""
 
     def __init__(self, names: Iterable[str]) -> None:
         self._leader = {name: name for name in names}

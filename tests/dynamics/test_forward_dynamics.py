@@ -65,7 +65,7 @@ MASSLESS = "has no inertia to accelerate: the inertia matrix is singular at ever
         ((Link(name="rod", **ROD), Link(name="pin", parent="rod")), "pin"),
         # A point mass on the joint axis has no inertia about it.
         ((Link(name="point", mass=2.0, centre_of_mass=(0, 0, 0.3)),), "point"),
-        # Two joints on one axis without mass between them: the inner joint has no inertia of its own.
+        # Two joints on one axis without mass between them: the inner joint has no separate inertia.
         ((Link(name="inner"), Link(name="outer", parent="inner", **ROD)), "inner"),
         ((Link(name="slider", joint=Prismatic()),), "slider"),
     ],

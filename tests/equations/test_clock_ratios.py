@@ -23,7 +23,7 @@ def test_rounded_sample_times_have_the_common_period_of_their_fractions() -> Non
         assert math.gcd(*(int(period / own) for own in meant)) == 1
 
 
-def test_the_period_of_a_single_clock_is_kept_bit_for_bit() -> None:
+def test_the_period_of_a_single_clock_is_unchanged_bit_for_bit() -> None:
     for period in [0.1, 1.0 / 3.0, math.pi / 100.0, 2.0**-20, *np.random.default_rng(1).random(100).tolist()]:
         assert float(common_period(exact_clocks([SampleClock(period)]))) == period
 

@@ -77,7 +77,7 @@ def test_messages_to_the_studio_and_its_widgets_have_the_joint_names(
 
     pipe = Pipe()
     run = _Run(pipe, {"run": "r", "document": "d", "speed": None, "tuned": {}})
-    run._tell_start(ab.begin(diagram))
+    run._notify_start(ab.begin(diagram))
     _, shown, _ = _record(diagram_views(diagram), result)
     for channels in (pipe.heard["channels"], shown["channels"]):
         entries = {channel["name"]: tuple(channel["entries"]) for channel in channels}

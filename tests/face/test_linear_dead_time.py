@@ -110,7 +110,7 @@ def test_dead_time_in_a_sampled_system() -> None:
         system.frequency_response(FREQUENCIES[:4])[:, 0, 0], expected, atol=2e-3, rtol=0
     )
     with pytest.raises(
-        InputError, match=r"is in one diagram with the clock of 0.1 s.*frequency_response of that"
+        InputError, match=r"is in one diagram with the clock of 0.1 s.*frequency_response of the result"
     ):
         response(builder.build(), "u", "seen")
 

@@ -121,9 +121,7 @@ def test_modes_are_consistent_with_the_operating_point() -> None:
 def test_bounds_are_respected_and_active_bounds_are_named() -> None:
     two = ab.trim(pendulum(), free=["torque"], states={"q": 0.3}, bounds={"torque": (-20.0, 20.0)})
     assert not two.at_bounds
-    with pytest.raises(
-        SimulationError, match=r"rate of qd/x is -0.8.*torque.value is at one of them"
-    ) as caught:
+    with pytest.raises(SimulationError, match=r"rate of qd/x is -0.8.*torque.value is at a bound") as caught:
         ab.trim(pendulum(), free=["torque"], states={"q": 0.3}, bounds={"torque.value": (-2.0, 2.0)})
     assert isinstance(caught.value.partial, TrimResult)
     assert caught.value.partial.at_bounds == ("torque.value",)
@@ -153,7 +151,7 @@ def test_the_torque_that_holds_a_puma_is_its_gravity_load() -> None:
 def test_an_equation_that_depends_on_nothing_free_is_named() -> None:
     builder = ab.DiagramBuilder("ramp")
     builder.add("x", Integrator(), builder.add("u", Constant(value=1.0)))
-    with pytest.raises(SimulationError, match=r"rate of x/x is 1.*follows from nothing free"):
+    with pytest.raises(SimulationError, match=r"rate of x/x is 1.*depends on none"):
         ab.trim(builder.build())
 
 
@@ -166,14 +164,12 @@ def test_an_equation_without_a_root_is_reported() -> None:
     builder = ab.DiagramBuilder("rootless")
     state = builder.add("x", Integrator(initial=0.3))
     builder.connect(builder.add("f", Expression(formula="1 + u^2"), state), state["u"])
-    with pytest.raises(
-        SimulationError, match=r"rate of x/x is 1\b.*(a start from which|follows from nothing free)"
-    ):
+    with pytest.raises(SimulationError, match=r"rate of x/x is 1\b.*(a start from which|depends on none)"):
         ab.trim(builder.build())
     builder = ab.DiagramBuilder("steep")
     state = builder.add("x", Integrator(initial=0.0))
     builder.connect(builder.add("f", Expression(formula="sqrt(u) + 1"), state), state["u"])
-    with pytest.raises(SimulationError, match="points with finite slopes"):
+    with pytest.raises(SimulationError, match="points with finite derivatives"):
         ab.trim(builder.build())
 
 

@@ -1,4 +1,4 @@
-"""The MATLAB subset: values of expressions, as MATLAB itself computes them."""
+"""The MATLAB subset: expressions have the same values as in MATLAB."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ def test_expression_has_matlabs_value(text: str, expected: object) -> None:
         ("x = 'a...b'", "a...b"),
     ],
 )
-def test_strings_have_the_value_that_matlab_gives_them(text: str, expected: str) -> None:
+def test_strings_have_the_same_value_as_in_matlab(text: str, expected: str) -> None:
     assert value(text) == expected
 
 

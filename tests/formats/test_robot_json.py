@@ -199,7 +199,7 @@ REFUSED = [
     ),
     (
         changed(*LINK, "geometry", value=[{"shape": "mesh", "vertices": [], "faces": [[0, 1, 0.5]]}]),
-        "a face does not name vertices",
+        "a face is not a list of vertex numbers",
     ),
     (changed("base", value={"rotation": [[1, 0, 0]]}), "1 rows are given"),
     (changed("base", value={"rotation": [[2, 0, 0], [0, 1, 0], [0, 0, 1]]}), "should be a rotation is not"),

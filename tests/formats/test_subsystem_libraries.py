@@ -146,9 +146,9 @@ def cases(folder: Path) -> list[tuple[str, type[ArmblocksError], str]]:
         ("../outside.json#A", FormatError, "there is no such file"),
         ("empty.json#Amplifier", UnknownNameError, "there is no library block named 'Amplifier'"),
         ("parts/base.json#Amplifire", UnknownNameError, "named 'Amplifire'.*did you mean 'Amplifier'"),
-        ("circle.json#A", FormatError, r"in a circle: circle.json#A -> ring.json#B -> circle.json#A"),
-        ("ring.json#Self", FormatError, r"hold each other in a circle: ring.json#Self -> ring.json#Self"),
-        ("deep.json#n0", FormatError, f"more than {DEEPEST_CHAIN} deep inside each other: deep.json#n0 -> "),
+        ("circle.json#A", FormatError, r"in a cycle: circle.json#A -> ring.json#B -> circle.json#A"),
+        ("ring.json#Self", FormatError, r"contain each other in a cycle: ring.json#Self -> ring.json#Self"),
+        ("deep.json#n0", FormatError, f"nested more than {DEEPEST_CHAIN} levels deep: deep.json#n0 -> "),
         ("wide.json#n0", FormatError, r"the diagram has \d+ blocks.*at most 100000"),
         ("model.json#A", FormatError, "the key 'library' is missing.*not of a diagram"),
         (

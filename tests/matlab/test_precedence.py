@@ -1,4 +1,5 @@
-"""The grammar is MATLAB's: precedences, signs, blanks in matrices; both evaluators and the speller agree."""
+"""The grammar is that of MATLAB: precedences, signs, blanks in matrices, for numbers, symbols and written
+trees."""
 
 from __future__ import annotations
 
@@ -122,14 +123,14 @@ def by_symbols(text: str) -> float:
 )
 def test_operators_bind_as_in_matlab(text: str, value: float | None) -> None:
     if value is None:
-        with pytest.raises(ArmblocksError, match=r"a comparison is compared again.*a < b && b < c"):
+        with pytest.raises(ArmblocksError, match=r"comparisons cannot be chained.*a < b && b < c"):
             by_formula(text)
         return
     assert by_formula(text).tolist() == [value]
     assert by_script(text).tolist() == [value]
 
 
-def test_powers_of_vectors_go_by_element() -> None:
+def test_powers_of_vectors_are_elementwise() -> None:
     assert by_formula("[1 2 4].^2.^-1").tolist() == [1.0, 0.25, 0.0625]
     assert by_formula("[1 -2 3]'.^2").tolist() == [1.0, 4.0, 9.0]
 
@@ -198,7 +199,7 @@ class TwoStacks:
         self.pending: list[tuple[str, str]] = []
 
     def reduce(self, binding: int) -> None:
-        """Apply pending operators that bind at least so tightly."""
+        """Apply the pending operators of this precedence or a higher one."""
         while self.pending and self.pending[-1][0] != "(" and _BINDING[self.pending[-1][0]] >= binding:
             kind, sign = self.pending.pop()
             right = self.values.pop()
@@ -276,7 +277,7 @@ def test_random_expressions_have_the_values_of_an_independent_evaluator() -> Non
             try:
                 expected = by_two_stacks(text)
             except ValueError:
-                with pytest.raises(ArmblocksError, match="a comparison is compared again"):
+                with pytest.raises(ArmblocksError, match="comparisons cannot be chained"):
                     by_formula(text)
                 refused += 1
                 continue
@@ -285,12 +286,12 @@ def test_random_expressions_have_the_values_of_an_independent_evaluator() -> Non
         if not math.isfinite(expected) or abs(expected) > 1e200:
             continue
         found = by_formula(text)[0]
-        # The powers of the C library differ in the last place, made greater by later powers.
+        # Powers of the C library differ in the last place; later powers increase the difference.
         assert found == pytest.approx(expected, rel=1e-9, abs=1e-300), text
         assert by_symbols(text) == pytest.approx(expected, rel=1e-9, abs=1e-300), text
         try:
             by_numbers = by_script(text)[0]
-        except ArmblocksError as error:  # a complex value in a part that does not matter
+        except ArmblocksError as error:  # a complex value in a part without effect on the result
             assert "complex" in str(error)
         else:
             assert by_numbers == found or abs(by_numbers) == abs(found) == 0.0, text
@@ -299,7 +300,7 @@ def test_random_expressions_have_the_values_of_an_independent_evaluator() -> Non
     assert refused > 5
 
 
-def test_where_python_has_the_same_grammar_it_has_the_same_values() -> None:
+def test_values_agree_with_python_for_expressions_with_the_same_grammar() -> None:
     draw = random.Random(21)
     compared = 0
     for _ in range(400):

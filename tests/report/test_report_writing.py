@@ -229,7 +229,7 @@ def test_an_exceeded_limit_is_described_and_highlighted(tmp_path: Path, puma560:
         result = ab.simulate(diagram)
     files = write_report(tmp_path, diagram, result, formats=("svg",))
     text = files.page.read_text(encoding="utf-8")
-    assert "Limit broken: joint &#39;link1&#39; leaves its range" in text
+    assert "Limit exceeded: joint &#39;link1&#39; leaves its range" in text
     assert 'class="bad"' in text and "over limit from" in text
 
 
@@ -303,4 +303,4 @@ def test_a_report_of_a_thinned_log_states_the_number_of_shown_rows(tmp_path: Pat
     assert result.time.size < 40_001
     write_report(tmp_path, diagram, result, formats=(), data=())
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "of 40 001 instants are shown here" in text.replace("\u202f", " ").replace("\u00a0", " ")
+    assert "of 40 001 samples" in text.replace("\u202f", " ").replace("\u00a0", " ")

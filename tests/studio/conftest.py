@@ -90,15 +90,15 @@ class Studio:
             env={**os.environ, "COLUMNS": "300"},
         )
         assert self.process.stdout is not None
-        said = ""
+        text = ""
         for line in self.process.stdout:
-            said += line
+            text += line
             if found := re.search(r"http://127\.0\.0\.1:\d+/login\?key=\S+", line):
                 self.link = found.group()
                 self.address = self.link.partition("login")[0]
                 return
         self.kill()
-        raise AssertionError(f"the studio did not start: {said}")
+        raise AssertionError(f"the studio did not start: {text}")
 
     def kill(self) -> None:
         """Kill the process, as in a crash."""

@@ -23,15 +23,15 @@ class Disk:
 
     def __init__(self, root: Path) -> None:
         self.project = ProjectFolder(root / "project")
-        self.kept = StateFolder(self.project.root)
-        self.kept.root = root / "state"
-        self.kept.journals = root / "state" / "journals"
+        self.state_folder = StateFolder(self.project.root)
+        self.state_folder.root = root / "state"
+        self.state_folder.journals = root / "state" / "journals"
 
     def documents(self) -> OpenDocuments:
-        return OpenDocuments(self.project, self.kept, load_robot)
+        return OpenDocuments(self.project, self.state_folder, load_robot)
 
     def robots(self) -> OpenRobots:
-        return OpenRobots(self.project, self.kept)
+        return OpenRobots(self.project, self.state_folder)
 
     def as_after_a_crash(self, root: Path) -> Disk:
         """A copy of the disk, as seen by a studio that starts after the present one was killed."""
@@ -41,8 +41,8 @@ class Disk:
         return Disk(root)
 
 
-def going(talking: Callable[[], Coroutine[Any, Any, None]]) -> None:
-    asyncio.run(talking())
+def going(scenario: Callable[[], Coroutine[Any, Any, None]]) -> None:
+    asyncio.run(scenario())
 
 
 def carry_out(files: OpenFiles[OpenedT], found: OpenedT, requests: Iterable[Alteration]) -> None:

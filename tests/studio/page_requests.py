@@ -12,20 +12,20 @@ from armblocks.errors import InputError
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.server.hub import Hub, Page
 
-Told = list[dict[str, Any]]
+Events = list[dict[str, Any]]
 
 
 def talk(
-    folder: Path, talking: Callable[[Hub, Callable[..., Awaitable[Any]], Told], Awaitable[None]]
-) -> Told:
+    folder: Path, scenario: Callable[[Hub, Callable[..., Awaitable[Any]], Events], Awaitable[None]]
+) -> Events:
     """Let a page send requests to a hub; return the events that it received."""
-    told: Told = []
+    received: Events = []
 
     async def going() -> None:
         hub = Hub(ProjectFolder(folder))
 
         async def hear(text: str) -> None:
-            told.append(json.loads(text))
+            received.append(json.loads(text))
 
         async def hear_bytes(data: bytes) -> None:
             raise AssertionError("samples arrived without a run")
@@ -38,13 +38,15 @@ def talk(
             nonlocal number
             number += 1
             await hub.answer(page, json.dumps({"number": number, "request": {"kind": kind, **values}}))
-            reply = next(event for event in told if event["kind"] == "reply" and event["number"] == number)
+            reply = next(
+                event for event in received if event["kind"] == "reply" and event["number"] == number
+            )
             if reply["fault"]:
                 raise InputError(reply["fault"]["what"], fix=reply["fault"]["fix"])
             return reply["value"]
 
-        await talking(hub, ask, told)
+        await scenario(hub, ask, received)
         hub.close()
 
     asyncio.run(going())
-    return told
+    return received

@@ -60,10 +60,10 @@ class Tally(Block):
         return ()
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the count", "", ()), Port("crossings", "how often it exceeded 4.5", "", ()))
+        return (Port("y", "the count", "", ()), Port("crossings", "number of times it exceeded 4.5", "", ()))
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return State("count", (), "the count"), State("seen", (), "how often it exceeded 4.5")
+        return State("count", (), "the count"), State("seen", (), "number of times it exceeded 4.5")
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         return (Guard("exceeds", (), "the count exceeds 4.5", 1),)

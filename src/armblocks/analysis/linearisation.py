@@ -120,7 +120,7 @@ def exact_response(evaluated: EvaluatedSystem, point: Point, ends: Ends, frequen
             f"{system.clocks[0].period:g} s",
             where=system.name,
             allowed="an exact response of dead time among continuous blocks only",
-            fix="linearize with a delay_order, and take the frequency_response of that",
+            fix="linearize with a delay_order, and use the frequency_response of the result",
         )
     unknowns = _unknowns(evaluated, point)
     flow, seen = _slopes(evaluated, point, unknowns, ends)

@@ -182,7 +182,7 @@ def bandwidth(system: StateSpaceModel, drop: float) -> float:
             f"the gain at rest is {rest:g}",
             where=system.name,
             allowed="a finite gain at rest that is not 0",
-            fix="ask for the bandwidth of the closed loop",
+            fix="compute the bandwidth of the closed loop",
         )
     level = rest * 10.0 ** (-drop / 20.0)
     low, high = frequency_range(system)

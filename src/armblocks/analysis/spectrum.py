@@ -88,7 +88,7 @@ def signal_spectrum(
     power = (np.abs(np.fft.rfft(pieces * weights[:, None], axis=1)) ** 2).mean(axis=0)
     if quantity == "amplitude":
         values = 2.0 * np.sqrt(power) / weights.sum()
-        values[[0, -1]] /= 2.0  # 0 and half the rate have no mirror image
+        values[[0, -1]] /= 2.0  # 0 and half the rate have no negative counterpart
     else:
         values = 2.0 * power / (rate * (weights**2).sum())
         values[[0, -1]] /= 2.0
@@ -110,9 +110,9 @@ def _evenly(time: Array, signals: ArrayLike, sample_rate: float, begin: float) -
     steps = steps[steps > 0.0]
     if not steps.size or not np.isfinite(values).all():
         raise InputError(
-            "there are fewer than two instants" if not steps.size else "a signal is not finite",
+            "there are fewer than two recorded times" if not steps.size else "a signal is not finite",
             where="spectrum",
-            allowed="finite numbers at instants of a run",
+            allowed="finite numbers at the recorded times of a run",
             fix="run longer" if not steps.size else "look at the signal in a Scope",
         )
     last = np.append(np.diff(time) > 0.0, True)
@@ -125,7 +125,7 @@ def _evenly(time: Array, signals: ArrayLike, sample_rate: float, begin: float) -
             f"nothing is recorded after {begin:g} s",
             where="spectrum",
             allowed=f"a begin before {time[-1]:g} s",
-            fix="let it begin earlier or run longer",
+            fix="set an earlier begin, or run longer",
         )
     rate = sample_rate or count / span
     places = start + np.arange(count) / rate

@@ -142,7 +142,7 @@ def _checked_matrices(system: StateSpaceModel) -> tuple[int, int, int]:
                 f"{letter} is not all finite numbers",
                 allowed="finite matrices",
                 where="linear system",
-                fix=f"take NaN and infinities out of {letter}",
+                fix=f"remove NaN and infinities from {letter}",
             )
         matrix.flags.writeable = False
         object.__setattr__(system, letter, matrix)

@@ -183,21 +183,21 @@ def forced_response(
     steps = np.diff(instants)
     if instants.ndim != 1 or instants.size < 2 or not (steps > 0.0).all():
         raise InputError(
-            "the instants do not rise",
-            allowed="two or more instants, each after the last, s",
+            "the times are not ascending",
+            allowed="two or more ascending times, s",
             where="time response",
-            fix="sort them, each once",
+            fix="sort them and remove duplicates",
         )
     if given.shape != (instants.size, nu):
         raise InputError(
             f"the inputs have shape {given.shape}",
-            allowed=f"shape {(instants.size, nu)}: instants, inputs",
+            allowed=f"shape {(instants.size, nu)}: times, inputs",
             where="time response",
-            fix="give one row of inputs for each instant",
+            fix="give one row of inputs for each time",
         )
     if system.is_discrete and not np.allclose(steps, system.dt, rtol=1e-9, atol=0.0):
         raise InputError(
-            f"the instants are not {system.dt:g} s apart",
+            f"the times are not {system.dt:g} s apart",
             allowed="the sample times of the system",
             where="time response",
             fix=f"use {system.dt:g} * numpy.arange(n)",

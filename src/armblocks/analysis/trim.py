@@ -358,7 +358,7 @@ def _failure(problem: TrimProblem, search: _Search, point: Point, result: TrimRe
         f"no operating point was found: {listed}{more}",
         where=problem.system.name,
         allowed=_why(problem, search, point, worst, result),
-        fix="free another parameter, give another start, or let a state move",
+        fix="free another parameter, give another start, or exempt a state with moving",
         partial=result,
     )
 
@@ -372,15 +372,13 @@ def _why(
 ) -> str:
     slopes = search.slopes(point)
     if not np.isfinite(slopes).all():
-        return "points with finite slopes, and this one has none"
+        return "points with finite derivatives; they are not finite at this point"
     rows = {name: slopes[k] for k, name in enumerate(search.equations)}
     fixed = [name for name in worst if not rows[name].any()]
     if fixed:
-        return (
-            f"equations that something free moves, and {', '.join(fixed[:NAMED])} follows from nothing free"
-        )
+        return f"equations that depend on a free variable; {', '.join(fixed[:NAMED])} depends on none"
     if result.at_bounds:
-        return f"values within the bounds, and {', '.join(result.at_bounds[:NAMED])} is at one of them"
+        return f"values within the bounds; {', '.join(result.at_bounds[:NAMED])} is at a bound"
     if len(search.equations) > len(search.unknowns):
         return f"as many equations as unknowns ({len(search.equations)} and {len(search.unknowns)} here)"
     return "a start from which the equations can be solved"

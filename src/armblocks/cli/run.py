@@ -90,7 +90,7 @@ def run(
     _check_writable(folder)
     signals = [name.strip() for name in log_signals.split(",")] if log_signals else []
     settings.update(parameters=parameters, initial_state=from_state, log=log, log_signals=signals)
-    with _given_back(made):
+    with _empty_folders_removed(made):
         result, failure = _simulate(diagram, settings)
     files = _report(folder, diagram, result, figures, formats or [])
     if save_state is not None and result.final_state is not None:
@@ -101,7 +101,7 @@ def run(
     print_motions(diagram, result, console)
     print_files(files, console)
     if result.log is not None:
-        console.print(f"all {result.log.rows} instants: {result.log.path}", highlight=False)
+        console.print(f"all {result.log.rows} samples: {result.log.path}", highlight=False)
     if open_report:
         typer.launch(str(files.page))
     if failure is not None:
@@ -172,7 +172,7 @@ def _check_writable(folder: Path) -> None:
 
 
 @contextmanager
-def _given_back(made: Sequence[Path]) -> Generator[None]:
+def _empty_folders_removed(made: Sequence[Path]) -> Generator[None]:
     """If the run is refused, remove the folders that were created for it, if they are empty."""
     try:
         yield

@@ -41,7 +41,7 @@ def show(
     import armblocks as ab
     from armblocks.cli.show_diagram import print_flat, print_hierarchy
     from armblocks.formats import DocumentKind, kind_of_document
-    from armblocks.robot import warn_of_doubts, warn_of_inertias
+    from armblocks.robot import warn_of_implausible_values, warn_of_inertias
 
     console = results_console()
     match kind_of_document(model):
@@ -57,7 +57,7 @@ def show(
     described = ab.load_robot(model, name=name).robot
     # Loading a shipped robot gives no warnings about known deviations; this command prints them.
     warn_of_inertias(described)
-    warn_of_doubts(described)
+    warn_of_implausible_values(described)
     print_robot(described, console)
 
 

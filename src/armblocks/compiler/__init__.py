@@ -6,8 +6,8 @@ load.
 """
 
 from armblocks.compiler.kernel import Kernel, compile_function
+from armblocks.compiler.kernel_cache import cached_kernel
 from armblocks.compiler.opcodes import Opcode
-from armblocks.compiler.recall import recall
 from armblocks.compiler.tape import OperationCount, Tape
 
-__all__ = ["Kernel", "Opcode", "OperationCount", "Tape", "compile_function", "recall"]
+__all__ = ["Kernel", "Opcode", "OperationCount", "Tape", "cached_kernel", "compile_function"]

@@ -110,7 +110,7 @@ def load(name: str) -> bytes | None:
 
 
 def store(name: str, content: bytes) -> None:
-    """Keep ``content`` under ``name``. Failing to write is no error."""
+    """Store ``content`` under ``name``. Write errors are ignored."""
     root = folder()
     if root is None:
         return
@@ -126,14 +126,14 @@ def store(name: str, content: bytes) -> None:
         except OSError:
             temporary.unlink(missing_ok=True)
             raise
-        _prune_now_and_then(root)
+        _prune_occasionally(root)
 
 
 def _path(root: Path, name: str) -> Path:
     return root / name[:2] / f"{name}{_SUFFIX}"
 
 
-def _prune_now_and_then(root: Path) -> None:
+def _prune_occasionally(root: Path) -> None:
     """Prune unless a process has done so recently; a file stores the time."""
     last = root / "pruned"
     with contextlib.suppress(OSError):

@@ -67,7 +67,7 @@ def target_features(triple: str, found: str) -> str:
     """LLVM's list of features for a processor that has those ``found`` (``"+avx2,-sve"``).
 
     On some x86-64 processors LLVM uses only half of a 512-bit register unless ``prefer-256-bit`` is switched
-    off. Other architectures do not know this feature.
+    off. Other architectures do not have this feature.
     """
     return ",".join(part for part in (found, "-prefer-256-bit" if _is_x86_64(triple) else "") if part)
 

@@ -25,7 +25,7 @@ _LONGEST_FORMULA = 16
 Shapes = Mapping[str, Shape]
 """Shapes by port name."""
 Signals = Mapping[str, SX]
-"""Symbolic values by name, each in its natural shape: scalar 1x1, vector a column, matrix as it is."""
+"""Symbolic values by name, each in its natural shape: scalar 1x1, vector a column, matrix unchanged."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -218,7 +218,8 @@ class Block(ABC):
     def check(self) -> None:  # noqa: B027 - optional, most blocks have no such checks
         """Raise ``InputError`` for inconsistent parameters; each value alone is already checked."""
 
-    # -- ends --------------------------------------------------------------------------------------------
+    # -- ports and states
+    # --------------------------------------------------------------------------------------------
 
     def input_ports(self) -> tuple[Port, ...]:
         """Inputs, in order."""

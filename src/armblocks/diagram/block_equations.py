@@ -199,7 +199,7 @@ def _trace(structure: _Structure) -> BlockEquations:
         for kind in SlotKind
         if kind is not SlotKind.CONDITION
     }
-    sought = _sought(features, structure.clocked, found)
+    sought = _required_shapes(features, structure.clocked, found)
     for kind, values in found.items():
         _check_complete(structure.block, kind, list(sought[kind]), values)
     slots = [BlockSlot(kind, name, shape) for kind, named in sought.items() for name, shape in named.items()]
@@ -213,14 +213,14 @@ def _trace(structure: _Structure) -> BlockEquations:
         guards=features.guards,
         groups=groups,
         delays=features.delays,
-        fixed_delays=frozenset(line.name for line in features.delays) - _moving_delays(groups),
+        fixed_delays=frozenset(line.name for line in features.delays) - _variable_delays(groups),
     )
 
 
-def _sought(
+def _required_shapes(
     features: Features, clocked: bool, found: Mapping[SlotKind, Signals]
 ) -> dict[SlotKind, dict[str, Shape]]:
-    """The shapes of all values that the equations of each role have to give."""
+    """The shapes of the values that the equations of each role return."""
     held = (*features.states, *features.discrete, *features.modes)
     states = {state.name: state.shape for state in held}
     modes = {mode.name: mode.shape for mode in features.modes}
@@ -242,8 +242,8 @@ def _sought(
     }
 
 
-def _moving_delays(groups: Sequence[Group]) -> frozenset[str]:
-    """The values that depend on more than parameters."""
+def _variable_delays(groups: Sequence[Group]) -> frozenset[str]:
+    """The names of delays that depend on time, states or inputs."""
     return frozenset(
         slot.name
         for group in groups

@@ -69,7 +69,7 @@ class DiagramBuilder:
     blocks inside can be formulas of them::
 
         with builder.subsystem("controller", …) as inner:
-            kp = inner.parameter("kp", 5.0, unit="N/m", doc="how hard it pulls")
+            kp = inner.parameter("kp", 5.0, unit="N/m", doc="stiffness")
             inner.add("gain", Gain(gain=kp), …)
             inner.add("filter", FirstOrderLag(time_constant=formula("1 / (10*kp)")), …)
 

@@ -162,7 +162,7 @@ def with_consistent_modes(features: Features) -> Features:
         return {**equations[SlotKind.MODE](at), _WORKS: at.u[ON] != 0.0}
 
     def contradictions(at: Arguments) -> Signals:
-        # The modes of a block that is off stand still; when it is switched on, `reset` gives all of them.
+        # Modes are constant while the control is off; `reset` computes all of them when it turns on.
         return {**equations[SlotKind.CONTRADICTION](at), _WORKS: (at.u[ON] != 0.0) != at.x[_WORKS]}
 
     def guards(at: Arguments) -> Signals:
@@ -201,12 +201,12 @@ def _plain(values: Signals) -> dict[str, SX]:
 
 
 def _starts(features: Features, at: Arguments) -> Signals:
-    """What a restart makes of the states; modes have no past then."""
+    """The initial states after a restart; the previous values of modes are 0."""
     before = {name_before(name) for name in at.x} & set(at.x)
     return {**features.starts(at.p), **{name: SX(0.0) for name in sorted(before)}}
 
 
 def _first_modes(modes: Equation, at: Arguments) -> Signals:
-    """The modes at a restart, from the states that start: as at the start of a run, where modes are 0."""
+    """The consistent modes at a restart, with present modes 0 as at the start of a run."""
     zero = {name: SX(at.x[name]) * 0.0 for name in modes(at)}
     return modes(at.with_states(zero))

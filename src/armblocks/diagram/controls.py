@@ -1,8 +1,9 @@
 """Blocks that replace conditional subsystems in a flat diagram: controls, held outputs, merged outputs.
 
-They are in no library and no file. An event has two iterations: first the control's mode follows its signal,
-so that ``restart`` or ``fire`` becomes 1; then the guard ``acts`` triggers, the blocks inside are reset or
-executed, and the control stores that it has acted. At a tick modes follow at once, and both happen together.
+They are not in the library and never in a file. An event has two iterations: first the control's mode follows
+its signal, so that ``restart`` or ``fire`` becomes 1; then the guard ``acts`` triggers, the blocks inside are
+reset or executed, and the control stores that it has acted. At a tick modes follow at once, and both happen
+together.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ def _inside(block: EnableControl | TriggerControl) -> tuple[Port, ...]:
 
 
 def _held(block: HeldOutput | MergedOutput, x: Signals, u: Signals, p: Signals) -> SX:
-    """The value that an output keeps; a reset of the enclosing subsystem sets it to the initial one."""
+    """The value that an output holds; a reset of the enclosing subsystem sets it to the initial one."""
     return if_else(u["anew"], p["initial"], x["held"]) if block.anew else x["held"]
 
 
@@ -48,7 +49,7 @@ def _side(u: SX) -> SX:
 
 
 def _begins(on: SX, x: Signals) -> SX:
-    """Whether a control is on since this instant, and the blocks inside have not started yet."""
+    """Whether a control has turned on at this instant, and the blocks inside have not started yet."""
     return logic_and(on, x["seen"] == 0.0)
 
 
@@ -56,7 +57,7 @@ def _begins(on: SX, x: Signals) -> SX:
 class EnableControl(Block):
     """Whether an enabled subsystem is active, and whether its states are reset at this time: on = u > 0.
 
-    ``works`` follows ``on`` once the blocks inside have found their modes and started their states anew, so
+    ``works`` follows ``on`` once the blocks inside have consistent modes and initial states, so
     that no event outside of the subsystem acts on the outputs of old modes and states.
     """
 

@@ -2,7 +2,7 @@
 
 ``features_of`` collects what a block declares by its methods: states, modes, guards, conditions, delays and
 equations. Functions from features to features change them: for a conditional subsystem
-(:mod:`~armblocks.diagram.conditional_equations`), for conditions that become modes, for modes that remember
+(:mod:`~armblocks.diagram.conditional_equations`), for conditions that become modes, for modes with hysteresis
 (:mod:`~armblocks.diagram.generated_modes`). Tracing reads the result.
 
 A new feature is a new :class:`SlotKind` with its value while a conditional subsystem is off, its equation in

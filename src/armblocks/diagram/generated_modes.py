@@ -1,6 +1,6 @@
-"""Modes, guards and states that follow from declarations: from conditions, and from modes that remember.
+"""Modes, guards and states that are generated for conditions and for modes with hysteresis.
 
-Each function takes features and gives features.
+Each function returns changed features.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from armblocks.equations import Slot, unflatten
 
 
 def with_memory(features: Features) -> Features:
-    """With a discrete state for every mode that remembers: its value before the event time.
+    """Add a discrete state for every mode with hysteresis: its value before the event time.
 
     Such a mode follows from this value, not from values during mode iteration.
     """
@@ -37,7 +37,7 @@ def with_memory(features: Features) -> Features:
 
 
 def with_modes_of_conditions(features: Features, located: Sequence[Condition]) -> Features:
-    """With a mode and a guard for each of these conditions: a change of the condition is an event."""
+    """Add a mode and a guard for each of these conditions: a change of the condition is an event."""
     if not located:
         return features
     equations = features.equations
@@ -76,7 +76,7 @@ def with_modes_of_conditions(features: Features, located: Sequence[Condition]) -
 
 
 def condition_answers(features: Features, asked: Sequence[Condition], at: Arguments) -> Signals:
-    """Conditions from the present values, each substituted into those after it."""
+    """The conditions at the present values, each substituted into those after it."""
     if not asked:
         return {}
     unknown = {

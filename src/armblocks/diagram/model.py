@@ -33,8 +33,8 @@ def diagram_model(diagram: Diagram) -> Model:
     """Analyse the flat form of a diagram.
 
     Raises ``DiagramError`` for unconnected inputs, for shapes and sample times that do not fit, and for
-    blocks whose parameters allow no equations (a robot without mass), ``AlgebraicLoopError`` for loops that
-    no order can solve.
+    blocks whose parameters allow no equations (a robot without mass), ``AlgebraicLoopError`` for loops
+    without an evaluation order.
     """
     shapes = infer_shapes(diagram)
     form = flatten_hierarchy(diagram)
@@ -90,7 +90,7 @@ def _equations(
 
 
 def sampling_of(diagram: Diagram) -> Sampling:
-    """The clocks of a diagram, and which one each sampled block of its flat form obeys.
+    """The clocks of a diagram, and the clock of each sampled block of its flat form.
 
     Raises ``DiagramError`` for a diagram that cannot be traced.
     """

@@ -83,7 +83,7 @@ class Parameter:
         return _CHECKS[self.kind](self, value, where)
 
     def describe(self) -> str:
-        """The rule in words, for error messages."""
+        """The rule as text, for error messages."""
         if self.kind is ParameterKind.CHOICE:
             return "one of " + ", ".join(self.choices)
         words = {

@@ -1,4 +1,4 @@
-"""Sample times: those that blocks declare, and those that are inherited through wires."""
+"""Sample times: those that blocks declare, and those that are inherited through connections."""
 
 from __future__ import annotations
 
@@ -69,11 +69,12 @@ class Sampling:
 def resolve_sampling(diagram: Diagram, equations: Mapping[str, BlockEquations]) -> Sampling:
     """Find the clock of every sampled block; ``equations`` are those of all other blocks.
 
-    A block with sample time -1 takes the clock of what reaches its inputs, through blocks that only
-    calculate; the fastest, if the others are multiples of it. If nothing but constants reaches it, it takes
-    the clock of the sampled blocks that it feeds.
+    A block with sample time -1 inherits the clock of the sampled blocks upstream, through blocks without
+    states; the fastest one, if the periods of the others are multiples of it. If only constants are upstream,
+    it inherits from the sampled blocks downstream.
 
-    Raises ``DiagramError`` where no clock follows, or two that do not fit.
+    Raises ``DiagramError`` for a block without a clock upstream or downstream, and for clocks that are not
+    multiples.
     """
     sampled = [name for name in diagram.blocks if diagram.clocked(name)]
     if not sampled:
@@ -112,11 +113,12 @@ def resolve_sampling(diagram: Diagram, equations: Mapping[str, BlockEquations]) 
 
 
 def moving_blocks(diagram: Diagram, equations: Mapping[str, BlockEquations]) -> frozenset[str]:
-    """The blocks that may change between instants: with the time, a state, or an input that does.
+    """The blocks with outputs that may change between instants: they depend on time, a state, or such
+    outputs.
 
-    What follows from sampled blocks, constants and modes alone changes at instants. Blocks on a loop count as
-    moving, so that a loop through comparisons is solved for each of their answers. ``equations`` are those of
-    all blocks that are not sampled.
+    Outputs that depend only on sampled blocks, constants and modes change at instants. Blocks on a loop
+    always belong to the result, so that a loop through comparisons is solved for each of their values.
+    ``equations`` are those of all blocks that are not sampled.
     """
     wires = {name: list[tuple[str, PortRef]]() for name in equations}
     for wire in diagram.connections:
@@ -137,9 +139,8 @@ def moving_blocks(diagram: Diagram, equations: Mapping[str, BlockEquations]) -> 
 
 
 def check_triggered(diagram: Diagram, equations: Mapping[str, BlockEquations]) -> None:
-    """Raise ``DiagramError`` for a block in a triggered subsystem that cannot wait for the trigger.
-
-    That is one with continuous states, and one with a sample time of its own.
+    """Raise ``DiagramError`` for a block in a triggered subsystem with a continuous state or with a declared
+    sample time.
     """
     for name, found in equations.items():
         block = diagram.blocks[name]
@@ -151,13 +152,13 @@ def check_triggered(diagram: Diagram, equations: Mapping[str, BlockEquations]) -
             raise DiagramError(
                 f"a block in a triggered subsystem {kind}",
                 where=f"block '{name}' ({block.title})",
-                allowed="blocks that calculate, and sampled ones with the sample time -1",
-                fix="set its sample_time to -1" if timed else "take a sampled block, or an enabled subsystem",
+                allowed="blocks without states, and sampled blocks with the sample time -1",
+                fix="set its sample_time to -1" if timed else "use a sampled block, or an enabled subsystem",
             )
 
 
 def _flows(block: BlockEquations) -> bool:
-    """Whether a block has outputs that change continuously by themselves: with the time or a state."""
+    """Whether outputs of a block depend on time or a continuous state."""
     return bool(block.states or block.delays) or any(group.timed for group in block.groups)
 
 
@@ -190,7 +191,7 @@ def _on_loops(following: Mapping[str, Iterable[str]]) -> set[str]:
 def _reach(
     begins: Mapping[str, Source], following: Mapping[str, Iterable[str]]
 ) -> Mapping[str, set[tuple[str, Source]]]:
-    """For each block the sources of its sample time, without those behind another source."""
+    """For each block the nearest sources of its sample time, without those upstream of another source."""
     reach: dict[str, set[tuple[str, Source]]] = {name: set() for name in following}
     queue: deque[str] = deque()
     for name, source in begins.items():
@@ -202,7 +203,7 @@ def _reach(
             if entry in begins:
                 continue
             before = len(reach[entry])
-            # One example of a block per clock is enough for a message, and keeps the sets small.
+            # One block per clock is enough for the message and limits the size of the sets.
             known = {source for _, source in reach[entry]}
             reach[entry].update(pair for pair in reach[name] if pair[1] not in known)
             if len(reach[entry]) > before:
@@ -212,21 +213,21 @@ def _reach(
 
 def _fastest(name: str, block: Block, reaching: Collection[tuple[str, Source]]) -> SampleClock:
     where = f"block '{name}' ({block.title})"
-    fix = "give the block a sample_time of its own"
+    fix = "set the sample_time of the block"
     moving = sorted(entry for entry, source in reaching if source is None)
     if moving:
         raise DiagramError(
-            f"the sample time -1 is that of the inputs, but '{moving[0]}' changes all the time",
+            f"the sample time -1 is that of the inputs, but '{moving[0]}' changes continuously",
             where=where,
-            allowed="-1 behind sampled blocks only",
-            fix=fix + "; what a continuous signal was some time ago, a Transport Delay says",
+            allowed="-1 downstream of sampled blocks only",
+            fix=fix + "; to delay a continuous signal, use a Transport Delay",
         )
     clocks = sorted(((clock, entry) for entry, clock in reaching if clock), key=lambda pair: pair[0].period)
     if not clocks:
         raise DiagramError(
             "the sample time -1 is that of the inputs, but none of them is sampled",
             where=where,
-            allowed="-1 behind or before a block with a sample time",
+            allowed="-1 upstream or downstream of a block with a sample time",
             fix=fix,
         )
     fastest, by = clocks[0]

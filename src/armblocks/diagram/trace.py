@@ -65,7 +65,7 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
     symbols = Symbols(model)
     flow = Tracing(model.flow, symbols, model.flow_order.sums)
     for node in model.flow_order.order:
-        flow.work_out(node)
+        flow.evaluate(node)
     signals = _signal_values(model.flow, model.flow_order.order, model.shapes)
     units = {str(ref): unit for ref, unit in infer_units(diagram).items()}
     layout = signature(*(Slot(path, shape, units.get(path, "")) for path, shape, _ in signals))
@@ -148,7 +148,7 @@ def _updated(model: Model, symbols: Symbols, flow: Tracing, loops: Implicit) -> 
     """
     tick = Tracing(model.tick, symbols, model.tick_order.sums, model.sampling.clock_of)
     for node in model.tick_order.order:
-        tick.work_out(node)
+        tick.evaluate(node)
     equations, discrete = model.tick.equations, dict(symbols.discrete)
     discrete |= _captured(model, symbols, flow)
     for name in model.sampling.clock_of:
@@ -209,7 +209,7 @@ def _breakpoints(model: Model, symbols: Symbols) -> list[SX]:
 
 
 def _recorded(diagram: Diagram, flow: Tracing, value: Value) -> SX:
-    """The recorded value of a signal; non-finite ones in a subsystem that does not work are recorded as 0."""
+    """The recorded value of a signal; non-finite ones in an inactive subsystem are recorded as 0."""
     worked_out, gate = flow.value(value), diagram.gates.get(value.node.block, {})
     for control in (ON, FIRE):
         if control in gate:
@@ -281,7 +281,7 @@ def _remembered(model: Model, symbols: Symbols) -> tuple[tuple[int, int], ...]:
 
 
 def _recaptured(model: Model, symbols: Symbols) -> tuple[int, ...]:
-    """The places in ``z`` of the discrete states that are captured again wherever modes remember."""
+    """The indices in ``z`` of discrete states that are captured together with modes with hysteresis."""
     ranges = signature(*symbols.discrete_slots).ranges
     return tuple(
         place
@@ -293,7 +293,7 @@ def _recaptured(model: Model, symbols: Symbols) -> tuple[int, ...]:
 
 
 def _momentary(model: Model, symbols: Symbols) -> dict[tuple[str, str], int]:
-    """The places in ``z`` of the discrete states that are 0 again at the end of an instant."""
+    """The indices in ``z`` of the discrete states that become 0 at the end of an instant."""
     ranges = signature(*symbols.discrete_slots).ranges
     return {
         (name, state.name): ranges[f"{name}/{state.name}"].start
@@ -306,7 +306,7 @@ def _momentary(model: Model, symbols: Symbols) -> dict[tuple[str, str], int]:
 def _silenced(
     guards: Sequence[tuple[str, Guard]], momentary: Mapping[tuple[str, str], int]
 ) -> tuple[tuple[int, int], ...]:
-    """The guards that a momentary state silences, each with its place in ``z``."""
+    """The guards that a momentary state disables, each with the index of this state in ``z``."""
     return tuple(
         (number, momentary[name, guard.silenced_by])
         for number, (name, guard) in enumerate(guards)
@@ -417,7 +417,7 @@ def _signal_values(
             derived.setdefault(network.output(ref).node, []).append(ref)
 
     def recorded(node: Node, slot: BlockSlot) -> bool:
-        # The outputs of a sampled block are recorded as it holds them.
+        # For a sampled block the held outputs are recorded.
         computed = slot.kind is SlotKind.OUTPUT and not network.diagram.clocked(node.block)
         return node.order == 0 and (computed or slot.kind is SlotKind.RECORD)
 

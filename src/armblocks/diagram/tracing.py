@@ -95,7 +95,7 @@ class Tracing:
         """Symbols of the unknowns: loop cuts (values that are read before they are computed), implicit
         outputs."""
 
-    def work_out(self, node: Node) -> None:
+    def evaluate(self, node: Node) -> None:
         """Evaluate the equations of one node with the values of the nodes on which it depends."""
         if node.group == HELD:
             return
@@ -116,7 +116,7 @@ class Tracing:
                 still, events = ([SX.zeros(part.numel()) for part in parts] for parts in (still, events))
                 for place, name in enumerate(group.discrete):
                     if name in {line.name for line in self.network.equations[node.block].delays}:
-                        still[place] = self._slope(node.block, name, order)
+                        still[place] = self._delayed_rate(node.block, name, order)
             inputs = [self.value(self.network.input(node.block, port, order)) for port in group.inputs]
             columns.append(vertcat(*states, *still, *inputs, *events, SX(0, 1)))
         arguments = [symbols.t, symbols.parameters[node.block], *columns]
@@ -148,7 +148,7 @@ class Tracing:
                     held = symbols.discrete[f"{node.block}/{slot.name}"]
                     self._values[node][slot.kind, slot.name] = if_else(ticks, fresh, held)
 
-    def _slope(self, block: str, name: str, order: int) -> SX:
+    def _delayed_rate(self, block: str, name: str, order: int) -> SX:
         """The time derivative of a delayed value. Raises ``DiagramError`` where it is not available."""
         if order > 1 or name not in self.network.equations[block].fixed_delays:
             what = "the second derivative" if order > 1 else "the derivative"

@@ -1,4 +1,4 @@
-"""Drawings of diagrams: faces of blocks, layout, routing of signal lines."""
+"""Drawings of diagrams: faces of blocks, layout, routing of wires."""
 
 from typing import TYPE_CHECKING
 

@@ -93,7 +93,7 @@ def diagram_picture(
         width=right - left + 2 * _MARGIN,
         height=bottom - top + 2 * _MARGIN,
         title=f"Diagram {diagram.name}" + (f", sheet {sheet}" if sheet else ""),
-        description=_in_words(level),
+        description=_text_alternative(level),
     )
     drawn = Picture(width=0, height=0, title="", marks=marks)
     picture.place(drawn, _MARGIN - left, _MARGIN - top)
@@ -142,7 +142,7 @@ def block_picture(block: Block) -> Picture:
 
 
 def drawn_bends(diagram: Diagram) -> Mapping[Connection, tuple[float, ...]]:
-    """The user-drawn routes, which are of the diagram's own layout."""
+    """The user-drawn routes, if the diagram has a layout for which they were drawn."""
     return diagram.bends if set(diagram.layout) >= set(diagram.blocks) else {}
 
 
@@ -378,7 +378,7 @@ def _block_title(name: str, box: Box) -> str:
     return f"{name} ({box.block.title})"
 
 
-def _in_words(diagram: Diagram) -> str:
+def _text_alternative(diagram: Diagram) -> str:
     """The text alternative of the drawing: a list of all connections."""
 
     def words(wire: Connection) -> str:

@@ -1,4 +1,4 @@
-"""How wires are drawn: lines with round corners, arrow heads, dots, and labels where there is no line."""
+"""Drawing of wires: lines with round corners, arrow heads, dots, and labels of wires without a line."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from armblocks.pictures.text_width import text_width
 _ROUNDING = 5.0
 LABEL_SIZE = 9.0
 LABEL_STUB = 8.0
-"""px: type size of the labels of wires without a line, and the dashed stub between port and label."""
+"""Font size of the labels of wires without a line, and length of the dashed stub before a label, px."""
 _LABEL_HEIGHT = 13.0
 
 
@@ -28,7 +28,7 @@ class WireKind(IntEnum):
 
 
 def wire_marks(net: RoutedNet, kind: WireKind, title: str, tone: Tone) -> list[Mark]:
-    """A scalar is a thin line, a vector a heavy one, a matrix a double one, a bus three lines."""
+    """The lines of a net: thin for a scalar, thick for a vector, double for a matrix, triple for a bus."""
     marks: list[Mark] = []
     weight = (1.2, 2.3, 3.8, 5.4)[kind]
     lines = [rounded(_shortened(path, 5.0), net.dots) for path in net.paths if path]
@@ -44,7 +44,7 @@ def wire_marks(net: RoutedNet, kind: WireKind, title: str, tone: Tone) -> list[M
 
 
 def _shortened(path: tuple[Point, ...], by: float) -> tuple[Point, ...]:
-    """The path without its last px, which the arrow's head covers."""
+    """The path without its last ``by`` px, which the arrow head covers."""
     (ax, ay), (bx, by_) = path[-2], path[-1]
     length = abs(bx - ax) + abs(by_ - ay)
     share = max(length - by, 0.0) / length if length else 0.0
@@ -52,7 +52,7 @@ def _shortened(path: tuple[Point, ...], by: float) -> tuple[Point, ...]:
 
 
 def rounded(path: tuple[Point, ...], dots: Sequence[Point] = ()) -> tuple[tuple[str | float, ...], ...]:
-    """The commands of straight pieces with small round corners, which are sharp where there are dots."""
+    """The path commands of segments with small round corners; corners at dots are sharp."""
     commands: list[tuple[str | float, ...]] = [("M", *path[0])]
     for before, corner, after in zip(path, path[1:], path[2:]):
         if corner in dots:
@@ -86,7 +86,7 @@ def arrow_head(path: tuple[Point, ...], tone: Tone = Tone.WIRE) -> Mark:
 
 
 def label_marks(net: Net, routed: RoutedNet, name: str, tone: Tone = Tone.WIRE) -> list[Mark]:
-    """The labels at the ends of wires that have no line: what both ends say is connected."""
+    """The labels at both ends of wires without a line; equal labels are connected."""
     ends = [end for end, path in zip(net.targets, routed.paths) if not path]
     if not ends:
         return []
@@ -96,9 +96,9 @@ def label_marks(net: Net, routed: RoutedNet, name: str, tone: Tone = Tone.WIRE) 
     ]
 
 
-def _label(end: WireEnd, way: int, name: str, tone: Tone) -> Sequence[Mark]:
-    """A dashed stub and a frame with the name; ``way`` is 1 at a source and -1 at a target."""
-    dx, dy = way * end.dx, way * end.dy
+def _label(end: WireEnd, side: int, name: str, tone: Tone) -> Sequence[Mark]:
+    """A dashed stub and a frame with the name; ``side`` is 1 at a source and -1 at a target."""
+    dx, dy = side * end.dx, side * end.dy
     x, y = end.x + LABEL_STUB * dx, end.y + LABEL_STUB * dy
     width = text_width(name, LABEL_SIZE) + 8
     left = x - width / 2 + dx * width / 2

@@ -1,4 +1,4 @@
-"""The lines of one net among those that are laid: user-drawn ways first, then the nearest target."""
+"""Routes one net between routed nets: user-drawn routes first, then targets by distance."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from itertools import pairwise
 
 import numpy as np
 
-from armblocks.drawing.wire_room import LEVELS, Extent, Level, Room, sorted_ends
+from armblocks.drawing.free_space import LEVELS, Extent, FreeSpace, Level, sorted_ends
 from armblocks.drawing.wire_search import Floats, Point
 from armblocks.drawing.wires import Net, RoutedNet, WireEnd, bent, corners
 
 _EXAMINED = 12.0
-"""px around a line on which its legality depends."""
+"""The legality of a line depends on objects within this distance, px."""
 
 
 @dataclass(frozen=True)
 class LaidNet:
-    """A routed net, its straight pieces (n, 4), and the area that its route depends on."""
+    """A routed net, its segments (n, 4), and the area on which its route depends."""
 
     net: Net
     routed: RoutedNet
@@ -27,22 +27,22 @@ class LaidNet:
 
 
 class NetRouter:
-    """Lays one net, target by target."""
+    """Routes one net, target by target."""
 
-    def __init__(self, room: Room, net: Net, number: int) -> None:
-        self._room = room
+    def __init__(self, space: FreeSpace, net: Net, number: int) -> None:
+        self._space = space
         self._net = net
         self._number = number
         self._tree: list[tuple[Point, Point]] = []
         self._dots: list[Point] = []
         self._examined: Extent = (np.inf, np.inf, -np.inf, -np.inf)
 
-    def laid(self) -> LaidNet:
-        """The routes to all targets: user-drawn ones first, then the nearest."""
+    def routed(self) -> LaidNet:
+        """Route all targets: user-drawn routes first, then the others by distance from the source."""
         net = self._net
         paths: dict[int, tuple[Point, ...]] = {}
         for k, (target, bends) in enumerate(zip(net.targets, net.bends)):
-            if (drawn := bent(net.source, bends, target)) and (path := self._kept(drawn, target)):
+            if (drawn := bent(net.source, bends, target)) and (path := self._user_drawn(drawn, target)):
                 paths[k] = path
         origin = net.source
 
@@ -50,12 +50,12 @@ class NetRouter:
             return abs(net.targets[k].x - origin.x) + abs(net.targets[k].y - origin.y), k
 
         for k in sorted(set(range(len(net.targets))) - set(paths), key=nearness):
-            paths[k] = self._found(net.targets[k])
+            paths[k] = self._route(net.targets[k])
         routed = RoutedNet(tuple(paths[k] for k in range(len(net.targets))), tuple(sorted(self._dots)))
         pieces = sorted_ends(np.array([(*a, *b) for a, b in self._tree]).reshape(-1, 4))
         return LaidNet(net, routed, pieces, self._examined)
 
-    def _found(self, target: WireEnd) -> tuple[Point, ...]:
+    def _route(self, target: WireEnd) -> tuple[Point, ...]:
         for level in LEVELS:
             path = self._at_level(target, level)
             if path:
@@ -65,18 +65,18 @@ class NetRouter:
 
     def _at_level(self, target: WireEnd, level: Level) -> tuple[Point, ...]:
         source, end = self._net.source, (target.x, target.y)
-        if not self._tree and _faces(source, target):
+        if not self._tree and _is_straight(source, target):
             line = (source.x, source.y, target.x, target.y)
             extent = _around(line, _EXAMINED + level.clearance)
             self._examine(extent)
             ports = [((source.x, source.y), (source.dx, source.dy)), (end, (-target.dx, -target.dy))]
-            if self._room.around(extent, self._number).is_free(line, level, ports):
+            if self._space.around(extent, self._number).is_free(line, level, ports):
                 return (source.x, source.y), end
         start, goal = _ahead(source, level.stub), _behind(target, level.stub)
         points = [start, goal, (source.x, source.y), end, *(point for piece in self._tree for point in piece)]
         extent = _around(_hull(points), level.window)
         self._examine(extent)
-        surroundings = self._room.around(extent, self._number)
+        surroundings = self._space.around(extent, self._number)
         if not surroundings.is_legal_stub((*goal, *end), level, end, (-target.dx, -target.dy)):
             return ()
         found: list[Point]
@@ -86,7 +86,7 @@ class NetRouter:
             port = (source.x, source.y)
             if not surroundings.is_legal_stub((*port, *start), level, port, (source.dx, source.dy)):
                 return ()
-            found = surroundings.way(source, start, goal, target, level)
+            found = surroundings.path(source, start, goal, target, level)
             if found:
                 found.insert(0, port)
         return corners([*found, end]) if found else ()
@@ -94,16 +94,16 @@ class NetRouter:
     def _ports(self) -> list[Point]:
         return [(end.x, end.y) for end in (self._net.source, *self._net.targets)]
 
-    def _kept(self, path: tuple[Point, ...], target: WireEnd) -> tuple[Point, ...]:
-        """A user-drawn path from where it leaves the tree, as long as it is legal; else nothing."""
+    def _user_drawn(self, path: tuple[Point, ...], target: WireEnd) -> tuple[Point, ...]:
+        """Add a user-drawn path from its last point on the routed tree; empty if it is not legal."""
         extent = _around(_hull(path), _EXAMINED)
         self._examine(extent)
         source, level = self._net.source, LEVELS[-1]
-        if not (_runs(path[0], path[1], source) and _runs(path[-2], path[-1], target)):
+        if not (_is_along(path[0], path[1], source) and _is_along(path[-2], path[-1], target)):
             return ()
         if _touches_itself(path):
             return ()
-        surroundings = self._room.around(extent, self._number)
+        surroundings = self._space.around(extent, self._number)
         for k, (a, b) in enumerate(pairwise(path)):
             ends: list[tuple[Point, tuple[int, int]]] = []
             if k == 0:
@@ -113,7 +113,7 @@ class NetRouter:
             if not surroundings.is_legal((*a, *b), level, ends):
                 return ()
         path = self._leaving(path)
-        if len(path) < 2 or (self._tree and not surroundings.may_turn(path[0], level)):
+        if len(path) < 2 or (self._tree and not surroundings.may_bend(path[0], level)):
             return ()
         self._add(path)
         return path
@@ -137,8 +137,8 @@ class NetRouter:
         self._examined = min(a[0], b[0]), min(a[1], b[1]), max(a[2], b[2]), max(a[3], b[3])
 
 
-def _faces(source: WireEnd, target: WireEnd) -> bool:
-    """Whether a straight line leads from a source into a target."""
+def _is_straight(source: WireEnd, target: WireEnd) -> bool:
+    """Whether a straight line can connect a source and a target."""
     if (source.dx, source.dy) != (target.dx, target.dy):
         return False
     along = (target.x - source.x) * source.dx + (target.y - source.y) * source.dy
@@ -146,8 +146,8 @@ def _faces(source: WireEnd, target: WireEnd) -> bool:
     return across == 0 and along >= 2 * LEVELS[-1].gap
 
 
-def _runs(a: Point, b: Point, end: WireEnd) -> bool:
-    """Whether a piece runs in the direction of the signal at an end, for as far as a stub."""
+def _is_along(a: Point, b: Point, end: WireEnd) -> bool:
+    """Whether a segment has the direction of the signal at an end, and at least the length of a stub."""
     return (b[0] - a[0]) * end.dx + (b[1] - a[1]) * end.dy >= LEVELS[-1].stub
 
 
@@ -157,7 +157,7 @@ def _touches_itself(path: Sequence[Point]) -> bool:
 
 
 def _contacts(one: tuple[Point, Point], other: tuple[Point, Point]) -> list[Point]:
-    """The ends of what two pieces, each level or upright, have in common."""
+    """The ends of the intersection of two segments, each horizontal or vertical."""
     (ax, ay), (bx, by) = one
     (cx, cy), (dx, dy) = other
     left, right = max(min(ax, bx), min(cx, dx)), min(max(ax, bx), max(cx, dx))
@@ -170,12 +170,12 @@ def _distance(a: Point, b: Point) -> float:
 
 
 def _ahead(end: WireEnd, stub: float) -> Point:
-    """Where a wire that leaves a port is free to turn."""
+    """The end of the stub of a wire that leaves a port."""
     return end.x + stub * end.dx, end.y + stub * end.dy
 
 
 def _behind(end: WireEnd, stub: float) -> Point:
-    """Where a wire that enters a port has its last corner."""
+    """The start of the stub of a wire that enters a port."""
     return end.x - stub * end.dx, end.y - stub * end.dy
 
 

@@ -1,12 +1,12 @@
-"""The wires of a sheet: orthogonal lines around blocks that can be read in one way only.
+"""Routes the wires of a sheet: orthogonal lines around blocks with an unambiguous meaning.
 
-The router keeps a law: from lines and dots alone a reader infers the connections of the model. No line passes
-under a block or beside a foreign port. Lines of two nets never share a piece, and cross at right angles away
-from corners, dots and ports. Where no such line fits, the wire gets none: its ends carry labels.
+The lines and dots determine the connections uniquely. No line passes under a block or near a port of another
+net. Lines of two nets never overlap, and cross at right angles away from corners, dots and ports. A wire
+without a legal route has labels at its ends in place of a line.
 
-The routes are a function of the blocks and nets alone. :class:`Routing` remembers the previous sheet and
-routes only the nets for which something in the area that the router examined has changed, so the result is
-the same as from the beginning.
+The routes are a function of the blocks and nets alone. :class:`Routing` stores the previous routes and the
+area on which each depends. It reroutes only nets with a change in this area; the result equals that of a new
+routing of the whole sheet.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from armblocks.drawing.free_space import RESERVED, Extent, FreeSpace, extents, meet, sorted_ends
 from armblocks.drawing.wire_net import LaidNet, NetRouter
-from armblocks.drawing.wire_room import RESERVED, Extent, Room, extents, meet, sorted_ends
 from armblocks.drawing.wire_search import Floats
 from armblocks.drawing.wires import Net, Obstacle, RoutedNet, WireEnd
 
 ALMOST_LEVEL = 1.5
-"""px by which a line may miss the middle of a port where that makes it straight."""
+"""Maximum offset of a line from the middle of a port, if that makes the line straight, px."""
 
 
 def route(obstacles: Sequence[Obstacle], nets: Sequence[Net]) -> list[RoutedNet]:
-    """The lines of every net."""
+    """The routes of all nets, in their order."""
     blocks = {str(k): obstacle for k, obstacle in enumerate(obstacles)}
     routed = Routing().update(blocks, {f"{k:06}": net for k, net in enumerate(nets)})
     return [routed[f"{k:06}"] for k in range(len(nets))]
@@ -34,7 +34,7 @@ def route(obstacles: Sequence[Obstacle], nets: Sequence[Net]) -> list[RoutedNet]
 
 @dataclass(frozen=True)
 class _Known:
-    """A net, and what follows from it alone: the pieces at its ports that are kept free, and its rank."""
+    """A net with its reserved segments at the ports and its rank in the routing order."""
 
     net: Net
     number: int
@@ -43,24 +43,25 @@ class _Known:
 
 
 class Routing:
-    """The routes of one sheet, kept up to date while its blocks and nets change."""
+    """The routes of one sheet, updated when its blocks or nets change."""
 
     def __init__(self) -> None:
         self._obstacles: Mapping[str, Obstacle] = {}
-        self._room = Room([])
+        self._space = FreeSpace([])
         self._known: dict[str, _Known] = {}
         self._laid: dict[str, LaidNet] = {}
         self._given: dict[str, tuple[Net, Net]] = {}
         self._numbers = 0
 
     def update(self, obstacles: Mapping[str, Obstacle], nets: Mapping[str, Net]) -> dict[str, RoutedNet]:
-        """The routes of all nets by key: user-drawn ones are laid first, then the short ones."""
+        """The routes of all nets by key. Nets with user-drawn routes are routed first, then others by
+        length."""
         nets = {key: self._levelled(key, net) for key, net in nets.items()}
         changed = [*self._changed_obstacles(obstacles), *self._changed_nets(nets)]
         if not changed and nets.keys() == self._laid.keys():
             return {key: self._laid[key].routed for key in nets}
-        room = self._room if obstacles == self._obstacles else Room(_sides(obstacles.values()))
-        room.reserve([(known.ends, known.number) for known in self._known.values()])
+        space = self._space if obstacles == self._obstacles else FreeSpace(_sides(obstacles.values()))
+        space.reserve([(known.ends, known.number) for known in self._known.values()])
         stale = self._stale(changed)
         laid: dict[str, LaidNet] = {}
         fresh: list[Extent] = []
@@ -72,19 +73,19 @@ class Routing:
                 or old.net != net
                 or (fresh and any(meet(old.examined, extent) for extent in fresh))
             ):
-                found = NetRouter(room, net, self._known[key].number).laid()
+                found = NetRouter(space, net, self._known[key].number).routed()
                 if old is None or found.routed != old.routed:
                     fresh += extents(found.pieces)
                     fresh += extents(old.pieces) if old is not None else ()
                 old = found
             laid[key] = old
-            room.lay(old.pieces, self._known[key].number)
-        self._obstacles, self._room, self._laid = dict(obstacles), room, laid
+            space.lay(old.pieces, self._known[key].number)
+        self._obstacles, self._space, self._laid = dict(obstacles), space, laid
         self._given = {key: self._given[key] for key in nets}
         return {key: laid[key].routed for key in nets}
 
     def _levelled(self, key: str, net: Net) -> Net:
-        """The net with targets level with its source that are almost so: no line has a step of one px."""
+        """The net with targets that are at most ``ALMOST_LEVEL`` off the level of the source moved to it."""
         old = self._given.get(key)
         if old is None or (old[0] is not net and old[0] != net):
             targets = tuple(_level(target, net.source) for target in net.targets)
@@ -92,7 +93,7 @@ class Routing:
         return old[1]
 
     def _stale(self, changed: Sequence[Extent]) -> set[str]:
-        """The nets whose routes depend on an area in which something has changed."""
+        """The nets whose routes depend on one of these changed areas."""
         if not changed or not self._laid:
             return set()
         examined = np.array([laid.examined for laid in self._laid.values()])[:, None]
@@ -105,7 +106,7 @@ class Routing:
         for name in {*obstacles, *self._obstacles}:
             old, new = self._obstacles.get(name), obstacles.get(name)
             if old is not new and old != new:
-                yield from (Room(_sides([one])).extent(0) for one in (old, new) if one is not None)
+                yield from (FreeSpace(_sides([one])).extent(0) for one in (old, new) if one is not None)
 
     def _changed_nets(self, nets: Mapping[str, Net]) -> list[Extent]:
         changed: list[Extent] = []
@@ -138,7 +139,7 @@ def _level(target: WireEnd, source: WireEnd) -> WireEnd:
 
 
 def _sides(obstacles: Iterable[Obstacle]) -> list[tuple[float, ...]]:
-    """Left, top, right and bottom of blocks and of their names."""
+    """Left, top, right and bottom of each block and of its name."""
     return [
         (
             *(o.x, o.y, o.x + o.width, o.y + o.height),
@@ -149,7 +150,7 @@ def _sides(obstacles: Iterable[Obstacle]) -> list[tuple[float, ...]]:
 
 
 def _ends(net: Net) -> Floats:
-    """The places directly before the ports of a net, which are kept free for it."""
+    """The segments directly before the ports of a net, which are reserved for it."""
     source = net.source
     rows = [(source.x, source.y, source.x + RESERVED * source.dx, source.y + RESERVED * source.dy)]
     rows += [(t.x - RESERVED * t.dx, t.y - RESERVED * t.dy, t.x, t.y) for t in net.targets]

@@ -1,9 +1,9 @@
-"""The cheapest way of a wire over a grid of horizontal and vertical lines.
+"""The cheapest route of a wire on a grid of horizontal and vertical lines.
 
-The grid has lines through every place where a wire may turn: beside blocks and beside other wires (Hanan
-1966 shows that such a grid contains a shortest rectilinear tree). The search counts bends: sweep *k* finds,
-for all nodes at once, the cheapest way that arrives with *k* bends. A sweep is a running minimum along every
-grid line, so its time depends on the size of the grid alone, not on the number of obstacles.
+The grid has lines through all possible corners: beside blocks and beside other wires (Hanan 1966 shows that
+such a grid contains a shortest rectilinear tree). Sweep *k* computes, for all nodes at once, the cost of the
+cheapest route with *k* bends. A sweep is a running minimum along every grid line, so its time depends on the
+size of the grid alone, not on the number of obstacles.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ Point: TypeAlias = tuple[float, float]
 Node: TypeAlias = tuple[int, int]
 
 BEND = 34.0
-"""px of detour that one bend is worth."""
+"""Cost of a bend, as the equivalent detour in px."""
 BLOCKED = 1e6
-"""Cost of an edge that no wire may use. Ways that cost more than half of it do not exist."""
+"""Cost of a blocked edge. A route that costs more than half of this value is not legal."""
 _MOST_BENDS = 14
 
 
 def grid_lines(exact: Sequence[float], wanted: Sequence[float], apart: float) -> Floats:
-    """All ``exact`` coordinates, and those of ``wanted`` that are ``apart`` from the others, in order."""
+    """All ``exact`` coordinates, and those of ``wanted`` that are ``apart`` from all others; sorted."""
     kept = sorted(set(exact))
     found, k = list(kept), 0
     last = -np.inf
@@ -44,12 +44,12 @@ def grid_lines(exact: Sequence[float], wanted: Sequence[float], apart: float) ->
 
 
 def painted(rectangles: Floats, weights: Floats, line: Floats, levels: Floats) -> Floats:
-    """The sum of the weights of the open rectangles that each edge of parallel grid lines meets.
+    """The sum of the weights of the open rectangles that each edge of parallel grid lines intersects.
 
     ``rectangles`` (n, 4): begin, end along the lines, begin, end across them. ``weights`` (n, kinds) are
-    dyadic, so sums are exact. ``line`` has the coordinates of the nodes along each line, ``levels`` where the
-    lines are. Gives (kinds, edges, lines): weights are put on the corners of the rectangles, and sums along
-    both directions fill them.
+    dyadic, so sums are exact. ``line`` has the coordinates of the nodes along each line, ``levels`` those of
+    the lines. Returns (kinds, edges, lines). The weights are written to the corners of the rectangles;
+    cumulative sums in both directions extend them to the interior (a summed-area table).
     """
     first = np.maximum(np.searchsorted(line, rectangles[:, 0], "right") - 1, 0)
     last = np.maximum(np.searchsorted(line, rectangles[:, 1], "left"), first)
@@ -69,9 +69,9 @@ def painted(rectangles: Floats, weights: Floats, line: Floats, levels: Floats) -
 
 @dataclass(frozen=True)
 class Grid:
-    """Grid lines, the cost of every edge, and where a wire may turn.
+    """Grid lines, the cost of every edge, and the nodes at which a wire may bend.
 
-    ``right`` (columns - 1, rows) and ``down`` (rows - 1, columns): costs of edges. ``turn``: rows, columns.
+    ``right`` (columns - 1, rows) and ``down`` (rows - 1, columns): costs of edges. ``turn`` (rows, columns).
     """
 
     xs: Floats
@@ -81,16 +81,16 @@ class Grid:
     turn: Truths
 
     def node(self, point: Point) -> Node:
-        """Row and column of a point, which is on a line of each direction."""
+        """Row and column of a point at the intersection of two grid lines."""
         return int(np.searchsorted(self.ys, point[1])), int(np.searchsorted(self.xs, point[0]))
 
     def cheapest(
         self, rightwards: Floats, downwards: Floats, goal: Node, most: float, *, flat: bool
     ) -> list[Point]:
-        """The corners of the cheapest way to a goal; empty if there is none, or it costs more than ``most``.
+        """The corners of the cheapest route to a goal; empty if there is none at a cost below ``most``.
 
-        ``rightwards`` and ``downwards`` (rows, columns): what it costs to begin at a node along its row or
-        along its column, infinite elsewhere. ``flat``: the way arrives along the row of the goal.
+        ``rightwards`` and ``downwards`` (rows, columns): the cost of a start at a node along its row or along
+        its column, infinite elsewhere. ``flat``: the route arrives along the row of the goal.
         """
         left = np.abs(self.ys - self.ys[goal[0]])[:, None] + np.abs(self.xs - self.xs[goal[1]])
         rows, columns = _Sweeps(self.right, self.turn.T, left.T), _Sweeps(self.down, self.turn, left)
@@ -131,10 +131,11 @@ class _Sweeps:
         self.costs: list[Floats] = []
         """Cost of arriving at each node with each number of bends."""
         self.bound = np.inf
-        """No way that goes on from the latest sweep costs less, bends to come apart."""
+        """Lower bound of the cost of routes that continue from the latest sweep, without further bends."""
 
     def sweep(self, begins: Floats) -> Floats:
-        """Sweep from nodes where a way may begin; gives the costs where they are lower than ever."""
+        """Sweep from these start costs; returns the costs that are new minima, infinity at all other
+        nodes."""
         forwards = np.minimum.accumulate(begins - self._along, axis=0)
         forwards += self._along
         costs = np.minimum.accumulate((begins + self._along)[::-1], axis=0)[::-1] - self._along
@@ -147,10 +148,10 @@ class _Sweeps:
         return fresh
 
     def bend(self, across: Floats) -> Floats:
-        """Sweep from nodes that were reached across, at these costs, and where the way may turn."""
+        """Sweep after a bend from nodes with these costs in the other direction."""
         return self.sweep(across.T + self._turning)
 
     def origin(self, k: int, line: int, place: int) -> int:
-        """Where the way that arrives with ``k`` bends at a place of a line has begun to run along it."""
+        """The place on a line at which the route with ``k`` bends to ``place`` has entered this line."""
         along = self._along[:, line]
         return int(np.argmin(self._begins[k][:, line] + np.abs(along - along[place])))

@@ -1,4 +1,4 @@
-"""Wires of a sheet as data: blocks in the way, ends, nets, and the lines that are drawn of them."""
+"""Data types of the wires of a sheet: obstacles, wire ends, nets, and routed nets."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Obstacle:
 
 @dataclass(frozen=True)
 class WireEnd:
-    """Where a wire meets a block, and the direction of the signal there."""
+    """The end of a wire at a block: position (px) and direction of the signal."""
 
     x: float
     y: float
@@ -40,17 +40,17 @@ class Net:
 
 
 def moved_bends(bends: Sequence[float], flat: bool, shift: tuple[float, float]) -> tuple[float, ...]:
-    """A user-drawn route whose blocks have moved by ``shift``; ``flat``: it leaves its source sideways."""
+    """A user-drawn route after a shift of its blocks; ``flat``: it leaves its source horizontally."""
     return tuple(value + shift[(k + flat + 1) % 2] for k, value in enumerate(bends))
 
 
 @dataclass(frozen=True)
 class RoutedNet:
-    """The drawn lines of a net.
+    """The route of a net.
 
-    ``paths``: for each target the corner points from the source or a branch point to the target. A path
-    without points means that there is no room for a line: the source and this target carry labels instead.
-    ``dots``: where lines branch.
+    ``paths``: for each target the corner points from the source or a branch point to the target. An empty
+    path means that no legal route exists: labels at the source and at this target replace the line. ``dots``:
+    where lines branch.
     """
 
     paths: tuple[tuple[Point, ...], ...]
@@ -58,11 +58,12 @@ class RoutedNet:
 
 
 def bent(source: WireEnd, bends: Sequence[float], target: WireEnd) -> tuple[Point, ...] | None:
-    """The corner points of a way along ``bends``, the coordinates of its straight pieces in turn (px).
+    """The corner points of the user-drawn route with these ``bends``; ``None`` if there is no such route.
 
-    Of a wire that leaves to the side these are x, y, x …; the first and the last piece go with their ports,
-    so the way holds together wherever blocks are moved. ``None`` where there are no bends, or where the last
-    piece would not run in the direction of its port (a block was turned).
+    ``bends`` has the coordinate (px) of each inner segment: x, y, x … for a wire that leaves its source
+    horizontally. The first and the last segment follow their ports, so that the route stays connected when
+    blocks move. The result is ``None`` without bends, and where the last segment would not have the direction
+    of its port, after the rotation of a block.
     """
     x, y, flat = source.x, source.y, source.dx != 0
     points: list[Point] = [(x, y)]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armblocks.compiler import Kernel, OperationCount, recall
+from armblocks.compiler import Kernel, OperationCount, cached_kernel
 from armblocks.compiler.arguments import check_count, in_order
 from armblocks.errors import InputError, UnknownNameError
 from armblocks.face.notebook_views import robot_view
@@ -231,7 +231,7 @@ class Arm:
         kernel = self._kernels.get(method)
         if kernel is None:
             key = f"robot/{method}/{self._description_key}"
-            kernel = self._kernels[method] = recall(key, lambda: _traces()[method](self.robot))
+            kernel = self._kernels[method] = cached_kernel(key, lambda: _traces()[method](self.robot))
         return kernel
 
     def _entry(self, method: str) -> Callable[..., Array]:

@@ -131,5 +131,5 @@ def _scalar(value: object, path: KeyPath) -> str:
                 f"a {type(value).__name__} cannot be written",
                 where=path_text(path),
                 allowed="JSON's own types",
-                fix="turn it into numbers, texts, lists and objects",
+                fix="convert it to numbers, texts, lists and objects",
             )

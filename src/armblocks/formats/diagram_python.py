@@ -251,7 +251,7 @@ def _loading(robot: Robot, where: str) -> tuple[str, str]:
             f"the robot '{robot.name}' is neither a shipped one nor that of a file",
             where=where,
             allowed=", ".join(list_robots()),
-            fix="write the diagram as JSON, which holds any robot",
+            fix="write the diagram as JSON, which can contain any robot",
         )
     reference = str(stated["robot"])
     model = f", friction_model={_value(stated['friction_model'])}" if "friction_model" in stated else ""

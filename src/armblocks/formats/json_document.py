@@ -121,7 +121,7 @@ def read_document(data: bytes, name: str, most_bytes: int, deepest: int = DEEPES
             "the document is too large",
             where=name,
             allowed=f"at most {most_bytes} bytes",
-            fix="split it, or keep long tables in files of their own",
+            fix="split it, or store long tables in separate files",
         )
     try:
         text = data.decode("utf-8-sig")

@@ -15,10 +15,10 @@ from armblocks.robot import FrictionModel, Robot
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Script:
-    """What a script leaves behind, by the names of its variables.
+    """The results of a script, by the names of its variables.
 
-    ``robots`` in the order in which the variables first appeared, without those that equal an earlier one
-    (copies); ``variables`` its matrices, always (rows, columns), in the script's own units, and its texts.
+    ``robots``: in the order in which the variables first appeared, without copies of an earlier one.
+    ``variables``: texts, and matrices (rows, columns) in the units of the script.
     """
 
     robots: Mapping[str, Robot]
@@ -28,19 +28,19 @@ class Script:
 def read_script(
     data: bytes, name: str, *, friction_model: FrictionModel = FrictionModel.SQUARED_GEAR
 ) -> Script:
-    """Run a robot script and keep its robots and variables.
+    """Run a robot script and return its robots and variables.
 
-    ``name`` is what messages call the file. Both families of the toolbox are known: ``link``, ``robot`` of
-    the releases up to 8 and ``Link``, ``SerialLink`` of 9 and later, with their own orders of the D-H
-    numbers, copies and handles. Every robot gets ``friction_model``, by default that of releases 9.5 to 10
-    whatever the script's release is: the formulas of older releases are errors in the signs or powers of the
-    gear ratio, kept by name in :class:`armblocks.robot.FrictionModel`. Gravity changes its sign, as the
-    toolbox's points up. Links are named ``link1``, ``link2`` …
+    ``name`` is the file's name in messages. Both interfaces of the toolbox are supported: ``link`` and
+    ``robot`` of releases up to 8 (value objects), ``Link`` and ``SerialLink`` of releases 9 and later (handle
+    objects). They differ in the order of the D-H parameters. Every robot gets ``friction_model``, by default
+    that of releases 9.5 to 10 for scripts of all releases: the formulas of older releases have wrong signs or
+    powers of the gear ratio; :class:`armblocks.robot.FrictionModel` lists them. The sign of gravity is
+    reversed, because the toolbox's vector points up. Links are named ``link1``, ``link2`` …
 
-    Raises ``FormatError`` with file, line and text at the first line that is not understood. Warns where
-    lines were broken as on a printed page and were joined.
+    Raises ``FormatError`` with file, line and text at the first invalid or unsupported line. Warns if lines
+    that a printed page had broken were joined.
     """
-    # Here and not above: half of what loading a shipped robot would cost, without a script anywhere.
+    # Imported here: these modules would double the time to load a shipped robot, which needs no script.
     from armblocks.formats.matlab.interpreter import Interpreter
     from armblocks.formats.matlab.page_layout import without_page_breaks
     from armblocks.formats.matlab.records import RobotRecord
@@ -55,8 +55,8 @@ def read_script(
     if broken := sorted({*uncommented, *interpreter.joined_lines}):
         warnings.warn(
             f"{name}: lines {', '.join(map(str, broken))} are broken as on a printed page and were joined "
-            "with what follows. MATLAB itself would not read them so. Fix: check the robot's numbers, and "
-            "give every statement a line of its own.",
+            "with the next line. MATLAB does not join them. Fix: check the robot's numbers, and write every "
+            "statement on one line.",
             ArmblocksWarning,
             stacklevel=2,
         )

@@ -13,7 +13,7 @@ from armblocks.files import read_bounded
 from armblocks.formats.robot_format import RobotFormat
 from armblocks.formats.robot_formats import ROBOT_FORMATS, ROBOT_SUFFIXES
 from armblocks.formats.shipped import ROBOT_FILE, list_robots, shipped_folder
-from armblocks.robot import FrictionModel, Robot, warn_of_doubts, warn_of_inertias
+from armblocks.robot import FrictionModel, Robot, warn_of_implausible_values, warn_of_inertias
 
 
 def load_robot(
@@ -42,7 +42,7 @@ def load_robot(
         robot = _pick(_read_file(Path(text)), text, name)
         robot = replace(robot, source=text)
         warn_of_inertias(robot)
-        warn_of_doubts(robot)
+        warn_of_implausible_values(robot)
     else:
         robot = shipped_robot(text)
         if name is not None:
@@ -114,7 +114,7 @@ def _pick(robots: Mapping[str, Robot], where: str, name: str | None) -> Robot:
             "the file defines no robot",
             where=where,
             allowed="kuka = robot(L, …) or SerialLink(L, …)",
-            fix="let the script make a robot, or name another file",
+            fix="define a robot in the script, or choose another file",
         )
     if name is not None:
         for variable, robot in robots.items():

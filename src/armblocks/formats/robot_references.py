@@ -83,7 +83,7 @@ class RobotReader:
         reference = node.text()
         if not self._trust:
             raise node.error(
-                f"'{reference}' is Python code, and files run no code unasked",
+                f"'{reference}' is Python code, which is run only for a trusted diagram",
                 allowed="a diagram without Python functions, or one that is trusted",
                 fix="read the code, then use load_diagram(..., trust=True) or --trust",
             )

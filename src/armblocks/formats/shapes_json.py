@@ -28,7 +28,7 @@ def _faces(node: Node) -> tuple[tuple[int, ...], ...]:
     faces = _rows(3)(node)
     for face, element in zip(faces, node.elements()):
         if any(number < 0 or number != int(number) for number in face):
-            raise element.error("a face does not name vertices", allowed="3 whole numbers from 0")
+            raise element.error("a face is not a list of vertex numbers", allowed="3 whole numbers from 0")
     return tuple(tuple(int(number) for number in face) for face in faces)
 
 

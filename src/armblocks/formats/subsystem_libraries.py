@@ -139,14 +139,14 @@ class Libraries:
         if key in self._chain:
             first = self._chain.index(key)
             raise FormatError(
-                f"library blocks hold each other in a circle: {' -> '.join(shown[first:])}",
+                f"library blocks contain each other in a cycle: {' -> '.join(shown[first:])}",
                 where=str(path),
                 allowed="library blocks that do not contain themselves",
-                fix="take one of these blocks out of the other",
+                fix="remove one of these blocks from the other",
             )
         if len(self._chain) >= DEEPEST_CHAIN:
             raise FormatError(
-                f"library blocks are more than {DEEPEST_CHAIN} deep inside each other: "
+                f"library blocks are nested more than {DEEPEST_CHAIN} levels deep: "
                 f"{' -> '.join(shown[:3])} -> …",
                 where=str(path),
                 allowed=f"at most {DEEPEST_CHAIN}",

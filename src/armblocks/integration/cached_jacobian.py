@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from armblocks.compiler import cache
-from armblocks.compiler.kept import keep_tape, kept_tape, tape_of
+from armblocks.compiler.cached_tapes import cached_tape, store_tape, tape_of
 from armblocks.compiler.tape import Tape
 from armblocks.integration.elimination_plan import JacobianPattern
 
@@ -43,7 +43,7 @@ def cached_jacobian(derivative: str, residual: str, trace: Callable[[], HybridSy
                 columns=tuple(kept["columns"]),
             )
             digest = str(kept["digest"])
-            tape = lambda: kept_tape(digest, lambda: _traced(trace).function)  # noqa: E731
+            tape = lambda: cached_tape(digest, lambda: _traced(trace).function)  # noqa: E731
             return CachedJacobian(pattern=pattern, digest=digest, tape=tape)
         except (ValueError, KeyError, TypeError):
             pass  # a cache entry of another version: compute it again
@@ -51,7 +51,7 @@ def cached_jacobian(derivative: str, residual: str, trace: Callable[[], HybridSy
     made = tape_of(traced.function)
     states, size = (slot.size for slot in (traced.function.inputs["x"], traced.function.outputs["T"]))
     pattern = JacobianPattern(states=states, size=size, rows=traced.rows, columns=traced.columns)
-    keep_tape(made)
+    store_tape(made)
     record = {
         "states": states,
         "size": size,

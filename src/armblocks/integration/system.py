@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from armblocks.compiler import cache
 from armblocks.compiler.batch import BatchLayout, Layout, emit_batch
+from armblocks.compiler.cached_tapes import cached_tape, slots_from_json, slots_to_json, store_tape, tape_of
 from armblocks.compiler.ir_text import Module
-from armblocks.compiler.kept import keep_tape, kept_tape, slots_from_json, slots_to_json, tape_of
 from armblocks.compiler.llvm_ir import emit_function
 from armblocks.compiler.native import Effort, NativeCode, load_code
 from armblocks.compiler.pieces import is_long
@@ -67,7 +67,7 @@ def recall_system(key: str, trace: Callable[[], HybridSystem]) -> CompiledSystem
             description = json.loads(stored)
 
             def tape(function: str) -> Tape:
-                return kept_tape(description["digests"][function], lambda: _functions(trace())[function])
+                return cached_tape(description["digests"][function], lambda: _functions(trace())[function])
 
             return CompiledSystem(description, tape, trace)
         except (ValueError, KeyError, TypeError):
@@ -76,7 +76,7 @@ def recall_system(key: str, trace: Callable[[], HybridSystem]) -> CompiledSystem
     tapes = {name: tape_of(function) for name, function in _functions(system).items()}
     description = _describe(system, tapes)
     for tape_made in tapes.values():
-        keep_tape(tape_made)
+        store_tape(tape_made)
     cache.store(name, json.dumps(description).encode())
     return CompiledSystem(description, tapes.__getitem__, lambda: system)
 

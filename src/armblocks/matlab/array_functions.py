@@ -81,7 +81,7 @@ def _size(by: Arithmetic, x: Any) -> Any:
 
 
 def number_of_elements(number: float) -> int:
-    """The number as a count of elements. Raises :class:`MismatchError` where it is none."""
+    """The number as a count of elements. Raises :class:`MismatchError` for other numbers."""
     if not (number >= 0 and number == number // 1):
         raise MismatchError(f"{number:g} is not a number of elements")
     if number > MOST_ELEMENTS:
@@ -103,7 +103,7 @@ def range_of(first: float, step: float, last: float) -> NDArray[np.float64]:
     """``first:step:last``: the elements are first + k step. Raises :class:`MismatchError`."""
     steps = (last - first) / step if step else math.nan
     if not (math.isfinite(step) and math.isfinite(steps)):
-        raise MismatchError("the steps do not lead from the first to the last number")
+        raise MismatchError("the steps go away from the last number")
     # The number of steps that fit, with a tolerance for rounding, so that 0:0.1:1 reaches 1.
     count = number_of_elements(max(0.0, math.floor(steps * (1 + 4e-16) + 1e-10) + 1.0))
     return (first + step * np.arange(count, dtype=np.float64)).reshape(1, -1)

@@ -16,26 +16,27 @@ from armblocks.matlab.source import Place
 from armblocks.rounded_functions import power
 
 Array = NDArray[np.float64]
-"""MATLAB's only number: a matrix, always with two axes. A scalar is (1, 1), nothing is (0, 0)."""
+"""MATLAB's only number: a matrix, always with two axes. A scalar is (1, 1), the empty matrix is (0, 0)."""
 
 MOST_WORK = 20_000_000
 """Maximum number of elements that one script may compute, which limits time and memory."""
 ROUNDED_WORK = 1000
-"""What a sine or a power costs beside a sum."""
+"""Cost of a sine or a power relative to a sum."""
 
 
 @dataclass
 class Budget:
-    """Counts what a script computes."""
+    """Limits the number of elements that a script computes."""
 
     left: int = MOST_WORK
 
     def spend(self, place: Place, count: int) -> None:
-        """Take ``count`` elements off; raises an error when the script asks for too much."""
+        """Subtract ``count`` elements; raises an error if the limit is exceeded."""
         self.left -= count
         if self.left < 0:
             raise place.error(
-                "the script computes more than a robot script may", allowed=f"{MOST_WORK} elements in all"
+                "the script exceeds the computation limit of robot scripts",
+                allowed=f"{MOST_WORK} elements in all",
             )
 
 
@@ -74,7 +75,7 @@ def kind_of(value: object) -> str:
 
 
 def number_of(place: Place, value: object, what: str) -> float:
-    """A value that must be one number, called ``what`` in the error."""
+    """A value that must be one number; ``what`` is its name in the error."""
     if is_array(value) and value.size == 1:
         return float(value[0, 0])
     raise place.error(f"{what} is {kind_of(value)}", allowed="one number")
@@ -199,7 +200,8 @@ def _matrix_power(place: Place, budget: Budget, a: Array, b: Array) -> Array:
 
 
 def _product(a: Array, b: Array) -> Array:
-    """``a b``, product by product from left to right: the bits of a library differ by processor."""
+    """``a b``, added from left to right, because the rounding of a numerical library depends on the
+    processor."""
     total = np.zeros((a.shape[0], b.shape[1]))
     for k in range(a.shape[1]):
         total += a[:, k : k + 1] * b[k]
@@ -223,7 +225,7 @@ def stacked(place: Place, budget: Budget, rows: Sequence[Sequence[object]]) -> A
         raise place.error(
             f"the rows of the matrix have {', '.join(map(str, widths[:8]))} elements",
             allowed="as many elements in every row",
-            fix="complete the short row, or put '...' at the end of a line that goes on",
+            fix="complete the short row, or put '...' at the end of a continued line",
         )
     check_size(place, sum(band.shape[0] for band in bands), widths[0])
     budget.spend(place, sum(band.size for band in bands))
@@ -246,9 +248,9 @@ def index_of(place: Place, value: object, most: int, shown: str = "") -> int:
 def positions(
     place: Place, shape: tuple[int, int], indices: Sequence[object], shown: str
 ) -> NDArray[np.intp]:
-    """The positions that ``array(i)`` or ``array(i, j)`` picks, counted column by column from 0.
+    """The positions that ``array(i)`` or ``array(i, j)`` selects, counted column by column from 0.
 
-    An index is an array of numbers, or ``None`` for ``:``. The result has the shape of the picked part.
+    An index is an array of numbers, or ``None`` for ``:``. The result has the shape of the selected part.
     """
     rows, columns = shape
     extents = {1: (rows * columns,), 2: shape}.get(len(indices))
@@ -256,7 +258,7 @@ def positions(
         raise place.error(f"{len(indices)} indices are given", allowed="1 or 2")
     chosen = [_chosen(place, index, extent, shown) for index, extent in zip(indices, extents)]
     if rows * columns == 0 and any(part.size for part in chosen):
-        raise place.error("an element of an empty matrix is asked for", allowed="elements that exist")
+        raise place.error("an element of an empty matrix is read", allowed="elements that exist")
     if len(chosen) == 2:
         check_size(place, chosen[0].size, chosen[1].size)
         return chosen[0].reshape(-1, 1) + rows * chosen[1].reshape(1, -1)

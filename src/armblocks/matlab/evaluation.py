@@ -1,4 +1,4 @@
-"""The walk over a syntax tree, with the arithmetic of any kind of values: numbers, symbols, robots."""
+"""The evaluation of a syntax tree with the arithmetic of one kind of values: numbers, symbols, robots."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ class Values(Protocol[V]):
         ...
 
     def call(self, place: Place, name: str, arguments: Sequence[V], written: Sequence[Expression]) -> V:
-        """``name(arguments)`` of a function; ``written`` are the arguments as they stand in the text."""
+        """``name(arguments)`` of a function; ``written`` are the syntax trees of the arguments."""
         ...
 
 

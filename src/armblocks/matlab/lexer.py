@@ -3,9 +3,9 @@
 This module handles the special cases of MATLAB's syntax: the quote that is a transpose after an operand and a
 string elsewhere, line continuation, block comments, newlines that end a statement outside brackets and a row
 inside them, and command syntax (``clear L``). It is more tolerant than MATLAB for statements that were broken
-over lines on a printed page: a line that cannot end where it ends (after ``=`` or an operator) goes on, and a
-line that starts with ``=`` belongs to the one before. MATLAB rejects both, so no script that MATLAB accepts
-is read differently.
+over lines on a printed page: a line that ends with ``=`` or an operator continues on the next line, and a
+line that starts with ``=`` continues the previous line. MATLAB rejects both, so all scripts that MATLAB
+accepts have the same meaning here.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from armblocks.matlab.source import Place, Position, Source
 
 
 class Kind(enum.Enum):
-    """What a token is."""
+    """The kinds of tokens."""
 
     NUMBER = "number"
     NAME = "name"
@@ -36,7 +36,7 @@ class Kind(enum.Enum):
 
 @dataclass(frozen=True, slots=True)
 class Token:
-    """One token; ``spaced`` says whether blanks stand before it, which matters inside matrices."""
+    """One token; ``spaced``: whether blanks precede it, which matters inside matrices."""
 
     kind: Kind
     text: str
@@ -46,7 +46,7 @@ class Token:
 
 
 COMMANDS = ("clear", "clearvars", "clc", "close", "format", "more")
-"""Words that MATLAB scripts use in command syntax; all but the first two do nothing here."""
+"""Commands that MATLAB scripts write in command syntax; all except the first two have no effect here."""
 
 _DIGITS = "[0-9](?:_?[0-9])*"
 _NUMBER = re.compile(
@@ -65,14 +65,14 @@ _CLOSING = {"(": ")", "[": "]", "{": "}"}
 def tokenize(source: Source) -> list[Token]:
     """All tokens of a source, with an END after every statement and an EOF at the end.
 
-    Raises an error at characters, numbers and strings that MATLAB does not know or that are not supported,
+    Raises an error at invalid or unsupported characters, numbers and strings,
     and at brackets that do not match.
     """
     return _Lexer(source).run()
 
 
 class _Lexer:
-    """Walks over the lines once; ``brackets`` holds the open brackets and their positions."""
+    """Reads the lines once; ``brackets`` contains the open brackets and their positions."""
 
     def __init__(self, source: Source) -> None:
         self.source = source
@@ -88,7 +88,7 @@ class _Lexer:
                 self._newline(number)
         if self.comment_starts:
             raise self._at(self.comment_starts[-1], 1).error(
-                "the block comment is never closed", allowed="%{ … %}, each on a line of its own"
+                "the block comment is never closed", allowed="%{ … %}, each on a separate line"
             )
         if self.brackets:
             bracket, at = self.brackets[-1]
@@ -162,7 +162,7 @@ class _Lexer:
             self._operator(at, ALTERNATIVES.get(found.group(), found.group()), spaced)
             return found.end()
         raise self.source.place(at).error(
-            f"the character {character!r} means nothing in MATLAB outside strings"
+            f"the character {character!r} is not allowed in MATLAB outside strings"
         )
 
     def _number(self, at: Position, text: str, found: re.Match[str], spaced: bool) -> int:
@@ -233,7 +233,7 @@ class _Lexer:
         if self.brackets and self.brackets[-1][0] in ("[", "{"):
             self.tokens.append(Token(Kind.ROW, "\n", end))
         elif last is not None and last.kind is Kind.OPERATOR and last.text in _UNFINISHED:
-            return  # the line cannot end here: it was broken on a printed page
+            return  # a statement cannot end here: the line was broken on a printed page
         elif self.brackets and self.source.is_file:
             bracket, start = self.brackets[-1]
             raise self.source.place(start).error(
@@ -245,7 +245,8 @@ class _Lexer:
             self.tokens.append(Token(Kind.END, "\n", end))
 
     def _undo_newline(self) -> None:
-        """A line starts with ``=``: take back the newlines before it, as the statement was broken there."""
+        """For a line that starts with ``=``: remove the newlines before it, because it continues the
+        statement."""
         while self.tokens and self.tokens[-1].kind is Kind.END and self.tokens[-1].text == "\n":
             self.tokens.pop()
 

@@ -1,13 +1,13 @@
-"""The operators with their precedence: the one table that the parser and the speller of trees read.
+"""The operators with their precedence: the table for the parser and for writing trees as text.
 
 Source: MathWorks, *Operator Precedence*. All operators of a level are left-associative: ``2^3^2`` is
 ``(2^3)^2``, and ``a/b/c`` is ``(a/b)/c``. A sign binds less than a power, ``-2^2`` is ``-(2^2)``; a sign
 after ``^`` belongs to the exponent, ``2^-1``. Comparisons do not chain: ``1 < u < 3`` is an error, because
-MATLAB compares the result of ``1 < u`` with 3, which nobody means.
+MATLAB compares the result of ``1 < u`` with 3, which is rarely intended.
 
 Python's spellings are alternatives of the same operators. The word ``not`` is the exception: it binds as in
 Python, less than a comparison, so that ``not u > 3`` is ``~(u > 3)``, whereas ``~u > 3`` is ``(~u) > 3`` as
-in MATLAB. With a bracket right behind it, ``not(u) > 3``, it is MATLAB's function.
+in MATLAB. Directly followed by a bracket, ``not(u) > 3``, it is MATLAB's function.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ INFIX: Mapping[str, Level] = {
     **dict.fromkeys(("*", "/", "\\", ".*", "./", ".\\"), Level.PRODUCT),
     **dict.fromkeys(("^", ".^"), Level.POWER),
 }
-"""Operators between two operands, as MATLAB spells them."""
+"""Operators between two operands, in MATLAB's spelling."""
 
 ALTERNATIVES: Mapping[str, str] = {"!=": "~=", "**": "^", "!": "~"}
 """Other spellings of operators: Python's and those of Simulink's Fcn block."""

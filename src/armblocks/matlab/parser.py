@@ -1,7 +1,7 @@
 """From tokens to expressions, with MATLAB's precedences and its rule for blanks inside matrices.
 
-In formulas, ``u[1]`` is an index like ``u(1)``; in scripts, a bracket right behind an operand starts another
-element of a matrix, as in MATLAB.
+In formulas, ``u[1]`` is an index like ``u(1)``; in scripts, a bracket directly after an operand starts
+another element of a matrix, as in MATLAB.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ from armblocks.matlab.syntax import (
 )
 
 DEEPEST = 60
-"""Brackets inside brackets."""
+"""Maximum nesting of brackets."""
 DEEPEST_TREE = 200
-"""Levels of an expression, which has one for every operator of another precedence."""
+"""Maximum nesting of an expression, which has a level for every change of precedence."""
 
 KEYWORDS = frozenset(
     re.findall(
@@ -64,7 +64,7 @@ def parse_formula(source: Source) -> Expression:
 
 
 class Parser:
-    """Precedence climbing; ``in_matrix`` says that blanks separate elements here."""
+    """Precedence climbing; ``in_matrix``: whether blanks separate elements here."""
 
     def __init__(self, source: Source) -> None:
         self.source = source
@@ -73,7 +73,7 @@ class Parser:
         self.in_matrix = False
         self.depth = 0
         self.indices = 0
-        """How many indices or calls are open around the present token."""
+        """Number of open indices and calls around the present token."""
 
     # -- tokens ------------------------------------------------------------------------------------------
 
@@ -108,7 +108,7 @@ class Parser:
         shown = {Kind.ROW: "the end of the line", Kind.EOF: "the end"}.get(token.kind, f"'{token.text[:40]}'")
         if not wanted and token.kind in (Kind.NUMBER, Kind.NAME, Kind.STRING):
             wanted = "an operator"
-        what = f"{shown} is not understood here" + (f", expected {wanted}" if wanted else "")
+        what = f"{shown} is not allowed here" + (f", expected {wanted}" if wanted else "")
         if token.kind is Kind.END and token.text == "\n":
             whole = "statement" if self.source.is_file else "formula"
             what = f"the {whole} ends where {wanted or 'something else'} is expected"
@@ -159,7 +159,7 @@ class Parser:
                 rest.append(Operation(operator, self._operators(Level(level + 1)), token.at))
             if level is Level.COMPARISON and len(rest) > 1:
                 raise self.source.place(rest[1].at).error(
-                    "a comparison is compared again",
+                    "comparisons cannot be chained",
                     allowed="one comparison between && or ||",
                     fix="write a < b && b < c, or set brackets",
                 )
@@ -203,7 +203,7 @@ class Parser:
         return Range(tuple(parts), at)
 
     def _signed(self) -> Expression:
-        """A row of signs and what follows; the power binds tighter than the sign."""
+        """A sequence of signs and its operand; a power binds tighter than a sign."""
         signs = self._signs()
         at = self.token.at
         found = self._postfix()
@@ -304,7 +304,7 @@ class Parser:
             )
 
     def _arguments(self, opening: str, closing: str) -> tuple[Expression, ...]:
-        """``(a, b)``: blanks separate nothing."""
+        """``(a, b)``: blanks do not separate arguments."""
         self._enter()
         outer, self.in_matrix = self.in_matrix, False
         self.indices += 1
@@ -365,7 +365,7 @@ class Parser:
 
 
 def _with_signs(signs: list[Token], operand: Expression) -> Expression:
-    """The operand behind a row of signs; two minus signs cancel out."""
+    """The operand with a sequence of signs; two minus signs cancel."""
     negative, at = False, None
     for token in reversed(signs):
         if token.text == "~":

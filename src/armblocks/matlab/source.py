@@ -1,4 +1,4 @@
-"""The text of a script or formula, and places in it: errors name the line, the column and the text there."""
+"""The text of a script or formula, and positions in it: errors contain line, column and text."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Source:
 
 
 def formula_source(text: str, where: str) -> Source:
-    """The lines of a formula; ``where`` says in messages which formula it is."""
+    """The lines of a formula; ``where`` identifies the formula in messages."""
     return Source(name=where, lines=_lines(text))
 
 

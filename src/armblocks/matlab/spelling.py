@@ -1,4 +1,4 @@
-"""Trees written as text, with the brackets that the precedences need; reading it back gives the same tree."""
+"""Writes trees as text, with the brackets that the precedences require; parsing gives the same tree."""
 
 from __future__ import annotations
 

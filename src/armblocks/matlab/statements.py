@@ -23,7 +23,7 @@ _TARGETS = "name, name{i}, name.field …"
 
 
 def parse_script(source: Source) -> tuple[Statement, ...]:
-    """All statements of a script. Raises ``FormatError`` at the first line that is not understood."""
+    """All statements of a script. Raises ``FormatError`` at the first invalid or unsupported line."""
     parser = Parser(source)
     statements: list[Statement] = []
     while parser.token.kind is not Kind.EOF:

@@ -1,8 +1,8 @@
 """Values of expressions as CasADi symbols, for equations that are traced.
 
 A vector is neither row nor column: ``[1 2]`` and ``[1; 2]`` are the same, and ``[v; w]`` has the rows v and
-w. Two vectors are multiplied element by element, as in Simulink's Fcn block (MATLAB would refuse two rows);
-with a matrix ``*`` is the matrix product, as in MATLAB, and ``.*`` goes element by element.
+w. Two vectors are multiplied element by element, as in Simulink's Fcn block (an error in MATLAB for two
+rows); with a matrix ``*`` is the matrix product, as in MATLAB, and ``.*`` is elementwise.
 """
 
 from __future__ import annotations

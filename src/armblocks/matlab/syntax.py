@@ -1,7 +1,7 @@
 """The syntax tree of expressions and statements; every node has the position of its first character.
 
-Chains of operators and of postfixes are flat tuples, not nested pairs: however long a line is, walking over
-it takes no deeper recursion than its brackets.
+Chains of operators and of postfixes are flat tuples, not nested pairs: the recursion depth depends on the
+nesting of brackets, not on the length of the line.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class CellLiteral:
 
 @dataclass(frozen=True, slots=True)
 class Prefix:
-    """``-operand`` or ``~operand``; a row of signs is folded to one."""
+    """``-operand`` or ``~operand``; a sequence of signs is reduced to one."""
 
     operator: str
     operand: Expression
@@ -135,13 +135,13 @@ class Transpose:
 
 
 Target = Parentheses | Braces | Field
-"""What may follow a name left of ``=``."""
+"""An index or field after a name on the left of ``=``."""
 Step = Target | Transpose
 
 
 @dataclass(frozen=True, slots=True)
 class Postfix:
-    """An operand and what follows it: ``L{2}.r(1)'``."""
+    """An operand with its indices and fields: ``L{2}.r(1)'``."""
 
     base: Expression
     steps: tuple[Step, ...]
@@ -163,7 +163,7 @@ class Assignment:
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """An expression alone: MATLAB shows it and keeps it as ``ans``."""
+    """An expression statement, whose value MATLAB stores in ``ans``."""
 
     value: Expression
     at: Position

@@ -134,15 +134,16 @@ def _notices(contents: ReportContents) -> str:
     elif run.message:
         notices.append(("warning", run.message))
     for summary in contents.summaries:
-        notices += [("error", f"Limit broken: {finding.text}.") for finding in summary.findings]
+        notices += [("error", f"Limit exceeded: {finding.text}.") for finding in summary.findings]
     log = contents.result.log
     if log is not None and log.rows > contents.result.time.size:
         notices.append(
             (
                 "warning",
-                f"{axis_number(contents.result.time.size)} of {axis_number(log.rows)} instants are shown "
-                "here, with all extremes of the logged signals. Averages over the time, work, path lengths "
-                f"and spectra follow from them, coarser than from all, which {log.path.name} holds.",
+                f"This report shows {axis_number(contents.result.time.size)} of "
+                f"{axis_number(log.rows)} samples, with all extremes of the logged signals. Averages over "
+                "time, work, path lengths and spectra are computed from them and less accurate than from "
+                f"all samples, which are in {log.path.name}.",
             )
         )
     seen: set[str] = set()

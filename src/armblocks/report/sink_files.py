@@ -45,7 +45,7 @@ def sink_files(diagram: Diagram, taken: Sequence[str] = ()) -> tuple[SinkFile, .
             raise DiagramError(
                 f"{other} and '{block}' write the same file '{settings.file}'",
                 where=f"diagram '{diagram.name}'",
-                allowed="a file of its own for each To File block",
+                allowed="a separate file for each To File block",
                 fix=f"give '{block}' another file",
             )
         check_format(Path(settings.file))

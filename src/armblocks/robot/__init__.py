@@ -5,14 +5,17 @@ from armblocks.robot.friction_model import FrictionModel
 from armblocks.robot.joints import JOINT_TYPES, Fixed, Joint, JointLimits, Prismatic, Revolute
 from armblocks.robot.link import Link, Motor, inertia_matrix
 from armblocks.robot.physicality import InertiaFinding, inertia_findings, warn_of_inertias
-from armblocks.robot.plausibility import Doubt, doubts, warn_of_doubts
+from armblocks.robot.plausibility import (
+    PlausibilityFinding,
+    plausibility_findings,
+    warn_of_implausible_values,
+)
 from armblocks.robot.robot import Robot
 
 __all__ = [
     "JOINT_TYPES",
     "DhConvention",
     "DhRow",
-    "Doubt",
     "Fixed",
     "FrictionModel",
     "InertiaFinding",
@@ -20,16 +23,17 @@ __all__ = [
     "JointLimits",
     "Link",
     "Motor",
+    "PlausibilityFinding",
     "Prismatic",
     "Revolute",
     "Robot",
-    "doubts",
     "inertia_findings",
     "inertia_matrix",
     "link_from_dh",
     "modified_dh",
+    "plausibility_findings",
     "serial_chain",
     "standard_dh",
-    "warn_of_doubts",
+    "warn_of_implausible_values",
     "warn_of_inertias",
 ]

@@ -46,7 +46,7 @@ def converted(robot: Robot, convention: DhConvention) -> Robot:
         moved = [*(shift.inverse() for shift in shifts[1:]), Transform()]
         ends = {"base": robot.base @ shifts[0]}
     links = [
-        _retold(link, replace(row, alpha=alpha, a=a, convention=convention), shift)
+        _with_row(link, replace(row, alpha=alpha, a=a, convention=convention), shift)
         for link, row, (alpha, a), shift in zip(robot.links, rows, numbers, moved)
     ]
     return replace(robot, links=tuple(links), **ends)
@@ -59,7 +59,7 @@ def reread(robot: Robot, convention: DhConvention) -> Robot:
     """
     rows = [replace(row, convention=convention) for row in _rows(robot)]
     return replace(
-        robot, links=tuple(_retold(link, row, Transform()) for link, row in zip(robot.links, rows))
+        robot, links=tuple(_with_row(link, row, Transform()) for link, row in zip(robot.links, rows))
     )
 
 
@@ -83,7 +83,7 @@ def _rows(robot: Robot) -> Sequence[DhRow]:
     return rows
 
 
-def _retold(link: Link, row: DhRow, T_new_old: Transform) -> Link:
+def _with_row(link: Link, row: DhRow, T_new_old: Transform) -> Link:
     """The link with another row. Its body is transformed to the new frame, in which the old frame has the
     given pose."""
     R = T_new_old.R

@@ -26,9 +26,9 @@ size."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Doubt:
-    """One finding: ``what`` was found at a ``link`` (``""`` for the whole robot), and a question about its
-    cause."""
+class PlausibilityFinding:
+    """A plausibility warning: ``what`` was found at a ``link`` (``""`` for the whole robot), and a question
+    about its cause."""
 
     robot: str
     link: str = ""
@@ -40,13 +40,13 @@ class Doubt:
         return f"robot '{self.robot}'{place}: {self.what}. {self.question}"
 
 
-def doubts(robot: Robot) -> tuple[Doubt, ...]:
+def plausibility_findings(robot: Robot) -> tuple[PlausibilityFinding, ...]:
     """Values that probably have a wrong unit or sign; they are warnings, not errors.
 
     Findings are: limits of revolute joints beyond a whole turn (degrees?), a reach beyond 20 m and inertias
     that are far too large for the robot's size (millimetres?), gravity that points upwards.
     """
-    return tuple(_doubts(robot))
+    return tuple(_findings(robot))
 
 
 def warn_of_degrees(angles: ArrayLike, where: str) -> None:
@@ -63,17 +63,17 @@ def warn_of_degrees(angles: ArrayLike, where: str) -> None:
         )
 
 
-def warn_of_doubts(robot: Robot) -> None:
+def warn_of_implausible_values(robot: Robot) -> None:
     """Issue an ArmblocksWarning for every finding; called when a robot is loaded."""
-    for doubt in doubts(robot):
-        warnings.warn(str(doubt), ArmblocksWarning, stacklevel=3)
+    for finding in plausibility_findings(robot):
+        warnings.warn(str(finding), ArmblocksWarning, stacklevel=3)
 
 
-def _doubts(robot: Robot) -> Iterator[Doubt]:
+def _findings(robot: Robot) -> Iterator[PlausibilityFinding]:
     for link in robot.links:
         low, high = link.joint.limits.position or (0.0, 0.0)
         if link.joint.turn and not link.joint.slide and max(abs(low), abs(high)) > WHOLE_TURN:
-            yield Doubt(
+            yield PlausibilityFinding(
                 robot=robot.name,
                 link=link.name,
                 what=f"the joint turns from {low:g} to {high:g} rad, more than a whole turn",
@@ -81,7 +81,7 @@ def _doubts(robot: Robot) -> Iterator[Doubt]:
             )
     reach = max(_reaches(robot).values())
     if reach > LONGEST_REACH:
-        yield Doubt(
+        yield PlausibilityFinding(
             robot=robot.name,
             what=f"it reaches {reach:g} m",
             question="Are its lengths in millimetres? They are used as given.",
@@ -89,7 +89,7 @@ def _doubts(robot: Robot) -> Iterator[Doubt]:
     for link in robot.links:
         moment = float(np.abs(np.linalg.eigvalsh(link.I)).max())
         if link.mass > 0 and reach > 0 and moment > link.mass * (LARGEST_GYRATION * reach) ** 2:
-            yield Doubt(
+            yield PlausibilityFinding(
                 robot=robot.name,
                 link=link.name,
                 what=f"its inertia of {moment:g} kg m2 is that of {link.mass:g} kg at a distance of "
@@ -97,7 +97,7 @@ def _doubts(robot: Robot) -> Iterator[Doubt]:
                 question="Is it in kg mm2 or kg cm2? It is used as given.",
             )
     if robot.gravity[2] > 0:
-        yield Doubt(
+        yield PlausibilityFinding(
             robot=robot.name,
             what=f"gravity is {list(robot.gravity)} m/s2, so that bodies fall upwards",
             question="Is its sign that of the toolbox? Here it is the acceleration of a falling body, "

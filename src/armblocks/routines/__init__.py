@@ -1,1 +1,1 @@
-"""A small typed language for numeric routines, with back ends that turn them into text."""
+"""A small typed language for numeric routines, with back ends that write them as text."""

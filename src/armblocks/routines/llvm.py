@@ -124,7 +124,7 @@ def _table(table: Table) -> str:
     if table.filled_in:
         return f"@{table.symbol} = global [{len(table.numbers)} x {kind}] zeroinitializer"
     numbers = ", ".join(f"{kind} {_literal(table.element, number)}" for number in table.numbers)
-    # An array without elements has no address of its own.
+    # An array without elements may have the address of another object.
     numbers = numbers or f"{kind} {_literal(table.element, 0)}"
     return f"@{table.symbol} = internal constant [{max(1, len(table.numbers))} x {kind}] [{numbers}]"
 

@@ -2,7 +2,7 @@
 
 A function is a tree of statements: operations in their order, conditional parts, and regions that may be left
 or repeated. :class:`~armblocks.routines.Routine` builds the tree; a back end such as
-:mod:`armblocks.routines.llvm` turns it into text. A value that differs between two paths is stored in a
+:mod:`armblocks.routines.llvm` writes it as text. A value that differs between two paths is stored in a
 :class:`Local`, so the tree needs no phi nodes.
 """
 

@@ -1,9 +1,9 @@
 """Typed values of a routine: numbers and conditions with operators.
 
 Each operation appends a statement to the routine that the value belongs to, at the position where Python
-evaluates it. Python numbers are constants. The types are those of the routine: a type checker tells a double
-from an integer and both from an array (:mod:`armblocks.routines.memory`). Python's ``if`` raises an error for
-a :class:`Boolean`, because its value is not known yet.
+evaluates it. Python numbers are constants. The types are those of the routine: a type checker distinguishes
+doubles, integers and arrays (:mod:`armblocks.routines.memory`). Python's ``if`` raises an error for a
+:class:`Boolean`, because its value is not known yet.
 """
 
 from __future__ import annotations

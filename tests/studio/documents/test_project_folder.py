@@ -92,17 +92,17 @@ def test_partly_written_files_of_a_killed_save_are_removed(folder: ProjectFolder
 @pytest.mark.parametrize(
     ("path", "words"),
     [
-        ("../outside.json", "lies outside of the project folder"),
-        ("arms/../../outside.json", "lies outside of the project folder"),
-        ("../project-secret/a.json", "lies outside of the project folder"),
-        ("link.json", "lies outside of the project folder"),
+        ("../outside.json", "is outside of the project folder"),
+        ("arms/../../outside.json", "is outside of the project folder"),
+        ("../project-secret/a.json", "is outside of the project folder"),
+        ("link.json", "is outside of the project folder"),
         ("/etc/passwd.json", "is not a path of the project"),
         ("\\\\host\\share\\a.json", "is not a path of the project"),
         ("C:/a.json", "is not a path of the project"),
         ("a\0.json", "is not a path of the project"),
         ("", "is not a path of the project"),
         ("notes.txt", "the studio does not open 'notes.txt'"),
-        ("inside.json/..", "lies outside of the project folder"),
+        ("inside.json/..", "is outside of the project folder"),
     ],
 )
 def test_paths_outside_the_project_are_refused(folder: ProjectFolder, path: str, words: str) -> None:
@@ -122,7 +122,7 @@ def test_robot_names_refer_to_shipped_robots_or_project_files(folder: ProjectFol
     assert folder.robot_path("arms/arm.m", ()) == str(folder.root / "arms" / "arm.m")
     with pytest.raises(ArmblocksError, match="there is no robot named 'pumma'"):
         folder.robot_path("pumma", ("puma560",))
-    with pytest.raises(ArmblocksError, match="lies outside"):
+    with pytest.raises(ArmblocksError, match="is outside"):
         folder.robot_path("../outside.json", ())
 
 

@@ -14,7 +14,7 @@ from crashed_disk import Disk, carry_out, going
 from armblocks.errors import ArmblocksError, FormatError, InputError
 from armblocks.formats import diagram_to_bytes, load_robot
 from armblocks.studio.documents import open_files
-from armblocks.studio.protocol.messages import documents as say
+from armblocks.studio.protocol.messages import documents as document_messages
 from armblocks.studio.protocol.messages.sheet_edits import (
     AddBlocks,
     DiagramEdit,
@@ -27,8 +27,8 @@ from armblocks.studio.sheet.document import Document
 from armblocks.studio.sheet.open_documents import OpenDocument, OpenDocuments
 
 
-def change(key: str, edit: DiagramEdit, **more: Any) -> say.Change:
-    return say.Change(document="", key=key, edit=edit, **more)
+def change(key: str, edit: DiagramEdit, **more: Any) -> document_messages.Change:
+    return document_messages.Change(document="", key=key, edit=edit, **more)
 
 
 def add(name: str, kind: str = "Gain") -> AddBlocks:
@@ -55,8 +55,8 @@ def random_requests(seed: int, count: int) -> list[Any]:
                 [
                     change(f"{seed} {k}", random_.choice(edits)),
                     change(f"{seed} {k}", random_.choice(edits)),
-                    say.Undo(document="", key=f"{seed} {k}"),
-                    say.Redo(document="", key=f"{seed} {k}"),
+                    document_messages.Undo(document="", key=f"{seed} {k}"),
+                    document_messages.Redo(document="", key=f"{seed} {k}"),
                 ]
             )
         )
@@ -65,7 +65,7 @@ def random_requests(seed: int, count: int) -> list[Any]:
 
 @pytest.mark.parametrize("seed", range(12))
 def test_recovered_edits_have_their_undo_and_redo_history(disk: Disk, tmp_path: Path, seed: int) -> None:
-    async def talking() -> None:
+    async def scenario() -> None:
         documents = disk.documents()
         found = documents.new()
         carry_out(documents, found, random_requests(seed, 150))
@@ -88,11 +88,11 @@ def test_recovered_edits_have_their_undo_and_redo_history(disk: Disk, tmp_path: 
             found.document.redo()
         assert content(back) == content(found)
 
-    going(talking)
+    going(scenario)
 
 
 def test_a_long_journal_is_replayed_from_its_last_snapshot(disk: Disk, tmp_path: Path) -> None:
-    async def talking() -> None:
+    async def scenario() -> None:
         documents = disk.documents()
         found = documents.new()
         documents.perform(found, change("0", add("gain")))
@@ -104,29 +104,29 @@ def test_a_long_journal_is_replayed_from_its_last_snapshot(disk: Disk, tmp_path:
             if found.snapshot is not None and found.snapshot.done():
                 break
         for k in range(300):
-            documents.perform(found, say.Undo(document="", key=f"u{k}"))
+            documents.perform(found, document_messages.Undo(document="", key=f"u{k}"))
         back = disk.as_after_a_crash(tmp_path / "second").documents().attach(found.key)
         assert content(back) == content(found)
         assert back.document.diagram.blocks["gain"].parameter_value("gain") == 149.0
 
-    going(talking)
+    going(scenario)
 
 
 def test_a_journal_cut_anywhere_recovers_the_complete_edits_before_the_cut(
     disk: Disk, tmp_path: Path
 ) -> None:
-    async def talking() -> None:
+    async def scenario() -> None:
         documents = disk.documents()
         found = documents.new()
         states = [content(found)]
         for k in range(6):
             documents.perform(found, change(str(k), add(f"b{k}")))
             states.append(content(found))
-        journal = disk.kept.journals / f"{found.key}.diagram"
+        journal = disk.state_folder.journals / f"{found.key}.diagram"
         whole = journal.read_bytes()
         ends = [0, *(k + 1 for k, byte in enumerate(whole) if byte == 10)]
         other = disk.as_after_a_crash(tmp_path / "second")
-        copy = other.kept.journals / journal.name
+        copy = other.state_folder.journals / journal.name
         for record in range(2, len(ends)):  # recovery needs at least a head and a snapshot
             for cut in (ends[record] - 1, ends[record], ends[record] + 7):
                 copy.unlink()  # also removes the lock of the previous recovery
@@ -138,15 +138,15 @@ def test_a_journal_cut_anywhere_recovers_the_complete_edits_before_the_cut(
                     continue
                 assert [entry.edits for entry in waiting.left.offers()] == [done] * (done > 0)
                 if done > 0:
-                    back = await waiting.recover(say.Recover(document=found.key, action="open"))
+                    back = await waiting.recover(document_messages.Recover(document=found.key, action="open"))
                     assert back is not None
                     assert content(back) == states[done]
 
-    going(talking)
+    going(scenario)
 
 
 def test_an_edit_repeated_after_a_crash_is_applied_once(disk: Disk, tmp_path: Path) -> None:
-    async def talking() -> None:
+    async def scenario() -> None:
         documents = disk.documents()
         found = documents.new()
         documents.perform(found, change("one", add("gain")))
@@ -156,11 +156,11 @@ def test_an_edit_repeated_after_a_crash_is_applied_once(disk: Disk, tmp_path: Pa
         assert after.perform(back, change("two", add("gain 2")))
         assert sorted(back.document.diagram.blocks) == ["gain", "gain 2"]
 
-    going(talking)
+    going(scenario)
 
 
 def test_a_page_finds_its_document_after_a_server_restart(disk: Disk) -> None:
-    async def talking() -> None:
+    async def scenario() -> None:
         first = disk.documents()
         new = first.new()
         await first.save(new, "a.json", overwrite=False)
@@ -178,11 +178,11 @@ def test_a_page_finds_its_document_after_a_server_restart(disk: Disk) -> None:
         with pytest.raises(ArmblocksError, match="there is no such file"):
             documents.attach("c" * 16, path="gone.json")
 
-    going(talking)
+    going(scenario)
 
 
 def test_a_file_newer_than_the_journal_is_kept_beside_the_recovered_file(disk: Disk, tmp_path: Path) -> None:
-    async def talking() -> None:
+    async def scenario() -> None:
         documents = disk.documents()
         found = documents.new()
         documents.perform(found, change("1", add("gain")))
@@ -195,7 +195,7 @@ def test_a_file_newer_than_the_journal_is_kept_beside_the_recovered_file(disk: D
         after = after_crash.documents()
         (recovery,) = after.left.offers()
         assert (recovery.path, recovery.disk, recovery.edits) == ("a.json", "changed", 1)
-        back = await after.recover(say.Recover(document=found.key, action="keep_both"))
+        back = await after.recover(document_messages.Recover(document=found.key, action="keep_both"))
         assert back is not None
         assert back.path is not None
         assert back.path.startswith("a recovered 20")
@@ -204,11 +204,11 @@ def test_a_file_newer_than_the_journal_is_kept_beside_the_recovered_file(disk: D
         assert not back.document.dirty
         assert after.left.offers() == []
 
-    going(talking)
+    going(scenario)
 
 
 def test_a_recovered_diagram_does_not_overwrite_a_newer_file(disk: Disk, tmp_path: Path) -> None:
-    async def talking() -> None:
+    async def scenario() -> None:
         documents = disk.documents()
         found = documents.new()
         await documents.save(found, "a.json", overwrite=False)
@@ -216,17 +216,17 @@ def test_a_recovered_diagram_does_not_overwrite_a_newer_file(disk: Disk, tmp_pat
         after_crash = disk.as_after_a_crash(tmp_path / "second")
         after_crash.project.path("a.json").write_bytes(b"{}")
         after = after_crash.documents()
-        back = await after.recover(say.Recover(document=found.key, action="open"))
+        back = await after.recover(document_messages.Recover(document=found.key, action="open"))
         assert back is not None
         assert (back.disk, back.document.dirty) == ("changed", True)
         with pytest.raises(ArmblocksError, match="the file has changed on the disk"):
             await after.save(back, "", overwrite=False)
 
-    going(talking)
+    going(scenario)
 
 
 def test_a_recovery_is_discarded_only_on_request(disk: Disk, tmp_path: Path) -> None:
-    async def talking() -> None:
+    async def scenario() -> None:
         documents = disk.documents()
         found = documents.new()
         documents.perform(found, change("1", add("gain")))
@@ -234,32 +234,32 @@ def test_a_recovery_is_discarded_only_on_request(disk: Disk, tmp_path: Path) -> 
         second.documents().end()
         after = second.documents()
         assert len(after.left.offers()) == 1
-        assert await after.recover(say.Recover(document=found.key, action="discard")) is None
+        assert await after.recover(document_messages.Recover(document=found.key, action="discard")) is None
         with pytest.raises(ArmblocksError, match="there is no diagram to recover named"):
-            await after.recover(say.Recover(document=found.key, action="open"))
+            await after.recover(document_messages.Recover(document=found.key, action="open"))
         assert second.documents().left.offers() == []
 
-    going(talking)
+    going(scenario)
 
 
 def test_saved_diagrams_leave_no_journal(disk: Disk) -> None:
-    async def talking() -> None:
+    async def scenario() -> None:
         documents = disk.documents()
         found = documents.new()
         documents.perform(found, change("1", add("gain")))
-        assert len(list(disk.kept.journals.iterdir())) == 1
+        assert len(list(disk.state_folder.journals.iterdir())) == 1
         with pytest.raises(InputError, match="'untitled' has unsaved edits"):
             documents.close(found, discard=False)
         await documents.save(found, "a.json", overwrite=False)
         documents.end()
-        assert list(disk.kept.journals.iterdir()) == []
+        assert list(disk.state_folder.journals.iterdir()) == []
 
-    going(talking)
+    going(scenario)
 
 
 @pytest.mark.filterwarnings("ignore::armblocks.errors.InertiaWarning")
 def test_a_missing_robot_file_is_reported_and_the_journal_remains(disk: Disk, tmp_path: Path) -> None:
-    async def talking() -> None:
+    async def scenario() -> None:
         from armblocks.formats import write_robot
 
         (disk.project.root / "arm.json").write_bytes(write_robot(load_robot("kr180")))
@@ -267,28 +267,28 @@ def test_a_missing_robot_file_is_reported_and_the_journal_remains(disk: Disk, tm
         def resolve(name: str) -> Any:
             return load_robot(str(disk.project.root / "arm.json") if name == "arm.json" else name)
 
-        documents = OpenDocuments(disk.project, disk.kept, resolve)
+        documents = OpenDocuments(disk.project, disk.state_folder, resolve)
         found = documents.new()
         block = NewBlock(name="arm", type="Fkine", place=Place(x=0, y=0), parameters={"robot": "arm.json"})
         documents.perform(found, change("1", add("gain")))
         documents.perform(found, change("2", AddBlocks(blocks=[block])))
         second = disk.as_after_a_crash(tmp_path / "second")
-        after = OpenDocuments(second.project, second.kept, lambda name: load_robot("no " + name))
+        after = OpenDocuments(second.project, second.state_folder, lambda name: load_robot("no " + name))
         (recovery,) = after.left.offers()
         assert recovery.missing.startswith("the last 1 edits could not be repeated")
-        back = await after.recover(say.Recover(document=found.key, action="open"))
+        back = await after.recover(document_messages.Recover(document=found.key, action="open"))
         assert back is not None
         assert list(back.document.diagram.blocks) == ["gain"]
         assert back.document.dirty
-        assert [path.suffix for path in second.kept.journals.iterdir()] == [".unread"]
+        assert [path.suffix for path in second.state_folder.journals.iterdir()] == [".unread"]
 
-    going(talking)
+    going(scenario)
 
 
 def test_a_disk_error_in_the_journal_does_not_prevent_edits(
     disk: Disk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    async def talking() -> None:
+    async def scenario() -> None:
         documents = disk.documents()
         found = documents.new()
         documents.perform(found, change("1", add("one")))
@@ -300,14 +300,14 @@ def test_a_disk_error_in_the_journal_does_not_prevent_edits(
             patch.setattr(os, "write", refuse)
             documents.perform(found, change("2", add("two")))
             assert not found.state().journaled
-        documents.perform(found, say.Undo(document="", key="3"))
-        documents.perform(found, say.Undo(document="", key="4"))
-        documents.perform(found, say.Redo(document="", key="5"))
+        documents.perform(found, document_messages.Undo(document="", key="3"))
+        documents.perform(found, document_messages.Undo(document="", key="4"))
+        documents.perform(found, document_messages.Redo(document="", key="5"))
         assert found.state().journaled
         back = disk.as_after_a_crash(tmp_path / "second").documents().attach(found.key)
         assert content(back) == content(found)
 
-    going(talking)
+    going(scenario)
 
 
 def test_pages_are_notified_of_a_disk_error_in_the_journal(
@@ -315,16 +315,16 @@ def test_pages_are_notified_of_a_disk_error_in_the_journal(
 ) -> None:
     monkeypatch.setattr(open_files, "SYNC_SECONDS", 0.0)
 
-    async def talking() -> None:
+    async def scenario() -> None:
         documents = disk.documents()
-        told: list[bool] = []
-        hears = asyncio.Event()
+        events: list[bool] = []
+        notified = asyncio.Event()
 
-        async def tell(found: OpenDocument) -> None:
-            told.append(found.state().journaled)
-            hears.set()
+        async def notify(found: OpenDocument) -> None:
+            events.append(found.state().journaled)
+            notified.set()
 
-        watching = asyncio.create_task(documents.watch(tell))
+        watching = asyncio.create_task(documents.watch(notify))
         found = documents.new()
         await asyncio.sleep(0)
 
@@ -335,17 +335,17 @@ def test_pages_are_notified_of_a_disk_error_in_the_journal(
             patch.setattr(os, "fsync", refuse)
             documents.perform(found, change("1", add("one")))
             async with asyncio.timeout(30):
-                await hears.wait()
-        assert told == [False]
+                await notified.wait()
+        assert events == [False]
         watching.cancel()
 
-    going(talking)
+    going(scenario)
 
 
 def test_a_disk_error_in_a_save_leaves_the_diagram_and_the_journal(
     disk: Disk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    async def talking() -> None:
+    async def scenario() -> None:
         documents = disk.documents()
         found = documents.new()
         await documents.save(found, "a.json", overwrite=False)
@@ -366,14 +366,14 @@ def test_a_disk_error_in_a_save_leaves_the_diagram_and_the_journal(
         await documents.save(found, "", overwrite=False)
         assert not found.document.dirty
 
-    going(talking)
+    going(scenario)
 
 
 def test_an_unreadable_journal_is_not_overwritten(disk: Disk) -> None:
-    async def talking() -> None:
+    async def scenario() -> None:
         key = "0123456789abcdef"
-        disk.kept.journals.mkdir(parents=True)
-        journal = disk.kept.journals / f"{key}.diagram"
+        disk.state_folder.journals.mkdir(parents=True)
+        journal = disk.state_folder.journals / f"{key}.diagram"
         journal.write_bytes(b"nothing that is a journal")
         documents = disk.documents()
         with pytest.raises(FormatError, match="the journal contains no complete record"):
@@ -381,13 +381,13 @@ def test_an_unreadable_journal_is_not_overwritten(disk: Disk) -> None:
         assert journal.read_bytes() == b"nothing that is a journal"
         assert [offer.document for offer in documents.left.offers()] == [key]
 
-    going(talking)
+    going(scenario)
 
 
 def test_a_defect_during_replay_keeps_the_edits_before_it(
     disk: Disk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    async def talking() -> None:
+    async def scenario() -> None:
         documents = disk.documents()
         found = documents.new()
         for k in range(4):
@@ -395,7 +395,7 @@ def test_a_defect_during_replay_keeps_the_edits_before_it(
         second = disk.as_after_a_crash(tmp_path / "second")
         real = Document.outcome
 
-        def defect(self: Document, request: say.Change) -> Any:
+        def defect(self: Document, request: document_messages.Change) -> Any:
             if request.key == "2":
                 raise KeyError("something")
             return real(self, request)
@@ -406,7 +406,7 @@ def test_a_defect_during_replay_keeps_the_edits_before_it(
         assert offer.missing == "the last 2 edits could not be repeated: armblocks has a defect (KeyError)"
         assert sorted(after.attach(found.key).document.diagram.blocks) == ["b0", "b1"]
 
-    going(talking)
+    going(scenario)
 
 
 def test_a_deleted_or_renamed_file_is_reported_and_its_content_remains(
@@ -414,30 +414,30 @@ def test_a_deleted_or_renamed_file_is_reported_and_its_content_remains(
 ) -> None:
     monkeypatch.setattr(open_files, "LOOK_SECONDS", 0.01)
 
-    async def talking() -> None:
+    async def scenario() -> None:
         documents = disk.documents()
-        told: asyncio.Queue[str] = asyncio.Queue()
+        events: asyncio.Queue[str] = asyncio.Queue()
 
-        async def tell(found: OpenDocument) -> None:
-            told.put_nowait(found.disk)
+        async def notify(found: OpenDocument) -> None:
+            events.put_nowait(found.disk)
 
-        watching = asyncio.create_task(documents.watch(tell))
+        watching = asyncio.create_task(documents.watch(notify))
         found = documents.new()
         documents.perform(found, change("1", add("one")))
         await documents.save(found, "a.json", overwrite=False)
         place = disk.project.path("a.json")
         async with asyncio.timeout(30):
             place.rename(place.with_name("b.json"))
-            assert await told.get() == "gone"
+            assert await events.get() == "gone"
             assert found.document.dirty
             crashed = disk.as_after_a_crash(tmp_path / "second").documents()
             assert [(offer.path, offer.disk) for offer in crashed.left.offers()] == [("a.json", "gone")]
             place.with_name("b.json").rename(place)
-            assert await told.get() == "same"
+            assert await events.get() == "same"
             place.unlink()
-            assert await told.get() == "gone"
+            assert await events.get() == "gone"
             await documents.save(found, "", overwrite=False)
         assert disk.project.exists("a.json")
         watching.cancel()
 
-    going(talking)
+    going(scenario)

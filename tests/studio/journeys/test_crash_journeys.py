@@ -41,7 +41,7 @@ def crash(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterato
     context.request.get(old.link)
     faults: list[str] = []
     context.on("weberror", lambda error: faults.append(str(error.error)))
-    context.on("console", lambda said: faults.append(said.text) if said.type == "error" else None)
+    context.on("console", lambda line: faults.append(line.text) if line.type == "error" else None)
     drawing, robot, left = (context.new_page() for _ in range(3))
     for page in (drawing, robot, left):
         page.goto(old.address)
@@ -65,7 +65,7 @@ def crash(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterato
     yield Crash(studio=studio, before=old, drawing=drawing, robot=robot, lost=lost)
     context.close()
     studio.stop()
-    assert [said for said in faults if "ERR_CONNECTION_" not in said] == []
+    assert [line for line in faults if "ERR_CONNECTION_" not in line] == []
 
 
 def draw_and_leave(page: Page) -> None:

@@ -99,18 +99,18 @@ class Line:
         self._page = line
         server = line.connect_to_server()
         line.on_message(server.send)
-        server.on_message(self._tell)
+        server.on_message(self._notify)
 
-    def _tell(self, said: str | bytes) -> None:
+    def _notify(self, message: str | bytes) -> None:
         if self.held:
-            self.waiting.append(said)
+            self.waiting.append(message)
         else:
-            self._page.send(said)
+            self._page.send(message)
 
     def release(self) -> None:
         self.held = False
-        for said in self.waiting:
-            self._page.send(said)
+        for message in self.waiting:
+            self._page.send(message)
 
 
 def test_a_conflicting_edit_is_reported_and_both_pages_show_the_same_diagram(
@@ -129,7 +129,7 @@ def test_a_conflicting_edit_is_reported_and_both_pages_show_the_same_diagram(
     page.keyboard.press("ArrowDown")
     expect(page.get_by_role("button", name="Undo move Gain (Ctrl+Z)")).to_be_enabled()
     other.keyboard.press("ArrowRight")  # moves Gain from its former position
-    wait_until(page, lambda: any("change from another page" in str(said) for said in line.waiting))
+    wait_until(page, lambda: any("change from another page" in str(message) for message in line.waiting))
     line.release()
     expect(other.get_by_text("your change conflicts with a change from another page")).to_be_visible()
     other.locator(".react-flow__pane").click(position={"x": 5, "y": 5})

@@ -86,7 +86,7 @@ def colours(picture: bytes) -> int:
     return len(Image.open(io.BytesIO(picture)).convert("RGB").getcolors(1 << 24) or ())
 
 
-def said(point: np.ndarray) -> str:
+def shown(point: np.ndarray) -> str:
     return "   ".join(f"{axis} {value:.3f}" for axis, value in zip("xyz", point, strict=True)) + " m"
 
 
@@ -101,16 +101,16 @@ def test_the_widgets_of_a_result_share_their_time_cursor(notebook: Page) -> None
     expect(scopes.locator(".chart")).to_have_count(7)
     expect(scopes.locator(".robot")).to_have_count(0)
     expect(arm.locator(".chart")).to_have_count(0)
-    expect(arm.get_by_label("Position of the tool")).to_have_text(said(tool[-1]))
+    expect(arm.get_by_label("Position of the tool")).to_have_text(shown(tool[-1]))
     slider = scopes.get_by_role("slider", name="Time")
     slider.focus()
     slider.press("Home")
-    expect(arm.get_by_label("Position of the tool")).to_have_text(said(tool[0]))
+    expect(arm.get_by_label("Position of the tool")).to_have_text(shown(tool[0]))
     slider.press("ArrowRight")
-    expect(arm.get_by_label("Position of the tool")).to_have_text(said(tool[1]))
+    expect(arm.get_by_label("Position of the tool")).to_have_text(shown(tool[1]))
     notebook.wait_for_function("models[0].saved === 0.01")  # sent to Python when the cursor stops
     notebook.evaluate("models[1].set('time', 5)")  # as if set in Python
-    expect(arm.get_by_label("Position of the tool")).to_have_text(said(tool[500]))
+    expect(arm.get_by_label("Position of the tool")).to_have_text(shown(tool[500]))
     inked = """(canvas) => {
         const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height)
         return new Set(new Uint32Array(data.buffer)).size
@@ -138,7 +138,7 @@ def test_a_robot_widget_shows_the_given_configuration(notebook: Page) -> None:
     puma = ab.load_robot("puma560")
     q = [0.1, 0.4, -2.0, 0.3, 0.5, 0.0]
     (arm,) = show(notebook, ab.robot_widget(puma, q))
-    expect(arm.get_by_label("Position of the tool")).to_have_text(said(puma.fkine(q)[:3, 3]))
+    expect(arm.get_by_label("Position of the tool")).to_have_text(shown(puma.fkine(q)[:3, 3]))
     expect(arm.get_by_role("slider", name="Time")).to_have_count(0)
     canvas = arm.locator(".robot canvas")
     expect(canvas).to_be_visible()

@@ -63,7 +63,7 @@ def test_a_robot_is_edited_marked_undone_saved_and_reopened(page: Page, folder: 
     expect(tool_x(editor)).to_have_text("0.5521 m")  # while it is typed
     cell.fill("half a metre")
     expect(cell).to_have_attribute("aria-invalid", "true")
-    expect(page.get_by_role("tooltip")).to_contain_text("'a' is not understood here, expected an operator")
+    expect(page.get_by_role("tooltip")).to_contain_text("'a' is not allowed here, expected an operator")
     expect(tool_x(editor)).to_have_text("0.5521 m")  # an invalid text changes nothing
     cell.fill("1/2")
     expect(cell).to_have_attribute("aria-invalid", "false")

@@ -34,7 +34,7 @@ def sheet(shared: Page) -> Iterator[Page]:
     page.keyboard.press("Escape")
     before = page.evaluate("sessionStorage.getItem('armblocks-shown')")
     menu(page, re.compile("^van_der_pol_pid a van der Pol"))
-    # The title does not tell: the document of the test before has the same.
+    # The title is not sufficient: the document of the previous test has the same title.
     page.wait_for_function("before => sessionStorage.getItem('armblocks-shown') !== before", arg=before)
     expect(page.locator(".title")).to_have_text("van_der_pol_pid")
     expect(block(page, "PID")).to_be_visible()
@@ -214,14 +214,14 @@ def test_a_mask_is_created_used_renamed_and_undone(sheet: Page) -> None:
     dialog.get_by_role("button", name="Add a parameter").click()
     for field, text in (("Default", "0.25"), ("Unit", "N s/m"), ("Range", "> 0"), ("Name", "d")):
         dialog.get_by_role("textbox", name=f"{field} of k").fill(text)
-    dialog.get_by_role("textbox", name="Description of d").fill("how much it resists")
+    dialog.get_by_role("textbox", name="Description of d").fill("damping coefficient")
     dialog.get_by_role("button", name="OK", exact=True).click()
     expect(dialog).to_be_hidden()
     expect(subsystem.locator("svg")).to_contain_text("Viscous")
     subsystem.dblclick()
     field = dialog.get_by_role("textbox", name="d N s/m")
     expect(field).to_have_value("0.25")
-    expect(dialog).to_contain_text("how much it resists")
+    expect(dialog).to_contain_text("damping coefficient")
     field.fill("0.5")
     dialog.get_by_role("button", name="Apply").click()
     dialog.get_by_role("button", name="Look under the mask").click()

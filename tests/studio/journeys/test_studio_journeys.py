@@ -103,7 +103,7 @@ def test_a_diagram_is_built_with_the_mouse_run_and_saved(page: Page, folder: Pat
     block(page, "Gain").dblclick()
     field = page.get_by_role("textbox", name="gain")
     field.fill("import os")
-    expect(page.get_by_text("'os' is not understood here")).to_be_visible()
+    expect(page.get_by_text("'os' is not allowed here")).to_be_visible()
     expect(page.get_by_role("button", name="OK", exact=True)).to_be_disabled()
     field.fill("2*pi")
     expect(page.get_by_text("= 6.283185307179586")).to_be_visible()

@@ -133,14 +133,14 @@ def test_two_runs_are_compared(opened: Opened) -> None:
     one, other = ab.simulate(model), ab.simulate(model, parameters={"lag.time_constant": 0.5})
     apart = np.abs(other["lag/y"] - one["lag/y"])
     row = page.locator(".signals label", has_text="lag")
-    said = row.locator(".apart")
-    expect(said).to_contain_text("✗")
-    found = re.findall(r"[\d.]+", said.inner_text())
+    message = row.locator(".apart")
+    expect(message).to_contain_text("✗")
+    found = re.findall(r"[\d.]+", message.inner_text())
     np.testing.assert_allclose(float(found[0]), apart.max(), rtol=5e-3)
     np.testing.assert_allclose(float(found[1]), one.time[apart.argmax()], rtol=5e-3)
     expect(page.locator(".signals label", has_text="gain").locator(".apart")).to_contain_text("✓ 0")
     page.get_by_role("textbox", name="Tolerance").fill("1")
-    expect(said).to_contain_text("✓")
+    expect(message).to_contain_text("✓")
     page.get_by_role("textbox", name="Search the signals").fill("LAG")
     expect(page.locator(".signals label")).to_have_count(1)
     name = page.locator(".kept-run").last.get_by_role("textbox", name="Name of Run")
@@ -173,7 +173,7 @@ def test_scope_measurements_equal_the_closed_form(opened: Opened) -> None:
     lag = measured(table, "lag")
     assert number(lag["min"]) == 0.0
     np.testing.assert_allclose(number(lag["max"]), GAIN, rtol=1e-3)
-    # The step comes at 1 s: over 10 s the mean of K (1 - exp(-t/T)) is K (9 - T (1 - exp(-9/T))) / 10.
+    # The step is at 1 s: over 10 s the mean of K (1 - exp(-t/T)) is K (9 - T (1 - exp(-9/T))) / 10.
     left = 9.0 - LAG * (1.0 - np.exp(-9.0 / LAG))
     np.testing.assert_allclose(number(lag["mean"]), GAIN * left / 10.0, rtol=1e-3)
     square = GAIN**2 * (9.0 - 2.0 * LAG * (1.0 - np.exp(-9.0)) + LAG / 2.0 * (1.0 - np.exp(-18.0))) / 10.0

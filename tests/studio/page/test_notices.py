@@ -47,7 +47,7 @@ def test_a_package_without_a_licence_text_stops_the_build(tmp_path: Path) -> Non
     folder = tmp_path / "node_modules" / "bare"
     folder.mkdir(parents=True)
     (folder / "package.json").write_text('{"name": "bare", "version": "1.0.0", "license": "MIT"}')
-    with pytest.raises(SystemExit, match=r"package bare .* brings no licence text"):
+    with pytest.raises(SystemExit, match=r"package bare .* has no licence text"):
         notices.package("node_modules/bare", tmp_path)
     (folder / "LICENSE").write_text("Do what you like.")
     assert notices.package("node_modules/bare", tmp_path).text == "Do what you like."

@@ -189,13 +189,13 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_every_kind_of_message_answers_hostile_values_with_an_error(folder: Path) -> None:
-    told: list[dict[str, Any]] = []
+    events: list[dict[str, Any]] = []
     defects: list[str] = []
 
     async def hear(text: str) -> None:
         event = json.loads(text)
         if event["kind"] == "reply":
-            told.append(event)
+            events.append(event)
         assert "SECRET" not in text
 
     async def hear_bytes(data: bytes) -> None:
@@ -213,8 +213,8 @@ def test_every_kind_of_message_answers_hostile_values_with_an_error(folder: Path
             text = json.dumps({"number": number, "request": request})
             text = text.replace(json.dumps(NESTED), "[" * 2000 + "]" * 2000)
             await hub.answer(page, text)
-            assert told[-1]["number"] == number
-            return told[-1]
+            assert events[-1]["number"] == number
+            return events[-1]
 
         robot = (await send({"kind": "open", "path": "arm.json"}))["value"][0]
         assert {request["kind"] for request in requests("", "")} == set(messages_of(Request))

@@ -30,16 +30,16 @@ class Listener:
         self.page = Page(self.outbox.put, self.outbox.put, self.outbox)
         self.sending = asyncio.create_task(self.outbox.empty())
 
-    async def _hear(self, said: str | bytes) -> None:
+    async def _hear(self, message: str | bytes) -> None:
         await self.listens.wait()
-        self.heard.append(said)
+        self.heard.append(message)
         self.news.set()
 
     async def until(self, kind: str, **members: Any) -> dict[str, Any]:
         async with asyncio.timeout(PATIENCE_SECONDS):
             while True:
                 self.news.clear()
-                for event in map(json.loads, (said for said in self.heard if isinstance(said, str))):
+                for event in map(json.loads, (message for message in self.heard if isinstance(message, str))):
                     if event["kind"] == kind and members.items() <= event.items():
                         return event
                 await self.news.wait()
@@ -69,7 +69,7 @@ def with_pages(folder: Path, going: Callable[[Hub, Listener, Listener], Awaitabl
 
 
 def of_runs(listener: Listener) -> list[str | bytes]:
-    return [said for said in listener.heard if isinstance(said, bytes) or '"kind":"run_' in said]
+    return [message for message in listener.heard if isinstance(message, bytes) or '"kind":"run_' in message]
 
 
 def test_a_page_suspended_during_a_run_delays_nobody_and_gets_all_messages_later(

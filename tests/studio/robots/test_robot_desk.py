@@ -29,14 +29,14 @@ class Talk:
     """A hub and a connected page."""
 
     def __init__(self, folder: Path) -> None:
-        self.told: list[dict[str, Any]] = []
+        self.received: list[dict[str, Any]] = []
         self.hub = Hub(ProjectFolder(folder))
-        self.page = self.new_page(self.told)
+        self.page = self.new_page(self.received)
         self._number = 0
 
-    def new_page(self, told: list[dict[str, Any]]) -> Page:
+    def new_page(self, received: list[dict[str, Any]]) -> Page:
         async def hear(text: str) -> None:
-            told.append(json.loads(text))
+            received.append(json.loads(text))
 
         async def hear_bytes(data: bytes) -> None:
             raise AssertionError("samples arrived without a run")
@@ -47,7 +47,7 @@ class Talk:
         self._number += 1
         request = {"number": self._number, "request": {"kind": kind, **values}}
         await self.hub.answer(self.page, json.dumps(request))
-        return next(e for e in self.told if e["kind"] == "reply" and e["number"] == self._number)
+        return next(e for e in self.received if e["kind"] == "reply" and e["number"] == self._number)
 
     async def ask(self, kind: str, **values: Any) -> Any:
         reply = await self.reply(kind, **values)
@@ -61,16 +61,16 @@ class Talk:
 
     def shown(self) -> dict[str, Any]:
         """The content and state that the page shows of a robot."""
-        events = [event for event in self.told if event.get("state", {}).get("kind") == "robot"]
+        events = [event for event in self.received if event.get("state", {}).get("kind") == "robot"]
         contents = [event.get("content") or (event.get("change") or {}).get("content") for event in events]
         return {**next(content for content in reversed(contents) if content), **events[-1]["state"]}
 
 
-def talk(folder: Path, talking: Callable[[Talk], Awaitable[None]]) -> None:
+def talk(folder: Path, scenario: Callable[[Talk], Awaitable[None]]) -> None:
     async def going() -> None:
         talk = Talk(folder)
         await talk.hub.welcome(talk.page)
-        await talking(talk)
+        await scenario(talk)
         talk.hub.close()
 
     asyncio.run(going())
@@ -85,9 +85,9 @@ def cell(link: str, column: str, text: str) -> dict[str, str]:
 
 
 def test_the_script_of_the_paper_is_dropped_edited_undone_saved_and_reopened(tmp_path: Path) -> None:
-    async def talking(talk: Talk) -> None:
+    async def scenario(talk: Talk) -> None:
         (key,) = await talk.ask("drop", name="kr180.m", content=packed(PRINTED.read_bytes()))
-        opened = next(event for event in talk.told if event["kind"] == "opened")
+        opened = next(event for event in talk.received if event["kind"] == "opened")
         assert opened["content"]["name"] == "KR180"
         assert any("broken as on a printed page" in note for note in opened["notes"])
         shown = talk.shown()
@@ -118,7 +118,7 @@ def test_the_script_of_the_paper_is_dropped_edited_undone_saved_and_reopened(tmp
         (tmp_path / "other.json").write_text("{}")
         assert "the file exists already" in await talk.refused("save", document=key, path="other.json")
 
-    talk(tmp_path, talking)
+    talk(tmp_path, scenario)
     (saved,) = read_robots((tmp_path / "arms" / "mine.json").read_bytes(), "mine.json").values()
     with pytest.warns(ArmblocksWarning, match="printed page"):
         (printed,) = read_robots(PRINTED.read_bytes(), "kr180.m").values()
@@ -128,7 +128,7 @@ def test_the_script_of_the_paper_is_dropped_edited_undone_saved_and_reopened(tmp
 
 
 def test_dropped_files_are_bounded_and_errors_name_the_file(tmp_path: Path) -> None:
-    async def talking(talk: Talk) -> None:
+    async def scenario(talk: Talk) -> None:
         for name in ("arm.exe", "noname", "run.py"):
             assert "is not a file type" in await talk.refused("drop", name=name, content="")
         assert "the content is not base64" in await talk.refused("drop", name="a.m", content="§")
@@ -149,14 +149,14 @@ def test_dropped_files_are_bounded_and_errors_name_the_file(tmp_path: Path) -> N
         assert [talk.hub.documents[key].state().title for key in keys] == ["one", "two"]
         assert talk.shown()["title"] == "one"
 
-    talk(tmp_path, talking)
+    talk(tmp_path, scenario)
 
 
 def test_saving_a_robot_file_updates_the_diagrams_that_use_it(tmp_path: Path) -> None:
     (tmp_path / "arms").mkdir()
     ab.save_robot(load_robot("puma560"), tmp_path / "arms" / "mine.json")
 
-    async def talking(talk: Talk) -> None:
+    async def scenario(talk: Talk) -> None:
         document = await talk.ask("open_shipped", document_kind="diagram", name="kr180model")
         blocks = talk.hub.documents[document].document.diagram.blocks
         name = next(name for name, block in blocks.items() if hasattr(block, "robot"))
@@ -169,19 +169,19 @@ def test_saving_a_robot_file_updates_the_diagrams_that_use_it(tmp_path: Path) ->
         await talk.ask("save", document=key)
         block = talk.hub.documents[document].document.diagram.block(name)
         assert block.robot.links[0].mass == 7
-        assert talk.told[-3]["kind"] == "changed"
-        assert talk.told[-3]["state"]["document"] == document
+        assert talk.received[-3]["kind"] == "changed"
+        assert talk.received[-3]["state"]["document"] == document
         await talk.ask("undo", document=document)
         block = talk.hub.documents[document].document.diagram.block(name)
         assert block.robot.links[0].mass == 0
         other = next(name for name, block in blocks.items() if not hasattr(block, "robot"))
         assert "no robot" in await talk.refused("robot_of_block", document=document, block=other)
 
-    talk(tmp_path, talking)
+    talk(tmp_path, scenario)
 
 
 def test_two_pages_show_each_other_s_edits(tmp_path: Path) -> None:
-    async def talking(talk: Talk) -> None:
+    async def scenario(talk: Talk) -> None:
         key = await talk.ask("open_shipped", document_kind="robot", name="puma560")
         assert talk.shown()["origin"] == "puma560"
         other_told: list[dict[str, Any]] = []
@@ -213,16 +213,16 @@ def test_two_pages_show_each_other_s_edits(tmp_path: Path) -> None:
         await talk.ask("undo", document=key)
         assert "has unsaved edits" in await talk.refused("close", document=key)
         await talk.ask("close", document=key, discard=True)
-        assert talk.told[-2]["documents"] == []
+        assert talk.received[-2]["documents"] == []
 
-    talk(tmp_path, talking)
+    talk(tmp_path, scenario)
 
 
 def test_read_outs_equal_the_values_of_the_arm(tmp_path: Path) -> None:
     arm = ab.load_robot("puma560")
     q, qd, qdd = [0.1, 0.4, -0.3, 0.5, 0.7, 0.2], [0.5] * 6, [1.0] * 6
 
-    async def talking(talk: Talk) -> None:
+    async def scenario(talk: Talk) -> None:
         key = await talk.ask("open_shipped", document_kind="robot", name="puma560")
         found = await talk.ask("readings", document=key, q=q, qd=qd, qdd=qdd)
         assert found["pose"] == arm.fkine(q).tolist()
@@ -240,7 +240,7 @@ def test_read_outs_equal_the_values_of_the_arm(tmp_path: Path) -> None:
         picture = await talk.ask("picture", document=key, q=q, theme="light")
         assert "<svg" in picture
 
-    talk(tmp_path, talking)
+    talk(tmp_path, scenario)
 
 
 def test_singularities_are_described_in_words() -> None:

@@ -131,7 +131,7 @@ def test_cells_without_a_value_can_be_emptied() -> None:
     [
         ("link1", "a", "", "the cell is empty"),
         ("link1", "a", "[1, 5]", "2 numbers were typed"),
-        ("link1", "a", "import os", "'os' is not understood here"),
+        ("link1", "a", "import os", "'os' is not allowed here"),
         ("link1", "a", "inf", "a is inf"),
         ("link1", "theta", "1", "this cell cannot be edited"),
         ("link1", "joint", "ball", "'ball' is not a choice"),

@@ -13,7 +13,7 @@ from armblocks.errors import ArmblocksError, FormatError, InputError
 from armblocks.formats import load_robot, write_robot
 from armblocks.studio.documents import open_files
 from armblocks.studio.documents.older_journals import as_of_today
-from armblocks.studio.protocol.messages import documents as say
+from armblocks.studio.protocol.messages import documents as document_messages
 from armblocks.studio.protocol.messages.robot_edits import AddJoint, RenameLink, SetCell
 from armblocks.studio.protocol.messages.sheet_edits import ArrangeBlocks, Rename
 from armblocks.studio.robots.open_robots import OpenRobot
@@ -23,32 +23,37 @@ def content(found: OpenRobot) -> bytes:
     return write_robot(found.robot)
 
 
-def cell(key: str, link: str, column: str, text: str, gesture: str = "", **more: Any) -> say.Change:
+def cell(
+    key: str, link: str, column: str, text: str, gesture: str = "", **more: Any
+) -> document_messages.Change:
     edit = SetCell(link=link, column=column, text=text, angles="deg")
-    return say.Change(document="", key=key, gesture=gesture, edit=edit, **more)
+    return document_messages.Change(document="", key=key, gesture=gesture, edit=edit, **more)
 
 
-JOURNAL_OF_0_2: list[tuple[dict[str, Any], say.Alteration]] = [
+JOURNAL_OF_0_2: list[tuple[dict[str, Any], document_messages.Alteration]] = [
     (
         {"kind": "robot_change", "gesture": "g", "edit": {"kind": "rename", "link": "a", "name": "b"}},
-        say.Change(document="", gesture="g", edit=RenameLink(link="a", name="b")),
+        document_messages.Change(document="", gesture="g", edit=RenameLink(link="a", name="b")),
     ),
     (
         {"kind": "robot_change", "gesture": "", "edit": {"kind": "add", "after": ""}},
-        say.Change(document="", edit=AddJoint(after="")),
+        document_messages.Change(document="", edit=AddJoint(after="")),
     ),
-    ({"kind": "robot_undo"}, say.Undo(document="")),
-    ({"kind": "arrange", "inside": ["a"]}, say.Change(document="", inside=["a"], edit=ArrangeBlocks())),
+    ({"kind": "robot_undo"}, document_messages.Undo(document="")),
+    (
+        {"kind": "arrange", "inside": ["a"]},
+        document_messages.Change(document="", inside=["a"], edit=ArrangeBlocks()),
+    ),
     (
         {"kind": "change", "inside": [], "edit": {"kind": "rename", "block": "a", "name": "b"}},
-        say.Change(document="", edit=Rename(block="a", name="b")),
+        document_messages.Change(document="", edit=Rename(block="a", name="b")),
     ),
 ]
 
 
 @pytest.mark.parametrize(("written", "meant"), JOURNAL_OF_0_2)
 def test_journaled_requests_of_version_0_2_0_are_converted(
-    written: dict[str, Any], meant: say.Alteration
+    written: dict[str, Any], meant: document_messages.Alteration
 ) -> None:
     assert type(meant).model_validate({**as_of_today(written), "document": ""}) == meant
 
@@ -62,7 +67,7 @@ def requests(seed: int, count: int) -> list[Any]:
         link, column = f"link{random_.randrange(1, 8)}", random_.choice(["a", "d", "mass", "alpha", "Ixx"])
         for _ in range(random_.randrange(1, 5)):
             made.append(cell(f"{seed} {len(made)}", link, column, f"{random_.random():.3f}", gesture))
-        for kind in (say.Undo, say.Redo):
+        for kind in (document_messages.Undo, document_messages.Redo):
             for _ in range(random_.randrange(3)):
                 made.append(kind(document="", key=f"{seed} {len(made)}"))
     return made
@@ -76,7 +81,7 @@ def test_recovered_robot_edits_have_their_undo_and_redo_history(
         open_files, "SNAPSHOT_EVERY", 25
     )  # some snapshots fall between the letters of one cell
 
-    async def talking() -> None:
+    async def scenario() -> None:
         robots = disk.robots()
         found = robots.open_shipped("puma560")
         carry_out(robots, found, requests(seed, 60))
@@ -100,7 +105,7 @@ def test_recovered_robot_edits_have_their_undo_and_redo_history(
             found.document.redo()
         assert content(back) == content(found)
 
-    going(talking)
+    going(scenario)
 
 
 def test_a_snapshot_within_a_gesture_does_not_split_its_undo_step(
@@ -108,7 +113,7 @@ def test_a_snapshot_within_a_gesture_does_not_split_its_undo_step(
 ) -> None:
     monkeypatch.setattr(open_files, "SNAPSHOT_EVERY", 2)
 
-    async def talking() -> None:
+    async def scenario() -> None:
         robots = disk.robots()
         found = robots.open_shipped("puma560")
         for number, text in enumerate(("1", "1.2", "1.25")):
@@ -121,17 +126,19 @@ def test_a_snapshot_within_a_gesture_does_not_split_its_undo_step(
         back.document.undo()
         assert back.robot == load_robot("puma560")
 
-    going(talking)
+    going(scenario)
 
 
 def test_unsaved_robots_are_offered_and_do_not_overwrite_a_newer_file(disk: Disk, tmp_path: Path) -> None:
-    async def talking() -> None:
+    async def scenario() -> None:
         robots = disk.robots()
         found = robots.open_shipped("puma560")
         await robots.save(found, "arm.json", overwrite=False)
         robots.perform(found, cell("1", "link1", "mass", "7"))
         documents = disk.documents()
-        documents.perform(documents.new(), say.Change(document="", key="1", edit=ArrangeBlocks()))
+        documents.perform(
+            documents.new(), document_messages.Change(document="", key="1", edit=ArrangeBlocks())
+        )
         second = disk.as_after_a_crash(tmp_path / "second")
         theirs = write_robot(load_robot("kr180"))
         second.project.path("arm.json").write_bytes(theirs)
@@ -145,37 +152,37 @@ def test_unsaved_robots_are_offered_and_do_not_overwrite_a_newer_file(disk: Disk
             6,
         )
         assert [offer.kind for offer in second.documents().left.offers()] == ["diagram"]
-        back = await after.recover(say.Recover(document=found.key, action="keep_both"))
+        back = await after.recover(document_messages.Recover(document=found.key, action="keep_both"))
         assert back is not None
         assert back.path is not None
         assert back.path.startswith("arm recovered 20")
         assert back.robot.links[0].mass == 7
         assert second.project.read("arm.json") == theirs
         with pytest.raises(ArmblocksError, match="there is no robot to recover named"):
-            await after.recover(say.Recover(document=found.key, action="open"))
+            await after.recover(document_messages.Recover(document=found.key, action="open"))
 
-    going(talking)
+    going(scenario)
 
 
 def test_a_robot_edit_repeated_after_a_crash_is_applied_once(disk: Disk, tmp_path: Path) -> None:
-    async def talking() -> None:
+    async def scenario() -> None:
         robots = disk.robots()
         found = robots.new()
         robots.perform(found, cell("one", "link1", "a", "2"))
-        robots.perform(found, say.Undo(document="", key="two"))
+        robots.perform(found, document_messages.Undo(document="", key="two"))
         after = disk.as_after_a_crash(tmp_path / "second").robots()
         back = after.attach(found.key)
         assert not after.perform(back, cell("one", "link1", "a", "2"))
-        assert not after.perform(back, say.Undo(document="", key="two"))
-        assert after.perform(back, say.Redo(document="", key="three"))
+        assert not after.perform(back, document_messages.Undo(document="", key="two"))
+        assert after.perform(back, document_messages.Redo(document="", key="three"))
         assert back.robot.links[0].dh is not None
         assert back.robot.links[0].dh.a == 2
 
-    going(talking)
+    going(scenario)
 
 
 def test_a_page_finds_its_robot_after_a_server_restart(disk: Disk) -> None:
-    async def talking() -> None:
+    async def scenario() -> None:
         first = disk.robots()
         made = first.new()
         await first.save(made, "arm.json", overwrite=False)
@@ -188,11 +195,11 @@ def test_a_page_finds_its_robot_after_a_server_restart(disk: Disk) -> None:
         assert robots.attach("e" * 16, origin="kr180").robot == load_robot("kr180")
         assert robots.attach("d" * 16).robot == made.robot
 
-    going(talking)
+    going(scenario)
 
 
 def test_a_dropped_robot_is_journaled_before_its_first_edit(disk: Disk, tmp_path: Path) -> None:
-    async def talking() -> None:
+    async def scenario() -> None:
         robots = disk.robots()
         found = robots.bring(load_robot("kr180"))
         assert found.document.dirty
@@ -201,11 +208,11 @@ def test_a_dropped_robot_is_journaled_before_its_first_edit(disk: Disk, tmp_path
         back = disk.as_after_a_crash(tmp_path / "second").robots().attach(found.key)
         assert back.robot == load_robot("kr180")
 
-    going(talking)
+    going(scenario)
 
 
 def test_reloading_a_changed_robot_file_is_one_undo_step(disk: Disk, tmp_path: Path) -> None:
-    async def talking() -> None:
+    async def scenario() -> None:
         robots = disk.robots()
         found = robots.new()
         with pytest.raises(FormatError, match="the robot has no file yet"):
@@ -225,18 +232,18 @@ def test_reloading_a_changed_robot_file_is_one_undo_step(disk: Disk, tmp_path: P
         back.document.undo()
         assert back.robot == mine
 
-    going(talking)
+    going(scenario)
 
 
 def test_a_page_does_not_overwrite_a_cell_changed_by_another_page(disk: Disk) -> None:
-    async def talking() -> None:
+    async def scenario() -> None:
         robots = disk.robots()
         found = robots.open_shipped("puma560")
         robots.perform(found, cell("1", "link1", "a", "2", author="other", base=0))
         robots.perform(found, cell("2", "link1", "d", "3", author="me", base=0))  # another cell
         for late in (
             cell("3", "link1", "a", "4", author="me", base=0),
-            say.Undo(document="", key="4", author="me", base=0),
+            document_messages.Undo(document="", key="4", author="me", base=0),
         ):
             with pytest.raises(InputError, match=r"another page.*repeat the edit"):
                 robots.perform(found, late)
@@ -244,4 +251,4 @@ def test_a_page_does_not_overwrite_a_cell_changed_by_another_page(disk: Disk) ->
         assert (found.robot.links[0].dh.a, found.robot.links[0].dh.d) == (2, 3)
         robots.perform(found, cell("5", "link1", "a", "4", author="me", base=2))  # after seeing the change
 
-    going(talking)
+    going(scenario)

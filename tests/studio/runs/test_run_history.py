@@ -14,7 +14,7 @@ from armblocks.blocks import BLOCKS
 from armblocks.errors import ArmblocksError
 from armblocks.face.model import CompiledDiagram
 from armblocks.formats import diagram_to_bytes, load_diagram, load_robot
-from armblocks.studio.protocol.messages import runs as say
+from armblocks.studio.protocol.messages import runs as run_messages
 from armblocks.studio.runs.history import RunHistory
 from armblocks.studio.runs.process import RunProcess
 from armblocks.studio.runs.tunables import tunables
@@ -94,14 +94,14 @@ class Listener:
         self.times: list[float] = []
         self.news = asyncio.Event()
 
-    async def tell(self, event: say.Message | bytes) -> None:
+    async def notify(self, event: run_messages.Message | bytes) -> None:
         if isinstance(event, bytes):
             header, time, _ = read_frame(event)
             assert header["first"] == len(self.times), "no sample is lost or repeated"
             self.times += time.tolist()
         else:
             self.events.append(event)
-            if isinstance(event, say.RunRewound):
+            if isinstance(event, run_messages.RunRewound):
                 del self.times[event.count :]
         self.news.set()
 
@@ -123,35 +123,37 @@ class Listener:
 def test_a_run_in_a_process_is_tuned_rewound_and_finished() -> None:
     async def going() -> None:
         heard = Listener()
-        run = RunProcess("r", "d", Worker(), heard.tell)
+        run = RunProcess("r", "d", Worker(), heard.notify)
         source = diagram_to_bytes(load_diagram("van_der_pol_pid", BLOCKS), load_robot).decode()
         run.start({"diagram": source, "folder": ".", "speed": 5.0, "tuned": {"PID.I": "1/2"}})
-        begun = await heard.until(say.RunStarted)
+        begun = await heard.until(run_messages.RunStarted)
         assert {t.path: t.value for t in begun.tunables}["PID.I"] == 0.5, "trial values apply from the start"
         while len(heard.times) < 100:
             await asyncio.sleep(0.02)
-        run.obey(say.Control(run="r", action="pause"))
-        await heard.until(say.RunProgress, lambda event: event.state == "paused")  # after the last samples
+        run.obey(run_messages.Control(run="r", action="pause"))
+        await heard.until(
+            run_messages.RunProgress, lambda event: event.state == "paused"
+        )  # after the last samples
         reached = len(heard.times)
-        run.obey(say.Tune(run="r", parameter="PID.P", value="2*3"))
-        assert (await heard.until(say.RunTuned)).parameter == "PID.P"
-        run.obey(say.Tune(run="r", parameter="PID.P", value="six"))
-        assert "six" in (await heard.until(say.RunProgress, lambda event: event.fault)).message
-        run.obey(say.Control(run="r", action="back"))
-        assert (await heard.until(say.RunRewound)).count < reached
+        run.obey(run_messages.Tune(run="r", parameter="PID.P", value="2*3"))
+        assert (await heard.until(run_messages.RunTuned)).parameter == "PID.P"
+        run.obey(run_messages.Tune(run="r", parameter="PID.P", value="six"))
+        assert "six" in (await heard.until(run_messages.RunProgress, lambda event: event.fault)).message
+        run.obey(run_messages.Control(run="r", action="back"))
+        assert (await heard.until(run_messages.RunRewound)).count < reached
         heard.events.clear()
-        run.obey(say.Rewind(run="r", time=0.5))
-        rewound = await heard.until(say.RunRewound)
+        run.obey(run_messages.Rewind(run="r", time=0.5))
+        rewound = await heard.until(run_messages.RunRewound)
         assert heard.times[-1] <= 0.5
         assert rewound.count == len(heard.times)
-        run.obey(say.SetSpeed(run="r", speed=None))
-        run.obey(say.Control(run="r", action="resume"))
-        end = await heard.until(say.RunProgress, lambda event: event.state == "done")
+        run.obey(run_messages.SetSpeed(run="r", speed=None))
+        run.obey(run_messages.Control(run="r", action="resume"))
+        end = await heard.until(run_messages.RunProgress, lambda event: event.state == "done")
         assert end.solver
         assert "auto" in end.reason
         assert np.all(np.diff(heard.times) > 0)
         with pytest.raises(ArmblocksError, match="the run has ended"):
-            run.obey(say.Control(run="r", action="back"))
+            run.obey(run_messages.Control(run="r", action="back"))
         run.end()
 
     asyncio.run(going())

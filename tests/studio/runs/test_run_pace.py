@@ -13,7 +13,7 @@ from run_frames import read_frame
 
 import armblocks as ab
 from armblocks.formats import diagram_to_bytes, load_robot
-from armblocks.studio.protocol.messages import runs as say
+from armblocks.studio.protocol.messages import runs as run_messages
 from armblocks.studio.runs import worker as run_worker
 from armblocks.studio.runs.pace import Pace
 
@@ -45,7 +45,9 @@ def test_due_time_follows_the_clock_from_its_reference() -> None:
 class Pipe:
     """A page that sends commands at given displayed times; waiting advances the clock."""
 
-    def __init__(self, clock: Clock, speed: float, commands: list[tuple[float, say.Message]]) -> None:
+    def __init__(
+        self, clock: Clock, speed: float, commands: list[tuple[float, run_messages.Message]]
+    ) -> None:
         self.clock = clock
         self.speed = speed
         self.commands = commands
@@ -88,7 +90,7 @@ def lag() -> ab.Diagram:
     return builder.build()
 
 
-def ran(monkeypatch: pytest.MonkeyPatch, speed: float, *commands: tuple[float, say.Message]) -> Pipe:
+def ran(monkeypatch: pytest.MonkeyPatch, speed: float, *commands: tuple[float, run_messages.Message]) -> Pipe:
     clock = Clock()
     monkeypatch.setattr(run_worker, "perf_counter", clock)
     monkeypatch.setattr(run_worker, "Pace", partial(Pace, clock=clock))
@@ -115,8 +117,8 @@ def test_a_slow_run_is_never_ahead_of_the_clock(
 def test_a_tuned_value_applies_from_the_displayed_instant(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    tune = say.Tune(run="r", parameter="gain.gain", value=2.0)
-    pause, resume = (say.Control(run="r", action=action) for action in ("pause", "resume"))
+    tune = run_messages.Tune(run="r", parameter="gain.gain", value=2.0)
+    pause, resume = (run_messages.Control(run="r", action=action) for action in ("pause", "resume"))
     pipe = ran(monkeypatch, 1.0, (12.005, tune), (15.005, pause), (15.005, resume))
     (tuned,) = (event for event in pipe.events if event["kind"] == "run_tuned")
     (paused,) = (event for event in pipe.events if event.get("state") == "paused")

@@ -36,13 +36,13 @@ class Talk:
 
     def __init__(self, folder: Path) -> None:
         self.hub = Hub(ProjectFolder(folder))
-        self.told: list[dict[str, Any]] = []
+        self.events: list[dict[str, Any]] = []
         self.news = asyncio.Event()
         self.page = Page(self._hear, self._hear_frame)
         self._number = 0
 
     async def _hear(self, text: str) -> None:
-        self.told.append(json.loads(text))
+        self.events.append(json.loads(text))
         self.news.set()
 
     async def _hear_frame(self, data: bytes) -> None:
@@ -53,7 +53,7 @@ class Talk:
         await self.hub.answer(
             self.page, json.dumps({"number": self._number, "request": {"kind": kind, **values}})
         )
-        reply = next(e for e in reversed(self.told) if e["kind"] == "reply")
+        reply = next(e for e in reversed(self.events) if e["kind"] == "reply")
         assert reply["fault"] is None, reply["fault"]
         return reply["value"]
 
@@ -62,7 +62,7 @@ class Talk:
         async with asyncio.timeout(PATIENCE_SECONDS):
             while True:
                 self.news.clear()
-                for event in self.told:
+                for event in self.events:
                     if event["kind"] == "run_progress" and event["run"] == run and event["state"] in states:
                         return event
                 await self.news.wait()
@@ -73,12 +73,12 @@ class Talk:
         return pid
 
 
-def talk(folder: Path, talking: Callable[[Talk], Awaitable[None]]) -> None:
+def talk(folder: Path, scenario: Callable[[Talk], Awaitable[None]]) -> None:
     async def going() -> None:
         talk = Talk(folder)
         await talk.hub.welcome(talk.page)
         try:
-            await talking(talk)
+            await scenario(talk)
         finally:
             talk.hub.close()
 
@@ -154,24 +154,24 @@ DEATHS: list[tuple[Callable[[Connection], None], str]] = [
 def test_a_failed_worker_is_reported_and_the_next_run_works(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, death: Callable[[Connection], None], words: str
 ) -> None:
-    async def talking(talk: Talk) -> None:
+    async def scenario(talk: Talk) -> None:
         document = await talk.ask("open_shipped", document_kind="diagram", name="falling_pendulum")
         with monkeypatch.context() as patch:
             in_worker(patch, death)
             talk.hub.runs.workers.prepare()
             run = await talk.ask("run", document=document)
-            told = await talk.until(run, "failed", "done")
-            assert told["state"] == "failed"
-            assert told["fault"]["what"] == words
-            assert told["fault"]["where"] == "run"
-            assert told["fault"]["fix"]
+            last = await talk.until(run, "failed", "done")
+            assert last["state"] == "failed"
+            assert last["fault"]["what"] == words
+            assert last["fault"]["where"] == "run"
+            assert last["fault"]["fix"]
             talk.hub.runs.workers.end()  # the next worker was prepared with the same fault
         assert await talk.ask("ping") is None
         await talk.ask("change", document=document, key="1", edit={"kind": "arrange"})
         again = await talk.ask("run", document=document)
         assert (await talk.until(again, "done", "failed"))["state"] == "done"
 
-    talk(tmp_path, talking)
+    talk(tmp_path, scenario)
 
 
 @pytest.mark.parametrize("hang", [hang_in_python, hang_in_native_code])
@@ -180,20 +180,20 @@ def test_stop_ends_a_run_in_any_state_of_its_worker(
 ) -> None:
     in_worker(monkeypatch, hang)
 
-    async def talking(talk: Talk) -> None:
+    async def scenario(talk: Talk) -> None:
         document = await talk.ask("open_shipped", document_kind="diagram", name="falling_pendulum")
         run = await talk.ask("run", document=document)
         pid = talk.pid(run)
         for _ in range(3000):  # more than the capacity of the pipe: sending must not block
             await talk.ask("speed", run=run, speed=1.0)
         await talk.ask("control", run=run, action="stop")
-        told = await talk.until(run, "stopped", "failed", "done")
-        assert (told["state"], told["fault"]) == ("stopped", None)
+        last = await talk.until(run, "stopped", "failed", "done")
+        assert (last["state"], last["fault"]) == ("stopped", None)
         with pytest.raises(ProcessLookupError):
             os.kill(pid, 0)
 
     assert run_process.STOP_SECONDS < 1.0  # leaves time for the system to end the process
-    talk(tmp_path, talking)
+    talk(tmp_path, scenario)
 
 
 def test_a_hung_worker_is_killed_without_a_stop_request(
@@ -202,16 +202,16 @@ def test_a_hung_worker_is_killed_without_a_stop_request(
     in_worker(monkeypatch, hang_in_python)
     monkeypatch.setattr(run_process, "SILENT_SECONDS", 1.0)
 
-    async def talking(talk: Talk) -> None:
+    async def scenario(talk: Talk) -> None:
         document = await talk.ask("open_shipped", document_kind="diagram", name="falling_pendulum")
         run = await talk.ask("run", document=document)
         assert (await talk.until(run, "failed"))["fault"]["what"] == "the run does not respond; it was ended"
 
-    talk(tmp_path, talking)
+    talk(tmp_path, scenario)
 
 
 def test_a_paused_run_is_ended_at_the_time_limit(tmp_path: Path) -> None:
-    async def talking(talk: Talk) -> None:
+    async def scenario(talk: Talk) -> None:
         document = await talk.ask("open_shipped", document_kind="diagram", name="falling_pendulum")
         run = await talk.ask("run", document=document, speed=0.1)
         await talk.until(run, "running")
@@ -219,38 +219,38 @@ def test_a_paused_run_is_ended_at_the_time_limit(tmp_path: Path) -> None:
         await talk.until(run, "paused")
         talk.hub.runs.processes[run]._until = monotonic() + 0.2  # pyright: ignore[reportPrivateUsage]
         await talk.ask("control", run=run, action="back")
-        told = await talk.until(run, "failed")
+        last = await talk.until(run, "failed")
         assert (
-            told["fault"]["what"]
+            last["fault"]["what"]
             == f"the run exceeds its time limit of {run_process.MOST_SECONDS:g} s; it was ended"
         )
 
-    talk(tmp_path, talking)
+    talk(tmp_path, scenario)
 
 
 def test_a_killed_worker_is_reported_and_its_samples_remain(tmp_path: Path) -> None:
-    async def talking(talk: Talk) -> None:
+    async def scenario(talk: Talk) -> None:
         document = await talk.ask("open_shipped", document_kind="diagram", name="falling_pendulum")
         run = await talk.ask("run", document=document, speed=1.0)
         await talk.until(run, "running")
         os.kill(talk.pid(run), signal.SIGKILL)
-        told = await talk.until(run, "failed")
-        assert "(SIGKILL): the memory may be exhausted" in told["fault"]["what"]
+        last = await talk.until(run, "failed")
+        assert "(SIGKILL): the memory may be exhausted" in last["fault"]["what"]
         late: list[str | bytes] = []
 
-        async def hear(said: str | bytes) -> None:
-            late.append(said)
+        async def hear(text: str | bytes) -> None:
+            late.append(text)
 
         other = Page(hear, hear)
         await talk.hub.welcome(other)
         request = {"kind": "attach", "document": document, "document_kind": "diagram"}
         attach = {"number": 1, "request": request}
         await talk.hub.answer(other, json.dumps(attach))
-        assert any(isinstance(said, bytes) for said in late), (
+        assert any(isinstance(text, bytes) for text in late), (
             "a page that connects later receives the samples"
         )
 
-    talk(tmp_path, talking)
+    talk(tmp_path, scenario)
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="/dev/full exists only on Linux")
@@ -260,20 +260,20 @@ def test_a_run_whose_samples_do_not_fit_on_disk_is_reported(
     def full(**_: object) -> object:
         return Path("/dev/full").open("r+b", buffering=0)
 
-    async def talking(talk: Talk) -> None:
+    async def scenario(talk: Talk) -> None:
         document = await talk.ask("open_shipped", document_kind="diagram", name="falling_pendulum")
         with monkeypatch.context() as patch:
             patch.setattr("armblocks.studio.runs.record.tempfile.TemporaryFile", full)
             run = await talk.ask("run", document=document)
-        told = await talk.until(run, "failed", "done")
-        assert told["state"] == "failed"
-        assert told["fault"]["what"] == (
+        last = await talk.until(run, "failed", "done")
+        assert last["state"] == "failed"
+        assert last["fault"]["what"] == (
             "the samples of the run cannot be stored (No space left on device); the run was ended"
         )
         again = await talk.ask("run", document=document)
         assert (await talk.until(again, "done", "failed"))["state"] == "done"
 
-    talk(tmp_path, talking)
+    talk(tmp_path, scenario)
 
 
 def crash_in_the_report(pipe: Connection, job: dict[str, Any]) -> None:
@@ -304,7 +304,7 @@ def test_a_report_whose_process_fails_raises_an_error_with_the_reason(
 ) -> None:
     monkeypatch.setattr(run_report, "write", death)
 
-    async def talking(talk: Talk) -> None:
+    async def scenario(talk: Talk) -> None:
         document = await talk.ask("open_shipped", document_kind="diagram", name="falling_pendulum")
         run = await talk.ask("run", document=document)
         await talk.until(run, "done")
@@ -312,4 +312,4 @@ def test_a_report_whose_process_fails_raises_an_error_with_the_reason(
             await talk.hub.runs.report(document)
         assert refused.value.what == words
 
-    talk(tmp_path, talking)
+    talk(tmp_path, scenario)

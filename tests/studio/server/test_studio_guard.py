@@ -158,15 +158,15 @@ def test_hostile_parameters_cause_no_server_error_and_reveal_no_file(
     coming = HubToCome(ProjectFolder(tmp_path / "project"))
     app = studio_app(coming, keys, frozenset({HOST}), web)
 
-    told: list[dict[str, Any]] = []
+    events: list[dict[str, Any]] = []
 
-    async def hear(said: str | bytes) -> None:
-        told.append(json.loads(said))
+    async def hear(text: str | bytes) -> None:
+        events.append(json.loads(text))
 
     async def opened() -> str:
         hub, page = await coming.here(), Page(hear, hear)
         await hub.answer(page, '{"number": 1, "request": {"kind": "new", "document_kind": "diagram"}}')
-        return told[-1]["value"]
+        return events[-1]["value"]
 
     document = asyncio.run(opened())
     assert call(app, f"/drawing/{document}.svg", cookie(keys))[0] == 200

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from page_requests import Told, talk
+from page_requests import Events, talk
 
 from armblocks.blocks import BLOCKS
 from armblocks.errors import ArmblocksError, FormatError, InputError
@@ -33,7 +33,7 @@ GAIN = {"name": "gain", "type": "Gain", "place": {"x": 0, "y": 0}}
 
 
 def test_a_diagram_is_opened_changed_checked_and_saved(tmp_path: Path) -> None:
-    async def talking(hub: Hub, ask: Callable[..., Awaitable[Any]], told: Told) -> None:
+    async def scenario(hub: Hub, ask: Callable[..., Awaitable[Any]], events: Events) -> None:
         key = await ask("open_shipped", document_kind="diagram", name="van_der_pol_pid")
         await ask("change", document=key, key="1", edit={"kind": "add", "blocks": [GAIN]})
         await ask(
@@ -41,27 +41,27 @@ def test_a_diagram_is_opened_changed_checked_and_saved(tmp_path: Path) -> None:
         )  # sent twice, applied once
 
         def last_check() -> list[Any] | None:
-            return next((event["findings"] for event in reversed(told) if event["kind"] == "checked"), None)
+            return next((event["findings"] for event in reversed(events) if event["kind"] == "checked"), None)
 
         await until(lambda: bool(last_check()))
         await ask("undo", document=key)
         assert await ask("save", document=key, path="models/mine.json") == "models/mine.json"
         await until(lambda: last_check() == [])
 
-    told = talk(tmp_path, talking)
+    events = talk(tmp_path, scenario)
     assert load_diagram(tmp_path / "models" / "mine.json", BLOCKS).name == "mine"
-    checks = [event for event in told if event["kind"] == "checked"]
+    checks = [event for event in events if event["kind"] == "checked"]
     first = next(event["findings"] for event in checks if event["findings"])
     assert [(f["block"], f["port"]) for f in first] == [("gain", "u")]
     assert checks[-1]["findings"] == []
     assert checks[-1]["wires"]["PID/y"]["shape"] == []
-    last = [event for event in told if event["kind"] == "changed"][-1]
+    last = [event for event in events if event["kind"] == "changed"][-1]
     assert last["state"]["path"] == "models/mine.json"
     assert not last["state"]["dirty"]
 
 
 def test_a_file_changed_on_disk_is_not_overwritten_without_confirmation(tmp_path: Path) -> None:
-    async def talking(hub: Hub, ask: Callable[..., Awaitable[Any]], told: Told) -> None:
+    async def scenario(hub: Hub, ask: Callable[..., Awaitable[Any]], events: Events) -> None:
         key = await ask("new", document_kind="diagram")
         with pytest.raises(ArmblocksError, match="the drawing has no file yet"):
             await ask("save", document=key)
@@ -76,25 +76,25 @@ def test_a_file_changed_on_disk_is_not_overwritten_without_confirmation(tmp_path
         await ask("save", document=key, path="b.json", overwrite=True)
         await ask("save", document=key)
 
-    talk(tmp_path, talking)
+    talk(tmp_path, scenario)
     assert load_diagram(tmp_path / "b.json", BLOCKS).name == "b"
 
 
 def test_an_incomplete_diagram_is_saved_and_reopened(tmp_path: Path) -> None:
-    async def talking(hub: Hub, ask: Callable[..., Awaitable[Any]], told: Told) -> None:
+    async def scenario(hub: Hub, ask: Callable[..., Awaitable[Any]], events: Events) -> None:
         key = await ask("new", document_kind="diagram")
         await ask("change", document=key, key="1", edit={"kind": "add", "blocks": [GAIN]})
         await ask("save", document=key, path="open.json")
         await ask("close", document=key)
         await ask("open", path="open.json")
 
-    told = talk(tmp_path, talking)
-    sheets = [event["content"]["sheet"]["blocks"] for event in told if event["kind"] == "opened"]
+    events = talk(tmp_path, scenario)
+    sheets = [event["content"]["sheet"]["blocks"] for event in events if event["kind"] == "opened"]
     assert list(sheets[-1]) == ["gain"]
 
 
 def test_a_group_needs_blocks_and_a_free_name(tmp_path: Path) -> None:
-    async def talking(hub: Hub, ask: Callable[..., Awaitable[Any]], told: Told) -> None:
+    async def scenario(hub: Hub, ask: Callable[..., Awaitable[Any]], events: Events) -> None:
         key = await ask("open_shipped", document_kind="diagram", name="van_der_pol_pid")
         with pytest.raises(ArmblocksError, match="no blocks were chosen"):
             await ask("change", document=key, key="1", edit={"kind": "group", "blocks": [], "name": "s"})
@@ -110,8 +110,8 @@ def test_a_group_needs_blocks_and_a_free_name(tmp_path: Path) -> None:
         await ask("undo", document=key)
         await ask("undo", document=key)  # the subsystem is removed, so the page shows the top sheet
 
-    told = talk(tmp_path, talking)
-    opened = [event for event in told if event["kind"] == "opened"]
+    events = talk(tmp_path, scenario)
+    opened = [event for event in events if event["kind"] == "opened"]
     assert opened[1]["content"]["inside"] == ["part"]
     assert opened[-1]["content"]["inside"] == []
     blocks, at_first = (event["content"]["sheet"]["blocks"] for event in (opened[-1], opened[0]))
@@ -119,7 +119,7 @@ def test_a_group_needs_blocks_and_a_free_name(tmp_path: Path) -> None:
 
 
 def test_the_server_sends_scenes_and_poses_of_robots(tmp_path: Path) -> None:
-    async def talking(hub: Hub, ask: Callable[..., Awaitable[Any]], told: Told) -> None:
+    async def scenario(hub: Hub, ask: Callable[..., Awaitable[Any]], events: Events) -> None:
         key = await ask("open_shipped", document_kind="diagram", name="kr180model")
         scene = await ask("scene", document=key, block="plot")
         assert scene["rows"] == 6
@@ -131,7 +131,7 @@ def test_the_server_sends_scenes_and_poses_of_robots(tmp_path: Path) -> None:
             await ask("scene", document=key, block="speed")
         assert await ask("typed", type="Gain", parameter="gain", text="[1 2;3 4]") == [[1.0, 2.0], [3.0, 4.0]]
 
-    talk(tmp_path, talking)
+    talk(tmp_path, scenario)
 
 
 def test_a_failed_start_raises_an_error_with_the_reason(tmp_path: Path) -> None:
@@ -147,11 +147,11 @@ def test_a_failed_start_raises_an_error_with_the_reason(tmp_path: Path) -> None:
 
 
 def test_a_run_without_memory_fails_with_an_error_message(monkeypatch: pytest.MonkeyPatch) -> None:
-    said: list[bytes] = []
+    message: list[bytes] = []
 
     class Pipe:
         def send_bytes(self, data: bytes) -> None:
-            said.append(data)
+            message.append(data)
 
     def exhausted(_: object) -> None:
         raise MemoryError
@@ -161,6 +161,6 @@ def test_a_run_without_memory_fails_with_an_error_message(monkeypatch: pytest.Mo
     run = run_worker._Run(Pipe(), job)  # pyright: ignore
     monkeypatch.setattr(run, "_go", lambda: exhausted(None))
     run.run()
-    event = json.loads(said[-1][1:])
+    event = json.loads(message[-1][1:])
     assert event["state"] == "failed"
     assert event["fault"]["what"] == "the run exceeds its memory limit"

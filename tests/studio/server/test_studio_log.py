@@ -45,7 +45,7 @@ def test_the_terminal_shows_no_key_after_the_login_and_no_file_content(tmp_path:
     (tmp_path / "script.m").write_text(f"{CONTENT} = (1")
     studio = Studio(tmp_path)
     with killed_at_the_end(studio.process):
-        rest, secrets = _said_after_the_login(studio)
+        rest, secrets = _output_after_the_login(studio)
     for secret in secrets:
         assert secret not in rest
     assert "Exception in ASGI application" not in rest  # of the aborted connections
@@ -62,7 +62,7 @@ def _abort(address: str, headers: dict[str, str]) -> None:
         page.socket.close()
 
 
-def _said_after_the_login(studio: Studio) -> tuple[str, tuple[str, ...]]:
+def _output_after_the_login(studio: Studio) -> tuple[str, tuple[str, ...]]:
     """Provoke errors that could reveal secrets; return the terminal output and the secrets."""
     key = studio.link.partition("key=")[2]
     code, cookie = status(studio.link, {})
@@ -80,9 +80,9 @@ def _said_after_the_login(studio: Studio) -> tuple[str, tuple[str, ...]]:
     with connect(address, additional_headers=headers, max_size=None) as page:
         for number, path in enumerate(("bad.json", "script.m", CONTENT + ".json")):
             page.send(json.dumps({"number": number, "request": {"kind": "open", "path": path}}))
-            while (said := json.loads(page.recv(timeout=60)))["kind"] != "reply":
+            while (message := json.loads(page.recv(timeout=60)))["kind"] != "reply":
                 pass
-            assert said["fault"]["what"]
+            assert message["fault"]["what"]
         page.send(json.dumps({"number": 9, "request": {"kind": CONTENT}}))
         page.send(CONTENT)
         with pytest.raises(ConnectionClosed):
@@ -112,10 +112,10 @@ def test_logged_exceptions_have_a_traceback_and_no_message(capsys: pytest.Captur
     finally:
         root.handlers[:] = before
         root.setLevel(level)
-    said = capsys.readouterr().err
-    assert "ERROR: a request failed because of a defect" in said
-    assert f'File "{__file__}"' in said
-    assert "ValueError" in said
-    assert "WARNING: GET /login?key=… … …" in said
+    message = capsys.readouterr().err
+    assert "ERROR: a request failed because of a defect" in message
+    assert f'File "{__file__}"' in message
+    assert "ValueError" in message
+    assert "WARNING: GET /login?key=… … …" in message
     for secret in (CONTENT, *keys.secrets()):
-        assert secret not in said.replace("raise ValueError(CONTENT) from KeyError(CONTENT)", "")
+        assert secret not in message.replace("raise ValueError(CONTENT) from KeyError(CONTENT)", "")

@@ -12,7 +12,7 @@ from armblocks.diagram import Diagram
 from armblocks.errors import ArmblocksError, InputError
 from armblocks.formats import load_robot
 from armblocks.studio.documents.aspects import changed_aspects, clash
-from armblocks.studio.protocol.messages import documents as say
+from armblocks.studio.protocol.messages import documents as document_messages
 from armblocks.studio.protocol.messages.sheet_edits import (
     AddBlocks,
     Connect,
@@ -41,8 +41,8 @@ def drawing() -> Document:
     return document
 
 
-def change(author: str, base: int, edit: DiagramEdit, *inside: str) -> say.Change:
-    return say.Change(document="", author=author, base=base, edit=edit, inside=list(inside))
+def change(author: str, base: int, edit: DiagramEdit, *inside: str) -> document_messages.Change:
+    return document_messages.Change(document="", author=author, base=base, edit=edit, inside=list(inside))
 
 
 def gain(block: str, value: float) -> SetParameters:
@@ -123,10 +123,10 @@ def test_undo_of_an_unseen_change_is_refused() -> None:
     document = drawing()
     base = document.version
     document.perform(change("other", base, gain("b0", 2.0)))
-    for undo in (say.Undo, say.Redo):
+    for undo in (document_messages.Undo, document_messages.Redo):
         with pytest.raises(InputError, match="the drawing was changed in another page meanwhile"):
             document.perform(undo(document="", author="me", base=base))
-    document.perform(say.Undo(document="", author="me", base=document.version))
+    document.perform(document_messages.Undo(document="", author="me", base=document.version))
     assert document.diagram.blocks["b0"].parameter_value("gain") == 1.0
 
 
@@ -149,14 +149,16 @@ class Page:
 
     def hear(self) -> None:
         """Process the next message."""
-        self.version, told = self.coming.popleft()
-        for name, block in told.blocks.items():
+        self.version, change = self.coming.popleft()
+        for name, block in change.blocks.items():
             if block is None:
                 self.blocks.pop(name, None)
             else:
                 self.blocks[name] = block
-        self.wires = (self.wires - set(told.wires_removed)) | set(told.wires_added)
-        self.lines = {key: lines for key, lines in {**self.lines, **told.lines}.items() if lines is not None}
+        self.wires = (self.wires - set(change.wires_removed)) | set(change.wires_added)
+        self.lines = {
+            key: lines for key, lines in {**self.lines, **change.lines}.items() if lines is not None
+        }
 
 
 def random_edit(random_: random.Random, page: Page) -> DiagramEdit:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from page_requests import Told, talk
+from page_requests import Events, talk
 
 import armblocks as ab
 from armblocks.blocks import BLOCKS, Gain
@@ -106,17 +106,17 @@ def test_pasting_reads_no_file_outside_the_project(tmp_path: Path) -> None:
     text = copy(placed(load_diagram("puma560_servos", BLOCKS)), "servo 1")
     assert '"joint_servos#JointServo"' in text
 
-    async def talking(hub: Any, ask: Any, told: Told) -> None:
+    async def scenario(hub: Any, ask: Any, events: Events) -> None:
         key = await ask("open_shipped", document_kind="diagram", name="puma560_servos")
         same = await ask("copy", document=key, blocks=["servo 1"])
         assert same == text
         edit = {"kind": "paste", "names": {"servo 1": "another"}}
         await ask("change", document=key, edit={**edit, "text": same})
         outside = same.replace("joint_servos#JointServo", "../outside.json#Servo")
-        with pytest.raises(InputError, match="lies outside of the project folder"):
+        with pytest.raises(InputError, match="is outside of the project folder"):
             await ask("change", document=key, edit={**edit, "text": outside, "names": {"servo 1": "third"}})
 
-    talk(tmp_path / "project", talking)
+    talk(tmp_path / "project", scenario)
 
 
 def test_inserting_a_block_into_a_wire_and_removing_it_is_one_step_each() -> None:

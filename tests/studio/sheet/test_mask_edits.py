@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from page_requests import Told, talk
+from page_requests import Events, talk
 
 import armblocks as ab
 from armblocks.blocks import BLOCKS, Constant, Gain, Scope
@@ -137,7 +137,7 @@ def test_removing_a_parameter_that_a_formula_reads_is_refused(document: Document
 
 
 @pytest.mark.parametrize(
-    ("parameters", "said"),
+    ("parameters", "message"),
     [
         ([declared("k", was="nothing")], "unknown mask parameter|no mask parameter"),
         ([declared("k", was="k"), declared("k")], "declared twice"),
@@ -148,10 +148,10 @@ def test_removing_a_parameter_that_a_formula_reads_is_refused(document: Document
     ],
 )
 def test_invalid_declarations_are_refused(
-    document: Document, parameters: list[MaskParameter], said: str
+    document: Document, parameters: list[MaskParameter], message: str
 ) -> None:
     before = document.diagram
-    with pytest.raises(ArmblocksError, match=said):
+    with pytest.raises(ArmblocksError, match=message):
         edited(document, parameters)
     assert document.diagram is before
 
@@ -217,14 +217,14 @@ def test_renaming_changes_only_whole_names(text: str, order: list[str]) -> None:
 
 
 def test_a_page_can_read_and_set_a_mask(tmp_path: Path) -> None:
-    async def talking(hub: Any, ask: Any, told: Told) -> None:
+    async def scenario(hub: Any, ask: Any, events: Events) -> None:
         key = await ask("open_shipped", document_kind="diagram", name="puma560_servos")
         found = await ask("ask_mask", document=key, block="servo 1")
         assert [rule["name"] for rule in found["parameters"]] == ["w", "G", "Jm", "B", "limit", "q0"]
         await ask("change", document=key, edit={"kind": "break_link", "block": "servo 1"})
         mask = {**found, "block": "servo 1", "name": "Servo"}
         await ask("change", document=key, edit=mask)
-        change = [event for event in told if event["kind"] == "changed"][-1]["change"]
+        change = [event for event in events if event["kind"] == "changed"][-1]["change"]
         assert ">Servo<" in change["sheet"]["blocks"]["servo 1"]["face"]
 
-    talk(tmp_path, talking)
+    talk(tmp_path, scenario)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from page_requests import Told, talk
+from page_requests import Events, talk
 
 import armblocks as ab
 from armblocks.blocks import BLOCKS
@@ -71,12 +71,12 @@ def test_a_library_is_read_only_until_the_link_is_broken(document: Document) -> 
 
 
 def test_a_page_opens_a_masked_subsystem_and_evaluates_formulas(tmp_path: Path) -> None:
-    async def talking(hub: Any, ask: Any, told: Told) -> None:
+    async def scenario(hub: Any, ask: Any, events: Events) -> None:
         key = await ask("open_shipped", document_kind="diagram", name="puma560_servos")
         where = {"document": key, "inside": [], "block": "servo 1", "type": "Subsystem"}
         assert await ask("typed", **where, parameter="w", text="w/2 + 1") == 11.0
         await ask("look", document=key, inside=["servo 1"])
-        opened = [event for event in told if event["kind"] == "opened"][-1]
+        opened = [event for event in events if event["kind"] == "opened"][-1]
         assert opened["content"]["sheet"]["linked"] == ["servo 1"]
         assert opened["content"]["sheet"]["link"] == "joint_servos#JointServo"
         with pytest.raises(InputError, match="belongs to the library block"):
@@ -86,7 +86,7 @@ def test_a_page_opens_a_masked_subsystem_and_evaluates_formulas(tmp_path: Path) 
         again = await ask("open", path="mine.json")
         assert again == [key]
 
-    talk(tmp_path, talking)
+    talk(tmp_path, scenario)
 
 
 def test_libraries_outside_the_project_are_not_read(tmp_path: Path) -> None:
@@ -94,7 +94,7 @@ def test_libraries_outside_the_project_are_not_read(tmp_path: Path) -> None:
     servo = ab.load_library("joint_servos")["JointServo"]
     ab.save_library({"Servo": servo}, tmp_path / "outside.json")
     folder = ProjectFolder(tmp_path / "project")
-    with pytest.raises(FormatError, match=r"the library 'outside.json' lies outside of the project folder"):
+    with pytest.raises(FormatError, match=r"the library 'outside.json' is outside of the project folder"):
         folder.read_library((tmp_path / "outside.json").resolve())
     ab.save_library({"Servo": servo}, tmp_path / "project" / "own.json")
     assert folder.read_library(folder.root / "own.json")

@@ -12,7 +12,7 @@ from sheet_edits import MAKERS, random_edit
 
 from armblocks.errors import ArmblocksError
 from armblocks.formats import diagram_to_bytes, load_robot
-from armblocks.studio.protocol.messages import documents as say
+from armblocks.studio.protocol.messages import documents as document_messages
 from armblocks.studio.sheet.document import Document
 from armblocks.studio.sheet.edits import EDITS
 
@@ -34,7 +34,7 @@ def test_random_edits_are_undone_redone_and_recovered_from_the_journal(tmp_path:
     done: Counter[type] = Counter()
     inner = 0
 
-    async def talking() -> None:
+    async def scenario() -> None:
         nonlocal inner
         for seed in range(SEEDS):
             (tmp_path / str(seed) / "project").mkdir(parents=True)
@@ -46,7 +46,9 @@ def test_random_edits_are_undone_redone_and_recovered_from_the_journal(tmp_path:
             forms = [document.diagram]
             for number in range(40):
                 path, edit = random_edit(document, chance)
-                request = say.Change(document="", key=f"{seed} {number}", inside=path, edit=edit)
+                request = document_messages.Change(
+                    document="", key=f"{seed} {number}", inside=path, edit=edit
+                )
                 try:
                     documents.perform(found, request)
                 except ArmblocksError:
@@ -71,7 +73,7 @@ def test_random_edits_are_undone_redone_and_recovered_from_the_journal(tmp_path:
                 assert one.redo_title == ""
                 assert content(one) == end
 
-    going(talking)
+    going(scenario)
     for kind in MAKERS:
         assert done[kind] >= LEAST, (kind, done)
     assert inner > SEEDS
@@ -81,8 +83,8 @@ def test_random_edits_are_undone_redone_and_recovered_from_the_journal(tmp_path:
 def test_random_edits_are_reproducible_from_the_seed(seed: int, tmp_path: Path) -> None:
     (tmp_path / "project").mkdir()
 
-    async def talking() -> None:
+    async def scenario() -> None:
         document = Disk(tmp_path).documents().open_shipped("puma560_servos").document
         assert random_edit(document, random.Random(seed)) == random_edit(document, random.Random(seed))
 
-    going(talking)
+    going(scenario)

@@ -203,7 +203,7 @@ class CTraj(Block):
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         if self.profile == "lspb":
-            s = Trapezoidal().outputs(t, {}, {}, self._way(p))["q"]
+            s = Trapezoidal().outputs(t, {}, {}, self._profile(p))["q"]
         else:
             s = Quintic(q0=SX(0.0), qf=SX(1.0), tmax=p["tmax"]).at(t).q
         T0, T1 = u["T0"], u["T1"]
@@ -212,10 +212,10 @@ class CTraj(Block):
         return {"T": pose(R, T0[:3, 3] + s * (T1[:3, 3] - T0[:3, 3])), "s": s}
 
     def breakpoints(self, p: Signals) -> tuple[SX, ...]:
-        return Trapezoidal().breakpoints(self._way(p)) if self.profile == "lspb" else (p["tmax"],)
+        return Trapezoidal().breakpoints(self._profile(p)) if self.profile == "lspb" else (p["tmax"],)
 
     @staticmethod
-    def _way(p: Signals) -> Signals:
+    def _profile(p: Signals) -> Signals:
         """The parameters of the trapezoidal profile of s."""
         return {"q0": SX(0.0), "qf": SX(1.0), "tmax": p["tmax"], "cruise": SX(1.5)}
 

@@ -1,4 +1,4 @@
-"""Pass: Bus Creators, Bus Selectors and Bus Assignments are replaced by what they carry.
+"""Pass: Bus Creators, Bus Selectors and Bus Assignments are replaced by their contents.
 
 Takes: bus blocks.
 

@@ -1,4 +1,4 @@
-"""What output ports carry: replacements are followed back to the blocks that compute signals."""
+"""The contents of output ports: replacements are traced back to the blocks that compute signals."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Contents:
     def of(self, ref: PortRef) -> Carried:
         """The signal or bus at an output port; uses an explicit stack, so that paths may be long.
 
-        Raises ``DiagramError`` where replacements form a cycle, and what their contents raise.
+        Raises ``DiagramError`` where replacements form a cycle, and the errors of their contents.
         """
         way = {ref: None}
         while way:

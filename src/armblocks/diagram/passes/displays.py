@@ -1,6 +1,6 @@
 """Pass: the views of all blocks; displays of buses show all signals of the bus.
 
-Takes: what every port carries.
+Takes: the contents of all ports.
 
 Gives: the views (``Netlist.views``), by path. Displays with a bus at an input become virtual, because their
 views read the signals themselves.

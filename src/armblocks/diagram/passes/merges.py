@@ -2,8 +2,8 @@
 
 Takes: Merge blocks whose inputs are held outputs of conditional subsystems.
 
-Gives: ``MergedOutput`` blocks without a gate; their inputs ``works1``, ``works2`` and so on tell which of the
-subsystems are active.
+Gives: ``MergedOutput`` blocks without a gate; their inputs ``works1``, ``works2`` and so on are 1 for active
+subsystems.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def resolve_merges(net: Netlist) -> Netlist:
 
 
 def _works(net: Netlist, path: str, port: str) -> PortRef:
-    """The signal that tells whether the subsystem of an input is active."""
+    """The signal that is 1 while the subsystem of an input is active."""
     carried = net.at(path, port)
     if isinstance(carried, PortRef) and isinstance(net.blocks[carried.block], HeldOutput):
         return net.drivers[PortRef(carried.block, "works")]

@@ -2,7 +2,7 @@
 
 A netlist begins as a copy of the hierarchy: the blocks of all levels by path, virtual ones included, and the
 connections of all levels. A pass resolves one kind of virtual block: it gives a *replacement* for each output
-port of such a block, which says what the port carries. The last pass removes all replaced blocks.
+port of such a block: the contents of the port. The last pass removes all replaced blocks.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ def _first(given: Sequence[Carried]) -> Carried:
 
 @dataclass(frozen=True)
 class Replacement:
-    """What an output port of a virtual block carries.
+    """The contents of an output port of a virtual block.
 
-    ``sources`` are output ports; ``content`` computes a signal or bus from what these carry. By default it is
-    that of the first one.
+    ``sources`` are output ports; ``content`` computes a signal or bus from their contents. By default it
+    returns that of the first source.
     """
 
     sources: tuple[PortRef, ...]
@@ -56,7 +56,7 @@ class Netlist:
     drivers: Mapping[PortRef, PortRef]
     """The output port that is connected to each input port."""
     replaced: Mapping[str, Replacements] = field(default_factory=dict[str, Replacements])
-    """The blocks that the last pass removes, by path, with what their output ports carry."""
+    """The blocks that the last pass removes, by path, with the contents of their output ports."""
     gates: Mapping[str, Gate] = field(default_factory=dict[str, Gate])
     """Hidden inputs of blocks in conditional subsystems: see ``Diagram.gates``."""
     shares: Mapping[str, str] = field(default_factory=dict[str, str])

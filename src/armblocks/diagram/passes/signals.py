@@ -1,4 +1,4 @@
-"""Pass: what every port carries.
+"""Pass: the contents of all ports.
 
 Takes: replacements for the output ports of all virtual blocks.
 
@@ -18,8 +18,8 @@ from armblocks.diagram.port import PortRef
 def resolve_signals(net: Netlist) -> Netlist:
     """The netlist with the contents of all replacements.
 
-    Raises ``DiagramError`` for connections in a cycle without a block that computes a signal, and what the
-    contents of replacements raise.
+    Raises ``DiagramError`` for connections in a cycle without a block that computes a signal, and the errors
+    of replacements.
     """
     contents = Contents(net.replaced, net.where)
     carried = {ref: contents.of(ref) for ref in net.outputs()}

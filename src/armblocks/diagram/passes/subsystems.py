@@ -2,8 +2,8 @@
 
 Takes: subsystems, In and Out blocks; conditional subsystems have held outputs in place of their Out blocks.
 
-Gives: replacements: an In block carries what drives the subsystem's input; an output of a subsystem carries
-what its Out block receives, or the held output.
+Gives: replacements: an In block has the contents of the driver of the subsystem's input; an output of a
+subsystem has those of the input of its Out block, or the held output.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Takes: Goto and From blocks.
 
-Gives: replacements: a From carries what the nearest visible Goto of its tag receives.
+Gives: replacements: a From has the contents of the input of the nearest visible Goto with its tag.
 """
 
 from __future__ import annotations

@@ -31,13 +31,13 @@ from armblocks.matlab.syntax import (
 )
 
 QUIET = ("disp",)
-"""Functions that only print: their arguments are computed and nothing is shown."""
+"""Functions that only print: their arguments are evaluated, but nothing is printed."""
 
 
 class Interpreter:
     """The variables of one run of one script.
 
-    ``joined_lines`` collects the lines on which a vector went on after a line break (see ``_joined``).
+    ``joined_lines``: the numbers of the lines whose vector continues on the next line (see ``_joined``).
     """
 
     def __init__(self, source: Source) -> None:
@@ -50,7 +50,7 @@ class Interpreter:
         )
 
     def run(self, statements: tuple[Statement, ...]) -> None:
-        """Execute all statements in order. Raises ``FormatError`` at the first that cannot be."""
+        """Execute all statements in order. Raises ``FormatError`` at the first invalid one."""
         for statement in statements:
             self.budget.spend(self.source.place(statement.at), 10)
             match statement:
@@ -65,7 +65,7 @@ class Interpreter:
     # -- statements ----------------------------------------------------------------------------------------
 
     def _evaluation(self, value: Expression) -> Value | None:
-        """An expression alone; ``None`` where it is a command in the form of a call."""
+        """The value of an expression statement; ``None`` for a command that is written as a call."""
         match value:
             case Postfix(base=Name(name=name), steps=(Parentheses(arguments=arguments),), at=at) if (
                 name not in self.variables and name in (*COMMANDS, *QUIET)
@@ -83,7 +83,7 @@ class Interpreter:
 
     def _command(self, place: Place, words: tuple[str, ...]) -> None:
         if words[0] not in ("clear", "clearvars"):
-            return  # clc, close, format, more: nothing to see here
+            return  # clc, close, format, more: without effect here
         names = words[1:]
         if not names or names in (("all",), ("variables",), ("-all",), ("classes",)):
             self.variables.clear()
@@ -100,10 +100,10 @@ class Interpreter:
             value = self._evaluator.value(self._joined(statement.value))
         else:
             value = self._evaluator.value(statement.value)
-        kept = copied(value)
+        copy = copied(value)
         old = self.variables.get(statement.name)
         if not statement.steps:
-            self.variables[statement.name] = kept
+            self.variables[statement.name] = copy
             return
         if old is None and isinstance(statement.steps[0], Field):
             raise place.error(
@@ -111,14 +111,14 @@ class Interpreter:
                 allowed="fields of links and robots",
                 fix=f"define {statement.name} first, with link, Link, robot or SerialLink",
             )
-        self.variables[statement.name] = self._stored(place, old, statement.steps, kept)
+        self.variables[statement.name] = self._stored(place, old, statement.steps, copy)
 
     def _joined(self, matrix: Matrix) -> Matrix:
-        """The matrix, as one row if it is a vector that was broken over two lines on a printed page.
+        """The matrix; a vector that a printed page had broken into two lines becomes one row.
 
-        ``[ .13`` and ``.524 .539]`` on the next line are two rows to MATLAB, which refuses them as their
-        lengths differ; where a field takes a vector, nothing else than one row can be meant. Three lines
-        are left alone: they may be a triangle of a symmetric matrix.
+        MATLAB reads ``[ .13`` and ``.524 .539]`` on the next line as two rows and rejects them, because their
+        lengths differ. In an assignment to a vector field they can only be one row. Three lines are not
+        joined: they may be a triangle of a symmetric matrix.
         """
         if not matrix.broken or len(matrix.rows) != 2 or len(matrix.rows[0]) == len(matrix.rows[1]):
             return matrix
@@ -126,7 +126,7 @@ class Interpreter:
         return replace(matrix, rows=((*matrix.rows[0], *matrix.rows[1]),))
 
     def _stored(self, place: Place, old: Value | None, steps: tuple[Target, ...], new: Value) -> Value:
-        """``old`` with ``new`` put where ``steps`` lead: ``L{2}.r(1) = …``."""
+        """``old`` with ``new`` at the element or field that ``steps`` select: ``L{2}.r(1) = …``."""
         if not steps:
             return new
         step, rest = steps[0], steps[1:]
@@ -193,17 +193,21 @@ class Interpreter:
             inner = old.links[index] if index < len(old.links) else None
             stored = self._stored(place, inner, rest, new)
             if not isinstance(stored, LinkRecord):
-                raise place.error(f"{kind_of(stored)} is put among links", allowed="links")
+                raise place.error(
+                    f"{kind_of(stored)} is assigned to an element of an array of links", allowed="links"
+                )
             old.links += [None] * (index + 1 - len(old.links))
             old.links[index] = stored
             return old
         if isinstance(old, np.ndarray) and not rest:
             self.budget.spend(place, old.size)
-            return with_element(place, old, indices, number_of(place, new, "what is assigned to an element"))
+            return with_element(
+                place, old, indices, number_of(place, new, "the value assigned to an element")
+            )
         raise place.error(f"() is used on {kind_of(old)}", allowed="matrices and arrays of links")
 
     def _indices(self, value: Value | None, arguments: tuple[Expression, ...]) -> list[Value]:
-        """The indices on the left of ``=``; ``end`` is the last element of a value that exists."""
+        """The indices on the left of ``=``; ``end`` is the last element of the present value."""
         found: list[Value] = []
         indices = self._evaluator.indices(empty() if value is None else value, arguments)
         for index, argument in zip(indices, arguments):

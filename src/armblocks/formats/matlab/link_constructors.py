@@ -1,11 +1,11 @@
-"""``link`` of releases up to 8; ``Link``, ``Revolute``, ``Prismatic`` and their MDH twins of 9 and later.
+"""``link`` of releases up to 8; ``Link``, ``Revolute``, ``Prismatic`` and their MDH variants of 9 and later.
 
-A row of more than six numbers is a legacy DYN row in both: the first five, then
-``m rx ry rz Ixx Iyy Izz Ixy Iyz Ixz [Jm [G [B [Tc+ Tc-]]]]`` with offset 0. The first five stand in another
-order: ``alpha A theta D sigma`` for ``link``, ``theta d a alpha sigma`` for ``Link``.
+In both, a row of more than six numbers is a legacy DYN row: five D-H parameters, then ``m rx ry rz Ixx Iyy
+Izz Ixy Iyz Ixz [Jm [G [B [Tc+ Tc-]]]]`` with offset 0. The order of the D-H parameters is ``alpha A theta D
+sigma`` for ``link`` and ``theta d a alpha sigma`` for ``Link``.
 
-A gear ratio that a script does not give is 1, as the toolbox's manual says. (The code of releases 9 and 10
-leaves it 0, so that the motor's inertia and friction vanish without a word.)
+The default gear ratio is 1, as in the toolbox's manual. (In the code of releases 9 and 10 it is 0, so that
+motor inertia and motor friction are silently ignored.)
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def link_from_row(
     if not (4 <= count <= 6 or _SHORTEST_DYN <= count <= _LONGEST_DYN) or count == _LONGEST_DYN - 1:
         order = " ".join(columns)
         raise place.error(
-            f"a row of {count} numbers describes no link",
+            f"a row of {count} numbers is not a link",
             allowed=f"4 to 6 numbers {order}, or a legacy row with m r I Jm G B Tc behind the first 5: "
             f"{_SHORTEST_DYN} to 18 or {_LONGEST_DYN} numbers",
         )
@@ -58,14 +58,14 @@ def link_from_row(
 
 
 def rows_of(array: Array) -> list[list[float]]:
-    """The rows of a D-H matrix as plain numbers."""
+    """The rows of a D-H matrix as lists of floats."""
     return [[float(number) for number in row] for row in array]
 
 
 def is_modified(place: Place, word: str) -> bool:
-    """The convention that a word names: the toolbox compares its first three letters."""
+    """Whether the modified convention is named; as in the toolbox, three letters are compared."""
     if word[:3] not in ("sta", "mod"):
-        raise place.error(f"'{word}' is no D-H convention", allowed="'standard' or 'modified'")
+        raise place.error(f"'{word}' is not a D-H convention", allowed="'standard' or 'modified'")
     return word.startswith("mod")
 
 
@@ -94,14 +94,14 @@ def _new_link(
 ) -> LinkRecord:
     """A link of releases 9 and later, from a row or from names and values.
 
-    Without a word on the joint, a given ``d`` makes it revolute and a given ``theta`` prismatic.
+    If the joint type is not given, a link with ``d`` is revolute and a link with ``theta`` is prismatic.
     """
     if sigma is None and arguments and isinstance(arguments[0], LinkRecord) and len(arguments) == 1:
         return replace(arguments[0], place=place)
     if sigma is None and arguments and isinstance(arguments[0], np.ndarray):
         if arguments[0].shape[0] != 1 or len(arguments) > 2:
             raise place.error(
-                f"{name} is called with {kind_of(arguments[0])} and {len(arguments) - 1} more",
+                f"{name} is called with {kind_of(arguments[0])} and {len(arguments) - 1} more arguments",
                 allowed="Link([theta d a alpha sigma offset], convention)",
             )
         if len(arguments) == 2:
@@ -125,18 +125,18 @@ def _new_link(
             position += 1
         else:
             raise place.error(
-                f"{name} does not know '{key}'",
+                f"{name} has no parameter '{key}'",
                 allowed=", ".join((*_KEYS, "revolute", "prismatic", "modified")),
             )
-    _settle_joint(place, link, given, fixed=sigma is not None, name=name)
+    _check_joint(place, link, given, fixed=sigma is not None, name=name)
     return link
 
 
 _KEYS = ("theta", "d", "a", "alpha", "sigma", "offset", "qlim", "m", "r", "I", "Jm", "G", "B", "Tc")
 
 
-def _settle_joint(place: Place, link: LinkRecord, given: set[str], *, fixed: bool, name: str) -> None:
-    """Which of d and theta is the joint's variable; both given is a contradiction."""
+def _check_joint(place: Place, link: LinkRecord, given: set[str], *, fixed: bool, name: str) -> None:
+    """Set the joint type if it is not given, and check that the joint variable, d or theta, is not given."""
     unstated = not fixed and not given & {"sigma", "revolute", "prismatic"}
     if unstated and {"d", "theta"} <= given:
         raise place.error(

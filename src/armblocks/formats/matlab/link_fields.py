@@ -1,4 +1,4 @@
-"""The fields of links: what a script may assign to them, in which shapes, and what it reads back."""
+"""The fields of links: the values and shapes that a script may assign, and the values that it reads."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ VECTORS = frozenset(("r", "I", "Tc", "qlim"))
 
 
 def set_link_field(place: Place, link: LinkRecord, name: str, value: Value) -> None:
-    """``link.name = value``. Raises ``FormatError`` for an unknown field or a value that it cannot hold."""
+    """``link.name = value``. Raises ``FormatError`` for an unknown field or an invalid value."""
     setter = _SETTERS.get(name)
     if setter is None:
         raise place.error(f"a link has no field '{name}'", allowed=ASSIGNABLE)
@@ -56,7 +56,7 @@ def numbers(place: Place, value: Value, what: str, count: int) -> list[float]:
 
 
 def inertia_from(place: Place, value: Value) -> tuple[Vector3, Vector3, Vector3]:
-    """``I`` as the toolbox takes it: 3x3, or Ixx Iyy Izz, or Ixx Iyy Izz Ixy Iyz Ixz."""
+    """``I`` in the forms of the toolbox: 3x3, or Ixx Iyy Izz, or Ixx Iyy Izz Ixy Iyz Ixz."""
     array = array_of(place, value, "I")
     allowed = "a symmetric 3x3 matrix, [Ixx Iyy Izz], or [Ixx Iyy Izz Ixy Iyz Ixz]"
     if array.shape != (3, 3) and (1 not in array.shape or array.size not in (3, 6)):
@@ -66,7 +66,7 @@ def inertia_from(place: Place, value: Value) -> tuple[Vector3, Vector3, Vector3]
     try:
         return inertia_matrix(array if array.shape == (3, 3) else array.ravel())
     except ArmblocksError as error:
-        raise place.error(f"I is refused: {error.what}", allowed=allowed) from None
+        raise place.error(f"I is invalid: {error.what}", allowed=allowed) from None
 
 
 def coulomb_from(place: Place, value: Value) -> tuple[float, float]:

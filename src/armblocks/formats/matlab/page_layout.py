@@ -1,14 +1,14 @@
 """Scripts copied from a printed page: recovery of statements that were merged into a comment line.
 
-A page breaks lines at its margin. If a comment line was filled with the following statements, MATLAB would
-treat them as comment::
+A printed page breaks lines at its margin. If a statement was moved to the end of a comment line, MATLAB
+treats it as a comment::
 
     % Inertia of the segment L{1}.Jm =
     200e-6; L{2}.Jm = 200e-6;
 
-Such a line is recognised by three criteria: it is a comment, its last statement is an unfinished assignment
-to a field of an element, and the next line is its rest (it starts with a number, a sign or a bracket, or with
-``=``), with which no statement of a script begins. Commented-out statements that are whole stay comments.
+Such a line is recognised by three criteria. It is a comment; its last statement is an incomplete assignment
+to a field of an element; and the next line is the rest of this statement: it starts with a number, a sign, a
+bracket or ``=``, with which no statement begins. Complete statements in comments stay comments.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _REST_FROM_EQUALS = re.compile(r"\s*=(?!=)")
 def without_page_breaks(source: Source) -> tuple[Source, tuple[int, ...]]:
     """The source with such comments blanked up to their first statement, and the numbers of those lines.
 
-    Lines and columns stay where they were.
+    Line and column numbers do not change.
     """
     lines = list(source.lines)
     changed: list[int] = []

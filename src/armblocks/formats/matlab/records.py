@@ -10,7 +10,7 @@ from armblocks.spatial import Matrix3, Transform, Vector3
 
 
 class Release(enum.Enum):
-    """Which language of the toolbox an object comes from."""
+    """The interface of the toolbox with which an object was created."""
 
     UP_TO_8 = "up to 8"
     """``link``, ``robot``: values, copied when assigned."""
@@ -20,9 +20,9 @@ class Release(enum.Enum):
 
 @dataclass(kw_only=True)
 class LinkRecord:
-    """A link as scripts see it; ``None`` where a script says nothing. Units as in ``Link`` and ``Motor``.
+    """A link in a script; ``None``: not set by the script. Units as in ``Link`` and ``Motor``.
 
-    ``place`` is where it was made, for messages about it.
+    ``place``: where it was created, for messages.
     """
 
     place: Place
@@ -49,13 +49,13 @@ class LinkRecord:
         return "a link"
 
     def assigned(self) -> LinkRecord:
-        """What another variable gets."""
+        """The object that another variable gets by an assignment."""
         return replace(self) if self.release is Release.UP_TO_8 else self
 
 
 @dataclass(kw_only=True)
 class RobotRecord:
-    """A robot as scripts see it. ``gravity`` has the toolbox's sign: it points up."""
+    """A robot in a script. ``gravity`` has the toolbox's sign: it points up."""
 
     place: Place
     release: Release
@@ -73,7 +73,7 @@ class RobotRecord:
         return "a robot"
 
     def assigned(self) -> RobotRecord:
-        """What another variable gets."""
+        """The object that another variable gets by an assignment."""
         if self.release is Release.FROM_9:
             return self
         return replace(self, links=[link.assigned() for link in self.links])

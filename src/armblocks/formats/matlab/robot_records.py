@@ -28,13 +28,13 @@ from armblocks.spatial import Transform
 
 ASSIGNABLE = "name, manuf, manufacturer, comment, gravity, base, tool, offset, qlim, links, plotopt"
 _DISPLAY_ONLY = ("plotopt", "lineopt", "shadowopt", "plotopt3d", "config", "configs", "ikineType", "faceopt")
-"""Fields and options that say how a robot is drawn or labelled: accepted, as they change no number."""
+"""Fields and options for plots and labels: accepted and ignored, because no result depends on them."""
 
 
 def make_robot(place: Place, arguments: list[Value], variable: str) -> RobotRecord:
     """``robot(L, name, manuf, comment)`` of releases up to 8; ``L`` a cell array of links or a D-H matrix.
 
-    ``variable`` is the name of the first argument's variable: a robot made from a matrix is called so.
+    ``variable`` is the name of the first argument's variable, and the default name of a robot from a matrix.
     """
     if not 1 <= len(arguments) <= 4:
         raise place.error(
@@ -132,7 +132,7 @@ def _check_convention(place: Place, made: RobotRecord) -> None:
 
 
 def set_robot_field(place: Place, robot: RobotRecord, name: str, value: Value) -> None:
-    """``robot.name = value``. Raises ``FormatError`` for an unknown field or a value that it cannot hold."""
+    """``robot.name = value``. Raises ``FormatError`` for an unknown field or an invalid value."""
     match name:
         case "name" | "comment":
             setattr(robot, name, text_of(place, value, name))
@@ -180,7 +180,7 @@ def _transform(place: Place, value: Value, name: str) -> Transform:
     try:
         return Transform.from_matrix(matrix)
     except ArmblocksError as error:
-        raise place.error(f"{name} is refused: {error.what}", allowed=error.allowed, fix=error.fix) from None
+        raise place.error(f"{name} is invalid: {error.what}", allowed=error.allowed, fix=error.fix) from None
 
 
 def _set_links(place: Place, robot: RobotRecord, value: Value) -> None:
@@ -213,9 +213,9 @@ def _set_joint_rows(place: Place, robot: RobotRecord, name: str, value: Value) -
 
 
 def finished_robot(record: RobotRecord, friction_model: FrictionModel) -> Robot:
-    """The frozen robot that a script has built. Links are named ``link1``, ``link2`` … from the base on.
+    """The ``Robot`` of a script's record. Links are named ``link1``, ``link2`` … from the base.
 
-    Raises ``FormatError`` at the line that made the robot.
+    Raises ``FormatError`` at the line that created the robot.
     """
     _check_convention(record.place, record)
     try:
@@ -260,9 +260,9 @@ def _finished_link(number: int, link: LinkRecord) -> Link:
 
 
 def _motor(link: LinkRecord) -> Motor | None:
-    """The motor, where the script says anything about one."""
-    said = (link.motor_inertia, link.gear_ratio, link.viscous_friction, link.coulomb_friction)
-    if all(part is None for part in said):
+    """The motor, or ``None`` if the script sets no motor parameter."""
+    given = (link.motor_inertia, link.gear_ratio, link.viscous_friction, link.coulomb_friction)
+    if all(part is None for part in given):
         return None
     return Motor(
         inertia=link.motor_inertia or 0.0,

@@ -18,7 +18,7 @@ from armblocks.matlab.syntax import Expression, Name
 
 
 class ScriptValues:
-    """The operations of expressions on values of scripts (:class:`armblocks.matlab.evaluation.Values`)."""
+    """Implements :class:`armblocks.matlab.evaluation.Values` for the values of scripts."""
 
     def __init__(self, budget: Budget, variables: Mapping[str, Value]) -> None:
         self._numbers = Numbers(budget)
@@ -142,7 +142,7 @@ class ScriptValues:
 
 
 def single_index(place: Place, indices: Sequence[Value | None], most: int) -> int:
-    """The one index into a row of links or values, from 0; ``L{1, 3}`` of a row has two."""
+    """The index into a row of links or values, from 0, given by one index or as ``L{1, 3}``."""
     if len(indices) == 2 and indices[0] is not None and number_of(place, indices[0], "an index") == 1:
         indices = indices[1:]
     if len(indices) != 1 or indices[0] is None:

@@ -12,12 +12,12 @@ from armblocks.matlab.arrays import Array, kind_of
 from armblocks.matlab.source import Place
 
 MOST_LINKS = 1000
-"""Elements of one cell array or array of links."""
+"""Maximum number of elements of a cell array or an array of links."""
 
 
 @dataclass
 class Cell:
-    """``{a, b}``: a row of values, of which some may not be set (``None``). Cells do not nest."""
+    """``{a, b}``: a row of values; ``None`` for elements that are not set. Cells cannot contain cells."""
 
     elements: list[Value | None] = field(default_factory=lambda: list[Value | None]())
 
@@ -43,7 +43,7 @@ Value = Array | str | Cell | LinkRecord | LinkArray | RobotRecord
 
 
 def copied(value: Value) -> Value:
-    """What an assignment keeps: releases up to 8 copy links and robots, later ones share them."""
+    """The value that an assignment stores: a copy, except for the handle objects of releases 9 and later."""
     match value:
         case Cell():
             return Cell([None if element is None else copied(element) for element in value.elements])
@@ -67,9 +67,11 @@ def join_links(place: Place, values: Sequence[Value]) -> LinkArray:
             case LinkArray():
                 links += value.links
             case _ if isinstance(value, np.ndarray) and value.size == 0:
-                pass  # [[] L1] is how loops without loops start
+                pass  # an empty array to which links are appended: L = []; L = [L L1]
             case _:
-                raise place.error(f"{kind_of(value)} stands among links", allowed="links only")
+                raise place.error(
+                    f"{kind_of(value)} is an element of an array of links", allowed="links only"
+                )
     if len(links) > MOST_LINKS:
         raise place.error(f"{len(links)} links in one array", allowed=f"at most {MOST_LINKS}")
     return LinkArray(links)

@@ -35,7 +35,7 @@ from pydantic import TypeAdapter, ValidationError
 from armblocks.errors import ArmblocksError, FormatError
 from armblocks.studio.documents.file_kind import EditedT, FileKind
 from armblocks.studio.documents.journal import Journal, Record, read_journal
-from armblocks.studio.documents.older_journals import as_of_today
+from armblocks.studio.documents.older_journals import converted
 from armblocks.studio.documents.project_folder import Fingerprint
 from armblocks.studio.protocol.message import AnyOf
 from armblocks.studio.protocol.messages.documents import Alteration
@@ -116,8 +116,8 @@ class FileJournal:
             self.begin_from(after, number, request.key)
             return
         self._past, self._future = past, future
-        said = request.model_dump(mode="json", exclude={"document", "base"})
-        self._journal.append({"perform": said, "does": does, "version": number, "at": _now()})
+        stored = request.model_dump(mode="json", exclude={"document", "base"})
+        self._journal.append({"perform": stored, "does": does, "version": number, "at": _now()})
         self.since_snapshot += 1
 
     def replaced(self, title: str, value: Any, number: int) -> None:
@@ -263,7 +263,7 @@ class _Replay(Generic[EditedT]):
     def _step(self, record: Record) -> None:
         document = self._found.document
         if "perform" in record:
-            document.perform(_ALTERATIONS.validate_python({**as_of_today(record["perform"]), "document": ""}))
+            document.perform(_ALTERATIONS.validate_python({**converted(record["perform"]), "document": ""}))
             return
         document.replace(record["title"], self._kind.from_text(record["replace"], "journal"))
 
@@ -291,11 +291,11 @@ def _why(error: Exception) -> str:
 
 
 def _said(fingerprint: Fingerprint | None) -> dict[str, Any] | None:
-    return None if fingerprint is None else fingerprint.said()
+    return None if fingerprint is None else fingerprint.as_dict()
 
 
-def _fingerprint(said: dict[str, Any] | None) -> Fingerprint | None:
-    return None if said is None else Fingerprint(**said)
+def _fingerprint(stored: dict[str, Any] | None) -> Fingerprint | None:
+    return None if stored is None else Fingerprint(**stored)
 
 
 def _now() -> float:

@@ -11,7 +11,7 @@ from armblocks.studio.documents.file_journal import JournaledFile, journaled_fil
 from armblocks.studio.documents.file_kind import FileKind
 from armblocks.studio.documents.journal import in_use
 from armblocks.studio.documents.project_folder import ProjectFolder
-from armblocks.studio.protocol.messages import documents as say
+from armblocks.studio.protocol.messages import documents as document_messages
 
 
 class LeftBehind:
@@ -35,7 +35,7 @@ class LeftBehind:
     def __contains__(self, key: str) -> bool:
         return key in self._read or key in self._unread
 
-    def offers(self) -> list[say.Recovery]:
+    def offers(self) -> list[document_messages.Recovery]:
         """Descriptions of the unsaved documents, for pages."""
         found = [self._offer(entry) for entry in self._read.values() if entry.document.dirty]
         return [*found, *(self._unread_offer(key, path) for key, path in self._unread.items())]
@@ -72,9 +72,9 @@ class LeftBehind:
         if key not in self:
             raise UnknownNameError(f"{self._kind.name} to recover", key, [*self._read, *self._unread])
 
-    def _offer(self, found: JournaledFile[Any]) -> say.Recovery:
+    def _offer(self, found: JournaledFile[Any]) -> document_messages.Recovery:
         disk = self._folder.compared(found.path, found.on_disk)[0] if found.path else "same"
-        return say.Recovery(
+        return document_messages.Recovery(
             kind=self._kind.name,
             document=found.key,
             title=found.document.value.name,
@@ -87,10 +87,10 @@ class LeftBehind:
             missing=found.missing,
         )
 
-    def _unread_offer(self, key: str, path: Path) -> say.Recovery:
+    def _unread_offer(self, key: str, path: Path) -> document_messages.Recovery:
         """Description of a journal that cannot be read, for pages."""
         last = path.stat().st_mtime if path.exists() else 0.0
-        return say.Recovery(
+        return document_messages.Recovery(
             kind=self._kind.name,
             document=key,
             title=key,

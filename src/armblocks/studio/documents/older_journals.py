@@ -13,7 +13,7 @@ _ROBOT_EDITS_OF_0_2 = {
 }
 
 
-def as_of_today(request: Mapping[str, Any]) -> dict[str, Any]:
+def converted(request: Mapping[str, Any]) -> dict[str, Any]:
     """Convert a journaled request to the form of this version.
 
     In 0.2.0, requests about robots were separate messages, their edits used the kinds of diagram edits, and

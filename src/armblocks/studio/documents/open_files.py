@@ -25,7 +25,7 @@ from armblocks.studio.documents.journal import SYNC_SECONDS
 from armblocks.studio.documents.left_behind import LeftBehind
 from armblocks.studio.documents.project_folder import Disk, Fingerprint, ProjectFolder
 from armblocks.studio.documents.state_folder import StateFolder
-from armblocks.studio.protocol.messages import documents as say
+from armblocks.studio.protocol.messages import documents as document_messages
 
 MOST_OPEN = 100
 MOST_KEYS = 1000
@@ -54,10 +54,10 @@ class OpenFile(Generic[EditedT]):
     snapshot: asyncio.Task[None] | None = None
     saving: asyncio.Lock = dataclasses.field(default_factory=asyncio.Lock)
 
-    def state(self) -> say.DocumentState:
+    def state(self) -> document_messages.DocumentState:
         """The state of the document as pages show it."""
         document = self.document
-        return say.DocumentState(
+        return document_messages.DocumentState(
             document=self.key,
             kind=document.kind,
             version=document.version,
@@ -84,15 +84,15 @@ OpenedT = TypeVar("OpenedT", bound=OpenFile[Any])
 class OpenFiles(ABC, Generic[OpenedT]):
     """The open documents of one kind in one project folder, by key. Used on one event loop."""
 
-    def __init__(self, folder: ProjectFolder, kept: StateFolder, kind: FileKind[Any, Any]) -> None:
+    def __init__(self, folder: ProjectFolder, state_folder: StateFolder, kind: FileKind[Any, Any]) -> None:
         self.folder = folder
-        self.kept = kept
+        self.state_folder = state_folder
         self.kind = kind
         self._open: dict[str, OpenedT] = {}
         self._same: dict[str, str] = {}
         """Keys that pages of an earlier server use for documents that are now open under another key."""
-        self.left = LeftBehind(folder, kept.journals, kind)
-        self._tell: Callable[[OpenedT], Awaitable[None]] | None = None
+        self.left = LeftBehind(folder, state_folder.journals, kind)
+        self._notify: Callable[[OpenedT], Awaitable[None]] | None = None
 
     @abstractmethod
     def _made(self, key: str, document: Any) -> OpenedT:
@@ -120,12 +120,12 @@ class OpenFiles(ABC, Generic[OpenedT]):
         """Return the document of a file; the file is read if it is not open yet."""
         place = self.folder.path(path)
         path = place.relative_to(self.folder.root).as_posix()
-        for found in self:
-            if found.path == path:
-                return found
+        for open_file in self:
+            if open_file.path == path:
+                return open_file
         data, on_disk = self.folder.read_known(path)
         value = self.kind.from_file(data, place)
-        self.kept.use(path)
+        self.state_folder.use(path)
         return self.add(value, path=path, on_disk=on_disk, key=key)
 
     def open_shipped(self, name: str, key: str = "") -> OpenedT:
@@ -143,12 +143,12 @@ class OpenFiles(ABC, Generic[OpenedT]):
         if key in self.left:
             return self._restore(self.left.take(key))
         if path:
-            found = self.open_path(path, key)
+            open_file = self.open_path(path, key)
         else:
-            found = self.open_shipped(origin, key) if origin else self.new(key)
-        if found.key != key:
-            self._same[key] = found.key
-        return found
+            open_file = self.open_shipped(origin, key) if origin else self.new(key)
+        if open_file.key != key:
+            self._same[key] = open_file.key
+        return open_file
 
     def add(
         self,
@@ -160,51 +160,51 @@ class OpenFiles(ABC, Generic[OpenedT]):
         key: str = "",
     ) -> OpenedT:
         """Open a value as a document, under the given key or a new one."""
-        found = self._add(self.kind.edited(value), key or secrets.token_hex(8))
-        found.path, found.origin, found.on_disk = path, origin, on_disk
-        return found
+        open_file = self._add(self.kind.edited(value), key or secrets.token_hex(8))
+        open_file.path, open_file.origin, open_file.on_disk = path, origin, on_disk
+        return open_file
 
-    def close(self, found: OpenedT, *, discard: bool) -> None:
+    def close(self, open_file: OpenedT, *, discard: bool) -> None:
         """Close a document; raises ``InputError`` if it has unsaved edits and ``discard`` is false."""
-        if found.document.dirty and not discard:
+        if open_file.document.dirty and not discard:
             raise InputError(
-                f"'{found.document.value.name}' has unsaved edits",
-                where=f"the {found.document.noun}",
+                f"'{open_file.document.value.name}' has unsaved edits",
+                where=f"the {open_file.document.noun}",
                 allowed="saving the document, or discarding its edits",
                 fix="choose one of the two",
             )
-        self._put_away(found, keep=False)
+        self._put_away(open_file, keep=False)
 
     def end(self) -> None:
         """Close all documents when the studio ends; journals of unsaved documents remain."""
-        for found in self:
+        for open_file in self:
             with contextlib.suppress(OSError):
-                self._put_away(found, keep=found.document.dirty)
+                self._put_away(open_file, keep=open_file.document.dirty)
         self.left.end()
 
-    def _put_away(self, found: OpenedT, *, keep: bool) -> None:
-        del self._open[found.key]
-        found.leave()
-        if found.journal is not None:
-            found.journal.close(keep=keep)
+    def _put_away(self, open_file: OpenedT, *, keep: bool) -> None:
+        del self._open[open_file.key]
+        open_file.leave()
+        if open_file.journal is not None:
+            open_file.journal.close(keep=keep)
 
     def bring(self, value: Any) -> OpenedT:
         """Open a value from outside the project; it is journaled at once, because no file contains it."""
-        found = self.add(value)
-        self._hold(found)
-        return found
+        open_file = self.add(value)
+        self._hold(open_file)
+        return open_file
 
     def _add(self, document: Any, key: str) -> OpenedT:
         if len(self._open) >= MOST_OPEN:
             self._make_room()
-        found = self._open[key] = self._made(key, document)
-        return found
+        open_file = self._open[key] = self._made(key, document)
+        return open_file
 
     def _make_room(self) -> None:
         """Close the earliest opened document that has no unsaved edits."""
-        for found in self:
-            if not found.document.dirty:
-                self._put_away(found, keep=False)
+        for open_file in self:
+            if not open_file.document.dirty:
+                self._put_away(open_file, keep=False)
                 return
         raise InputError(
             f"{len(self._open)} {self.kind.name}s with unsaved edits are open",
@@ -215,113 +215,115 @@ class OpenFiles(ABC, Generic[OpenedT]):
 
     # -- changing --------------------------------------------------------------------------------------------
 
-    def perform(self, found: OpenedT, request: say.Alteration) -> bool:
+    def perform(self, open_file: OpenedT, request: document_messages.Alteration) -> bool:
         """Apply a request; return ``False`` if it was applied before. Raises ``ArmblocksError``."""
-        if request.key and request.key in found.seen:
+        if request.key and request.key in open_file.seen:
             return False
-        document, before, number = found.document, found.document.value, found.document.version
+        document, before, number = open_file.document, open_file.document.value, open_file.document.version
         document.perform(request)
         if request.key:
-            found.seen.append(request.key)
+            open_file.seen.append(request.key)
         after, version = document.value, document.version
         continued = request.does == "change" and document.continued
         self._write(
-            found,
+            open_file,
             before,
             number,
             lambda journal: journal.performed(request, version, after, continued=continued),
         )
-        if found.journal is not None and found.journal.since_snapshot >= SNAPSHOT_EVERY:
-            self._snapshot_later(found, found.journal)
+        if open_file.journal is not None and open_file.journal.since_snapshot >= SNAPSHOT_EVERY:
+            self._snapshot_later(open_file, open_file.journal)
         return True
 
-    def reload(self, found: OpenedT, key: str = "") -> None:
+    def reload(self, open_file: OpenedT, key: str = "") -> None:
         """Replace the document by the content of its file, as one undo step; once for each ``key``."""
-        if key and key in found.seen:
+        if key and key in open_file.seen:
             return
-        if found.path is None:
-            raise self._no_file(found)
-        data, on_disk = self.folder.read_known(found.path)
-        self.replace(found, "reload", self.kind.from_file(data, self.folder.path(found.path)))
-        document = found.document
+        if open_file.path is None:
+            raise self._no_file(open_file)
+        data, on_disk = self.folder.read_known(open_file.path)
+        self.replace(open_file, "reload", self.kind.from_file(data, self.folder.path(open_file.path)))
+        document = open_file.document
         document.saved = document.value
-        found.on_disk, found.disk = on_disk, "same"
-        self._saved(found, found.path, document.version)
+        open_file.on_disk, open_file.disk = on_disk, "same"
+        self._saved(open_file, open_file.path, document.version)
         if key:
-            found.seen.append(key)
+            open_file.seen.append(key)
 
-    def replace(self, found: OpenedT, title: str, value: Any) -> None:
+    def replace(self, open_file: OpenedT, title: str, value: Any) -> None:
         """Replace the value of a document, as one undo step."""
-        document, before, number = found.document, found.document.value, found.document.version
+        document, before, number = open_file.document, open_file.document.value, open_file.document.version
         document.replace(title, value)
         version = document.version
-        self._write(found, before, number, lambda journal: journal.replaced(title, value, version))
+        self._write(open_file, before, number, lambda journal: journal.replaced(title, value, version))
 
-    def keep_mine(self, found: OpenedT) -> None:
+    def keep_mine(self, open_file: OpenedT) -> None:
         """Accept that another program has written the file; the next save overwrites it."""
-        found.disk, found.on_disk = "same", None
-        if found.path is not None and self.folder.exists(found.path):
-            found.on_disk = self.folder.read_known(found.path)[1]
-        self._hold(found)
+        open_file.disk, open_file.on_disk = "same", None
+        if open_file.path is not None and self.folder.exists(open_file.path):
+            open_file.on_disk = self.folder.read_known(open_file.path)[1]
+        self._hold(open_file)
 
-    def _hold(self, found: OpenedT) -> None:
+    def _hold(self, open_file: OpenedT) -> None:
         """Mark the document as contained in no file, and note this in the journal."""
-        document = found.document
+        document = open_file.document
         document.saved = None
-        self._write(found, document.value, document.version, lambda journal: journal.kept(document.version))
+        self._write(
+            open_file, document.value, document.version, lambda journal: journal.kept(document.version)
+        )
 
-    async def save(self, found: OpenedT, path: str, *, overwrite: bool) -> str:
+    async def save(self, open_file: OpenedT, path: str, *, overwrite: bool) -> str:
         """Write the file, under another path if one is given.
 
         Raises ``FormatError`` if there is no path or the write fails. Unless ``overwrite`` is true,
         also raises it if the file has changed on disk or another file would be replaced.
         """
-        async with found.saving:
-            path = path or found.path or ""
+        async with open_file.saving:
+            path = path or open_file.path or ""
             if not path:
-                raise self._no_file(found)
+                raise self._no_file(open_file)
             place = self.folder.path(path)
             path = place.relative_to(self.folder.root).as_posix()
             if not overwrite:
-                self._refuse_overwriting(found, path)
-            document, of = found.document, found.document.version
+                self._refuse_overwriting(open_file, path)
+            document, of = open_file.document, open_file.document.version
             written = document.value
-            value = self.kind.renamed(written, place) if path != found.path else written
+            value = self.kind.renamed(written, place) if path != open_file.path else written
 
             def write() -> Fingerprint:
                 return self.folder.write(path, self.kind.to_file(value, place))
 
-            found.on_disk = await asyncio.to_thread(write)
-            found.path, found.disk = path, "same"
+            open_file.on_disk = await asyncio.to_thread(write)
+            open_file.path, open_file.disk = path, "same"
             document.written(written, value.name)
-            self.kept.use(path)
-            self._saved(found, path, of)
+            self.state_folder.use(path)
+            self._saved(open_file, path, of)
             return path
 
-    def _no_file(self, found: OpenedT) -> FormatError:
+    def _no_file(self, open_file: OpenedT) -> FormatError:
         return FormatError(
-            f"the {found.document.noun} has no file yet",
+            f"the {open_file.document.noun} has no file yet",
             allowed="a path",
             fix="save it under a name",
-            where=f"{self.kind.name} '{found.document.value.name}'",
+            where=f"{self.kind.name} '{open_file.document.value.name}'",
         )
 
-    def _saved(self, found: OpenedT, path: str, of: int) -> None:
+    def _saved(self, open_file: OpenedT, path: str, of: int) -> None:
         """Write to an existing journal that the file contains version ``of``."""
-        if found.journal is None:
+        if open_file.journal is None:
             return
-        now, version, on_disk = found.document.value, found.document.version, found.on_disk
-        self._write(found, now, version, lambda journal: journal.saved(path, of, version, on_disk))
+        now, version, on_disk = open_file.document.value, open_file.document.version, open_file.on_disk
+        self._write(open_file, now, version, lambda journal: journal.saved(path, of, version, on_disk))
 
-    def _refuse_overwriting(self, found: OpenedT, path: str) -> None:
-        if path != found.path:
+    def _refuse_overwriting(self, open_file: OpenedT, path: str) -> None:
+        if path != open_file.path:
             if self.folder.exists(path):
                 raise FormatError(
                     "the file exists already", where=path, fix="overwrite it, or choose another name"
                 )
             return
-        found.disk, found.on_disk = self.folder.compared(path, found.on_disk)
-        if found.disk == "changed":
+        open_file.disk, open_file.on_disk = self.folder.compared(path, open_file.on_disk)
+        if open_file.disk == "changed":
             raise FormatError(
                 "the file has changed on the disk since it was opened",
                 where=path,
@@ -331,123 +333,125 @@ class OpenFiles(ABC, Generic[OpenedT]):
 
     # -- the journal -----------------------------------------------------------------------------------------
 
-    def _write(self, found: OpenedT, before: Any, number: int, write: Callable[[FileJournal], None]) -> None:
+    def _write(
+        self, open_file: OpenedT, before: Any, number: int, write: Callable[[FileJournal], None]
+    ) -> None:
         """Write to the journal; a new journal starts with a snapshot of the value before the change.
 
         A disk error does not prevent edits: pages are notified, and the next change tries again.
         """
         try:
-            if found.journal is None:
-                found.journal, found.behind = self._begin_journal(found), True
-            if found.behind:
-                found.journal.begin_from(before, number)
-                found.behind = False
-            write(found.journal)
-            found.journaled = True
-            self._sync_later(found)
+            if open_file.journal is None:
+                open_file.journal, open_file.behind = self._begin_journal(open_file), True
+            if open_file.behind:
+                open_file.journal.begin_from(before, number)
+                open_file.behind = False
+            write(open_file.journal)
+            open_file.journaled = True
+            self._sync_later(open_file)
         except OSError:
-            found.journaled, found.behind = False, True
+            open_file.journaled, open_file.behind = False, True
 
-    def _begin_journal(self, found: OpenedT) -> FileJournal:
+    def _begin_journal(self, open_file: OpenedT) -> FileJournal:
         return FileJournal.begin(
-            self.kept.journals / f"{found.key}.{self.kind.name}",
+            self.state_folder.journals / f"{open_file.key}.{self.kind.name}",
             self.kind,
-            key=found.key,
-            file=found.path,
-            origin=found.origin,
-            on_disk=found.on_disk,
+            key=open_file.key,
+            file=open_file.path,
+            origin=open_file.origin,
+            on_disk=open_file.on_disk,
         )
 
-    def _sync_later(self, found: OpenedT) -> None:
+    def _sync_later(self, open_file: OpenedT) -> None:
         """Flush the journal to disk within :data:`SYNC_SECONDS`."""
-        if found.syncing is not None and not found.syncing.done():
+        if open_file.syncing is not None and not open_file.syncing.done():
             return
 
         async def sync() -> None:
             await asyncio.sleep(SYNC_SECONDS)
-            if found.journal is not None:
+            if open_file.journal is not None:
                 try:
-                    await asyncio.to_thread(found.journal.sync)
+                    await asyncio.to_thread(open_file.journal.sync)
                 except OSError:
-                    found.journaled, found.behind = False, True
-                    if self._tell is not None:
-                        await self._tell(found)
+                    open_file.journaled, open_file.behind = False, True
+                    if self._notify is not None:
+                        await self._notify(open_file)
 
-        found.syncing = asyncio.get_running_loop().create_task(sync())
+        open_file.syncing = asyncio.get_running_loop().create_task(sync())
 
-    def _snapshot_later(self, found: OpenedT, journal: FileJournal) -> None:
+    def _snapshot_later(self, open_file: OpenedT, journal: FileJournal) -> None:
         """Write a snapshot to the journal; a thread serialises the document while edits continue."""
         journal.since_snapshot = 0
-        value, number = found.document.value, found.document.version
+        value, number = open_file.document.value, open_file.document.version
 
         async def snapshot() -> None:
             text = await asyncio.to_thread(self.kind.to_text, value)
-            if found.journal is journal:
+            if open_file.journal is journal:
                 with contextlib.suppress(OSError):
                     journal.snapshot(text, number)
 
-        found.snapshot = asyncio.get_running_loop().create_task(snapshot())
+        open_file.snapshot = asyncio.get_running_loop().create_task(snapshot())
 
     # -- recovery --------------------------------------------------------------------------------------------
 
-    async def recover(self, request: say.Recover) -> OpenedT | None:
+    async def recover(self, request: document_messages.Recover) -> OpenedT | None:
         """Apply the user's choice for a recoverable document; return the document if it is now open."""
         key = request.document
         if request.action == "discard":
             self.left.discard(key)
             return None
-        found = self.left.take(key)
-        opened = self._restore(found)
+        recovered = self.left.take(key)
+        opened = self._restore(recovered)
         if request.action == "keep_both":
-            await self.save(opened, self._free_path(found), overwrite=False)
+            await self.save(opened, self._free_path(recovered), overwrite=False)
         return opened
 
-    def _free_path(self, found: JournaledFile[Any]) -> str:
+    def _free_path(self, recovered: JournaledFile[Any]) -> str:
         """A free file name for a recovered document, in the folder of its former file."""
-        origin = PurePosixPath(found.path or f"{found.document.value.name}.json")
-        when = datetime.fromtimestamp(found.last).strftime("%Y-%m-%d %H.%M.%S")
+        origin = PurePosixPath(recovered.path or f"{recovered.document.value.name}.json")
+        when = datetime.fromtimestamp(recovered.last).strftime("%Y-%m-%d %H.%M.%S")
         wish = f"{origin.stem} recovered {when}"
         names = (f"{wish}.json", *(f"{wish} {k}.json" for k in range(2, 1000)))
         return next(str(p) for name in names if not self.folder.exists(str(p := origin.with_name(name))))
 
-    def _restore(self, found: JournaledFile[Any]) -> OpenedT:
+    def _restore(self, recovered: JournaledFile[Any]) -> OpenedT:
         """Reopen a recovered document with its history and continue its journal."""
-        path = found.path
+        path = recovered.path
         if path is not None and any(other.path == path for other in self):
             path = None  # the file is already open: this document needs another name
-        opened = self._add(found.document, found.key)
-        opened.path, opened.origin, opened.on_disk = path, found.origin, found.on_disk
-        opened.seen.extend(found.keys)
+        opened = self._add(recovered.document, recovered.key)
+        opened.path, opened.origin, opened.on_disk = path, recovered.origin, recovered.on_disk
+        opened.seen.extend(recovered.keys)
         if path is not None:
-            opened.disk, opened.on_disk = self.folder.compared(path, found.on_disk)
-        if found.missing:
+            opened.disk, opened.on_disk = self.folder.compared(path, recovered.on_disk)
+        if recovered.missing:
             # A journal with records that could not be repeated is kept under another suffix for inspection.
             with contextlib.suppress(OSError):
-                found.journal_path.replace(found.journal_path.with_suffix(".unread"))
+                recovered.journal_path.replace(recovered.journal_path.with_suffix(".unread"))
                 opened.document.saved = None
             return opened
         with contextlib.suppress(OSError):
-            opened.journal = FileJournal.go_on(found, self.kind)
+            opened.journal = FileJournal.go_on(recovered, self.kind)
         return opened
 
     # -- the disk --------------------------------------------------------------------------------------------
 
-    async def watch(self, tell: Callable[[OpenedT], Awaitable[None]]) -> None:
-        """Check the files periodically; ``tell`` is called for a document whose file has changed or whose
+    async def watch(self, notify: Callable[[OpenedT], Awaitable[None]]) -> None:
+        """Check the files periodically; ``notify`` is called for a document whose file has changed or whose
         journal cannot be written.
         """
-        self._tell = tell
+        self._notify = notify
         while True:
             await asyncio.sleep(LOOK_SECONDS)
-            for found in self:
-                if found.path is None or found.saving.locked():
+            for open_file in self:
+                if open_file.path is None or open_file.saving.locked():
                     continue
-                path, known, was = found.path, found.on_disk, found.disk
+                path, known, was = open_file.path, open_file.on_disk, open_file.disk
                 disk, now = await asyncio.to_thread(self.folder.compared, path, known)
-                if found.on_disk is not known or found.path != path:
+                if open_file.on_disk is not known or open_file.path != path:
                     continue  # it was saved meanwhile
-                found.disk, found.on_disk = disk, now
+                open_file.disk, open_file.on_disk = disk, now
                 if disk != was:
                     if disk == "gone":
-                        self._hold(found)
-                    await tell(found)
+                        self._hold(open_file)
+                    await notify(open_file)

@@ -58,7 +58,7 @@ class Fingerprint:
         """Whether modification time, size and inode are unchanged."""
         return (self.modified, self.size, self.number) == (status.st_mtime_ns, status.st_size, status.st_ino)
 
-    def said(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, Any]:
         """The constructor arguments as a dictionary, for the journal."""
         return asdict(self)
 
@@ -90,7 +90,7 @@ class ProjectFolder:
         found = (self.root / relative).resolve()
         if not found.is_relative_to(self.root) or found == self.root:
             raise FormatError(
-                f"'{relative[:80]}' lies outside of the project folder",
+                f"'{relative[:80]}' is outside of the project folder",
                 allowed=allowed,
                 where="project folder",
                 fix="copy the file into the project",
@@ -120,7 +120,7 @@ class ProjectFolder:
         """Read a linked library by its resolved path: a shipped one, or a file of the project."""
         if path.parent != shipped_folder("libraries").resolve() and not path.is_relative_to(self.root):
             raise FormatError(
-                f"the library '{path.name}' lies outside of the project folder",
+                f"the library '{path.name}' is outside of the project folder",
                 allowed="shipped libraries, and files of the project folder",
                 fix="copy the library into the project",
                 where="project folder",

@@ -54,8 +54,8 @@ class StateFolder:
     def begin_session(self, port: int, *, afresh: bool = False) -> Session:
         """Return the session for this port: the previous one if its port is the same, unless ``afresh``."""
         last = self.session()
-        kept = last is not None and last.port == port and not afresh
-        session = last if last is not None and kept else Session(port, secrets.token_urlsafe(32))
+        resumed = last is not None and last.port == port and not afresh
+        session = last if last is not None and resumed else Session(port, secrets.token_urlsafe(32))
         self._write(self._session, asdict(session))
         return session
 

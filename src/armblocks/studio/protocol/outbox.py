@@ -6,7 +6,7 @@ import asyncio
 from collections import deque
 from collections.abc import Awaitable, Callable
 
-Said = str | bytes
+Payload = str | bytes
 """A message as JSON, or a frame of samples."""
 BEHIND_BYTES = 4 * 2**20
 """Above this queue size, samples of a run are added only as fast as the page receives them, bytes."""
@@ -22,7 +22,7 @@ class Outbox:
     ) -> None:
         self._send_text = send_text
         self._send_bytes = send_bytes
-        self._waiting: deque[Said] = deque()
+        self._waiting: deque[Payload] = deque()
         self._size = 0
         self._news = asyncio.Event()
         self._room = asyncio.Event()
@@ -35,12 +35,12 @@ class Outbox:
         """Whether the queue is so long that no more samples of a run should be added."""
         return not self._room.is_set()
 
-    async def put(self, said: Said) -> None:
+    async def put(self, payload: Payload) -> None:
         """Add a message; does not wait."""
         if self.given_up:
             return
-        self._waiting.append(said)
-        self._size += len(said)
+        self._waiting.append(payload)
+        self._size += len(payload)
         self._news.set()
         if self._size > BEHIND_BYTES:
             self._room.clear()
@@ -56,9 +56,11 @@ class Outbox:
         try:
             while not self.given_up:
                 while self._waiting and not self.given_up:
-                    said = self._waiting.popleft()
-                    await (self._send_text(said) if isinstance(said, str) else self._send_bytes(said))
-                    self._size -= len(said)
+                    payload = self._waiting.popleft()
+                    await (
+                        self._send_text(payload) if isinstance(payload, str) else self._send_bytes(payload)
+                    )
+                    self._size -= len(payload)
                     if self._size <= BEHIND_BYTES:
                         self._room.set()
                 self._news.clear()

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from starlette.websockets import WebSocketDisconnect
 
-from armblocks.studio.protocol.outbox import Outbox, Said
+from armblocks.studio.protocol.outbox import Outbox, Payload
 
 if TYPE_CHECKING:
     from armblocks.studio.protocol.message import Message
@@ -35,7 +35,7 @@ class Page:
     """The queue through which both functions send, if there is one."""
     shows: dict[str, tuple[str, ...]] = field(default_factory=dict[str, tuple[str, ...]])
     """Displayed documents, with the path of the displayed sheet."""
-    hears: dict[str, int] = field(default_factory=dict[str, int])
+    records_in_progress: dict[str, int] = field(default_factory=dict[str, int])
     """Runs whose record is being sent, with the number of sent messages; live messages are withheld."""
 
     @property
@@ -48,14 +48,14 @@ class Page:
         if self.outbox is not None:
             await self.outbox.room()
 
-    async def tell(self, event: Message) -> None:
+    async def notify(self, event: Message) -> None:
         """Send an event; a disconnected page is ignored."""
         await self.send(event.model_dump_json())
 
-    async def send(self, said: Said) -> None:
+    async def send(self, payload: Payload) -> None:
         """Send a message or a frame without conversion."""
         with contextlib.suppress(*GONE):
-            await (self.send_text(said) if isinstance(said, str) else self.send_bytes(said))
+            await (self.send_text(payload) if isinstance(payload, str) else self.send_bytes(payload))
 
 
 class Pages:
@@ -82,10 +82,10 @@ class Pages:
         """The pages that show a document."""
         return [page for page in self if document in page.shows]
 
-    async def tell(self, event: Message) -> None:
+    async def notify(self, event: Message) -> None:
         """Send an event to every page."""
-        await asyncio.gather(*(page.tell(event) for page in self))
+        await asyncio.gather(*(page.notify(event) for page in self))
 
-    async def tell_of(self, document: str, event: Message) -> None:
+    async def notify_showing(self, document: str, event: Message) -> None:
         """Send an event to every page that shows a document."""
-        await asyncio.gather(*(page.tell(event) for page in self.showing(document)))
+        await asyncio.gather(*(page.notify(event) for page in self.showing(document)))

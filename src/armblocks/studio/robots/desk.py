@@ -13,7 +13,7 @@ from armblocks.robot import Robot
 from armblocks.studio.documents.desk import DocumentDesk
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.protocol.answers import Answers
-from armblocks.studio.protocol.messages import robots as say
+from armblocks.studio.protocol.messages import robots as robot_messages
 from armblocks.studio.protocol.page import Page
 from armblocks.studio.protocol.robot_scene import RobotScene
 from armblocks.studio.robots.presenter import RobotPresenter
@@ -44,41 +44,41 @@ class RobotDesk:
 
     def register(self, answers: Answers) -> None:
         """Register the handlers of the requests about robots."""
-        answers.on(say.RobotOfBlock, self._open_of_block)
-        answers.on(say.AskRobotTables, self._tables)
-        answers.on(say.AskScene, self._scene)
-        answers.on(say.AskPose, self._pose)
-        answers.on(say.AskPicture, self._picture)
-        answers.on(say.AskReadings, self._readings)
+        answers.on(robot_messages.RobotOfBlock, self._open_of_block)
+        answers.on(robot_messages.AskRobotTables, self._tables)
+        answers.on(robot_messages.AskScene, self._scene)
+        answers.on(robot_messages.AskPose, self._pose)
+        answers.on(robot_messages.AskPicture, self._picture)
+        answers.on(robot_messages.AskReadings, self._readings)
 
-    async def _open_of_block(self, page: Page, request: say.RobotOfBlock) -> str:
+    async def _open_of_block(self, page: Page, request: robot_messages.RobotOfBlock) -> str:
         robot = self._block_robot(request.document, request.inside, request.block)
         place = Path(robot.source)
         if place.suffix.lower() == ".json" and place.is_relative_to(self._folder.root) and place.is_file():
             opening = self._presenter.open_file(place.relative_to(self._folder.root).as_posix())
             return await self._documents.show(page, opening.opened[0], notes=opening.notes)
         is_shipped = robot.source in formats.list_robots()
-        found = self._robots.add(robot, origin=robot.source) if is_shipped else self._robots.bring(robot)
-        return await self._documents.show(page, found)
+        open_file = self._robots.add(robot, origin=robot.source) if is_shipped else self._robots.bring(robot)
+        return await self._documents.show(page, open_file)
 
-    async def _tables(self, _: Page, request: say.AskRobotTables) -> say.RobotTables:
+    async def _tables(self, _: Page, request: robot_messages.AskRobotTables) -> robot_messages.RobotTables:
         return robot_tables()
 
-    async def _scene(self, _: Page, request: say.AskScene) -> RobotScene:
+    async def _scene(self, _: Page, request: robot_messages.AskScene) -> RobotScene:
         return scene_of(self._robot(request.document, request.inside, request.block))
 
-    async def _pose(self, _: Page, request: say.AskPose) -> list[list[list[float]]]:
+    async def _pose(self, _: Page, request: robot_messages.AskPose) -> list[list[list[float]]]:
         return link_frames_of(self._robot(request.document, request.inside, request.block), request.q)
 
-    async def _picture(self, _: Page, request: say.AskPicture) -> str:
+    async def _picture(self, _: Page, request: robot_messages.AskPicture) -> str:
         robot = self._robot(request.document, request.inside, request.block)
         link_frames_of(robot, request.q)  # raises for a wrong number of coordinates
         return await asyncio.to_thread(arm_picture_svg, robot, request.q, _PICTURE_SIZE, request.theme)
 
-    async def _readings(self, _: Page, request: say.AskReadings) -> say.Readings:
-        found = self._robots[request.document]
-        async with found.reading:  # concurrent requests compile the arm only once
-            return await asyncio.to_thread(readings, found.arm, request.q, request.qd, request.qdd)
+    async def _readings(self, _: Page, request: robot_messages.AskReadings) -> robot_messages.Readings:
+        open_file = self._robots[request.document]
+        async with open_file.reading:  # concurrent requests compile the arm only once
+            return await asyncio.to_thread(readings, open_file.arm, request.q, request.qd, request.qdd)
 
     def _robot(self, document: str, path: Sequence[str], block: str) -> Robot:
         """Return the robot of a document, or of a block of a diagram."""

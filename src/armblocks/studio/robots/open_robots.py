@@ -39,8 +39,8 @@ class OpenRobot(OpenFile[RobotDocument]):
 class OpenRobots(OpenFiles[OpenRobot]):
     """The open robots of one project folder; see :class:`.OpenFiles`."""
 
-    def __init__(self, folder: ProjectFolder, kept: StateFolder) -> None:
-        super().__init__(folder, kept, RobotKind(folder))
+    def __init__(self, folder: ProjectFolder, state_folder: StateFolder) -> None:
+        super().__init__(folder, state_folder, RobotKind(folder))
 
     def _made(self, key: str, document: RobotDocument) -> OpenRobot:
         return OpenRobot(key=key, document=document)

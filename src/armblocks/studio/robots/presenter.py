@@ -35,9 +35,9 @@ class RobotPresenter(Presenter[OpenRobot]):
     def open_file(self, path: str) -> Opening[OpenRobot]:
         """Open the robot of a file, or the robots of a script; robots of a script have no file yet."""
         if path.lower().endswith(".json"):
-            found, notes = _noted(lambda: self.files.open_path(path))
-            found.notes = notes or found.notes
-            return Opening([found], found.notes)
+            open_file, notes = _noted(lambda: self.files.open_path(path))
+            open_file.notes = notes or open_file.notes
+            return Opening([open_file], open_file.notes)
         robots, notes = _read(self._folder.read(path), path)
         source = str(self._folder.path(path))
         return self._brought((dataclasses.replace(robot, source=source) for robot in robots.values()), notes)
@@ -47,25 +47,25 @@ class RobotPresenter(Presenter[OpenRobot]):
         robots, notes = _read(data, name)
         return self._brought(robots.values(), notes)
 
-    def content(self, found: OpenRobot, place: Place) -> RobotContent:
+    def content(self, open_file: OpenRobot, place: Place) -> RobotContent:
         """Return the tables of a robot."""
-        return robot_content(found.robot)
+        return robot_content(open_file.robot)
 
-    def change(self, found: OpenRobot, before: Robot, place: Place) -> RobotChange:
+    def change(self, open_file: OpenRobot, before: Robot, place: Place) -> RobotChange:
         """Return the complete robot; changes are not split."""
-        return RobotChange(content=robot_content(found.robot))
+        return RobotChange(content=robot_content(open_file.robot))
 
-    async def saved(self, found: OpenRobot) -> None:
+    async def saved(self, open_file: OpenRobot) -> None:
         """Update the diagrams that use the robot."""
-        if found.path is not None:
-            source = str(self._folder.path(found.path))
-            await self._robot_saved(dataclasses.replace(found.robot, source=source))
+        if open_file.path is not None:
+            source = str(self._folder.path(open_file.path))
+            await self._robot_saved(dataclasses.replace(open_file.robot, source=source))
 
     def _brought(self, robots: Iterable[Robot], notes: tuple[str, ...]) -> Opening[OpenRobot]:
         """Open robots that have no file."""
         opened = [self.files.bring(robot) for robot in robots]
-        for found in opened:
-            found.notes = notes
+        for open_file in opened:
+            open_file.notes = notes
         return Opening(opened, notes)
 
 
@@ -87,5 +87,5 @@ def _noted(read: Callable[[], Result]) -> tuple[Result, tuple[str, ...]]:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", ArmblocksWarning)
         result = read()
-    said = [str(one.message) for one in caught if issubclass(one.category, ArmblocksWarning)]
-    return result, tuple(dict.fromkeys(said))
+    texts = [str(one.message) for one in caught if issubclass(one.category, ArmblocksWarning)]
+    return result, tuple(dict.fromkeys(texts))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Literal
 
-from armblocks.robot import DhConvention, Link, Robot, doubts, inertia_findings, serial_chain
-from armblocks.studio.protocol.messages import robots as say
+from armblocks.robot import DhConvention, Link, Robot, inertia_findings, plausibility_findings, serial_chain
+from armblocks.studio.protocol.messages import robots as robot_messages
 from armblocks.studio.robots.columns import ROBOT, ROBOT_COLUMNS, Column, Owner
 from armblocks.studio.robots.link_columns import (
     DYNAMICS,
@@ -16,18 +16,18 @@ from armblocks.studio.robots.link_columns import (
 )
 
 
-def robot_tables() -> say.RobotTables:
+def robot_tables() -> robot_messages.RobotTables:
     """Return all editable columns."""
-    return say.RobotTables(
+    return robot_messages.RobotTables(
         kinematics=[_column(column) for column in KINEMATICS],
         dynamics=[_column(column) for column in DYNAMICS],
         robot=[_column(column) for column in ROBOT],
     )
 
 
-def robot_content(robot: Robot) -> say.RobotContent:
+def robot_content(robot: Robot) -> robot_messages.RobotContent:
     """Return the data of a robot that a page displays."""
-    return say.RobotContent(
+    return robot_messages.RobotContent(
         name=robot.name,
         convention=_convention(robot),
         chain=robot.links == serial_chain(robot.links),
@@ -37,13 +37,13 @@ def robot_content(robot: Robot) -> say.RobotContent:
             *_inertia_findings(robot),
             *_friction_findings(robot),
             *_weightless(robot),
-            *_doubts(robot),
+            *_findings(robot),
         ],
     )
 
 
-def _column(column: Column[Owner]) -> say.CellColumn:
-    return say.CellColumn(
+def _column(column: Column[Owner]) -> robot_messages.CellColumn:
+    return robot_messages.CellColumn(
         name=column.name,
         title=column.title,
         doc=column.doc,
@@ -55,9 +55,9 @@ def _column(column: Column[Owner]) -> say.CellColumn:
     )
 
 
-def _row(link: Link) -> say.LinkRow:
+def _row(link: Link) -> robot_messages.LinkRow:
     locked = {name: why for name, column in LINK_COLUMNS.items() if (why := column.locked(link))}
-    return say.LinkRow(
+    return robot_messages.LinkRow(
         name=link.name,
         parent=link.parent,
         turns=bool(link.joint.turn),
@@ -75,9 +75,9 @@ def _convention(robot: Robot) -> Literal["standard", "modified", ""]:
     return "modified" if found == {DhConvention.MODIFIED} else ""
 
 
-def _inertia_findings(robot: Robot) -> list[say.RobotFinding]:
+def _inertia_findings(robot: Robot) -> list[robot_messages.RobotFinding]:
     return [
-        say.RobotFinding(
+        robot_messages.RobotFinding(
             link=finding.link,
             columns=[*INERTIA_PLACES, *(["mass"] if "no mass" in finding.reason else [])],
             what=f"No rigid body has this inertia: {finding.reason} "
@@ -88,15 +88,17 @@ def _inertia_findings(robot: Robot) -> list[say.RobotFinding]:
     ]
 
 
-def _doubts(robot: Robot) -> list[say.RobotFinding]:
+def _findings(robot: Robot) -> list[robot_messages.RobotFinding]:
     return [
-        say.RobotFinding(link=doubt.link or robot.name, columns=[], what=f"{doubt.what}.", fix=doubt.question)
-        for doubt in doubts(robot)
+        robot_messages.RobotFinding(
+            link=finding.link or robot.name, columns=[], what=f"{finding.what}.", fix=finding.question
+        )
+        for finding in plausibility_findings(robot)
     ]
 
 
-def _friction_findings(robot: Robot) -> list[say.RobotFinding]:
-    found: list[say.RobotFinding] = []
+def _friction_findings(robot: Robot) -> list[robot_messages.RobotFinding]:
+    found: list[robot_messages.RobotFinding] = []
     for link in robot.links:
         if link.motor is None:
             continue
@@ -104,7 +106,7 @@ def _friction_findings(robot: Robot) -> list[say.RobotFinding]:
         wrong = {"B": link.motor.viscous_friction < 0, "Tc+": plus < 0, "Tc-": minus > 0}
         if any(wrong.values()):
             found.append(
-                say.RobotFinding(
+                robot_messages.RobotFinding(
                     link=link.name,
                     columns=[name for name, is_wrong in wrong.items() if is_wrong],
                     what="Friction accelerates the joint instead of braking it.",
@@ -114,14 +116,14 @@ def _friction_findings(robot: Robot) -> list[say.RobotFinding]:
     return found
 
 
-def _weightless(robot: Robot) -> list[say.RobotFinding]:
+def _weightless(robot: Robot) -> list[robot_messages.RobotFinding]:
     """Find joints without inertia, for which forward dynamics has no solution."""
     last = robot.links[-1]
     light = last.mass == 0 and not any(any(row) for row in last.inertia)
     if not light or (last.motor is not None and last.motor.reflected_inertia > 0) or not last.joint.moves:
         return []
     return [
-        say.RobotFinding(
+        robot_messages.RobotFinding(
             link=last.name,
             columns=["mass"],
             what="The last joint has no inertia: no mass, no inertia tensor and no rotor.",

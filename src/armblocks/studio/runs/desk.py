@@ -10,7 +10,7 @@ from armblocks.errors import InputError, UnknownNameError
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.protocol.answers import Answers
 from armblocks.studio.protocol.message import Message
-from armblocks.studio.protocol.messages import runs as say
+from armblocks.studio.protocol.messages import runs as run_messages
 from armblocks.studio.protocol.page import Page, Pages
 from armblocks.studio.runs.process import RunProcess
 from armblocks.studio.runs.record import RunRecord
@@ -40,12 +40,12 @@ class RunDesk:
         self._diagrams = diagrams
         self._resolve_robot = resolve_robot
         self._records: dict[str, RunRecord] = {}
-        self._telling: set[asyncio.Task[None]] = set()
+        self._sending: set[asyncio.Task[None]] = set()
 
     def register(self, answers: Answers) -> None:
         """Register the handlers of the requests about runs."""
-        answers.on(say.Run, self._run)
-        for command in (say.Control, say.SetSpeed, say.Rewind, say.Tune):
+        answers.on(run_messages.Run, self._run)
+        for command in (run_messages.Control, run_messages.SetSpeed, run_messages.Rewind, run_messages.Tune):
             answers.on(command, self._command)
 
     def of(self, document: str) -> str | None:
@@ -55,7 +55,7 @@ class RunDesk:
     def shown(self, page: Page, document: str) -> None:
         """Send a page that opened a diagram the record of its run, and start the process of the next run."""
         if (run := self.of(document)) is not None:
-            self._tell_later(page, run, 0)
+            self._send_later(page, run, 0)
         self.workers.prepare(after=PAGE_SECONDS)
 
     async def report(self, document: str) -> bytes:
@@ -68,7 +68,7 @@ class RunDesk:
 
     def close(self) -> None:
         """End every run."""
-        for task in self._telling:
+        for task in self._sending:
             task.cancel()
         for run in self.processes.values():
             run.end()
@@ -78,60 +78,66 @@ class RunDesk:
 
     # -- requests --------------------------------------------------------------------------------------------
 
-    async def _run(self, _: Page, request: say.Run) -> str:
-        found = self._diagrams[request.document]
+    async def _run(self, _: Page, request: run_messages.Run) -> str:
+        open_file = self._diagrams[request.document]
         key, record = secrets.token_hex(8), RunRecord()
 
-        async def tell(event: Message | bytes) -> None:
-            said = event if isinstance(event, bytes) else event.model_dump_json()
-            record.append(said)
-            for page in [page for page in self._pages.showing(found.key) if key not in page.hears]:
+        async def notify(event: Message | bytes) -> None:
+            payload = event if isinstance(event, bytes) else event.model_dump_json()
+            record.append(payload)
+            for page in [
+                page for page in self._pages.showing(open_file.key) if key not in page.records_in_progress
+            ]:
                 if page.behind:
-                    self._tell_later(page, key, len(record) - 1)
+                    self._send_later(page, key, len(record) - 1)
                 else:
-                    await page.send(said)
+                    await page.send(payload)
 
         worker = await self.workers.take()
         for other in list(self.processes.values()):
-            if other.document == found.key:
+            if other.document == open_file.key:
                 other.end()
                 del self.processes[other.key]
                 self._records.pop(other.key).close()
         job = {
             "diagram": formats.diagram_to_bytes(
-                found.document.diagram, self._resolve_robot, folder=self._folder.root
+                open_file.document.diagram, self._resolve_robot, folder=self._folder.root
             ).decode(),
             "folder": str(self._folder.root),
             "speed": request.speed,
             "tuned": request.tuned,
         }
-        run = RunProcess(key, found.key, worker, tell)
+        run = RunProcess(key, open_file.key, worker, notify)
         self.processes[key], self._records[key] = run, record
         run.start(job)
         return run.key
 
-    async def _command(self, _: Page, request: say.RunCommand) -> None:
+    async def _command(self, _: Page, request: run_messages.RunCommand) -> None:
         if request.run not in self.processes:
             raise UnknownNameError("run", request.run, self.processes)
         self.processes[request.run].obey(request)
 
     # -- messages to pages -----------------------------------------------------------------------------------
 
-    def _tell_later(self, page: Page, run: str, said: int) -> None:
-        """Send a page the messages of a run from number ``said`` on, as fast as the page receives them.
+    def _send_later(self, page: Page, run: str, begin: int) -> None:
+        """Send a page the messages of a run from number ``begin`` on, as fast as the page receives them.
 
         This serves pages that have just connected or are behind. Live messages of the run are withheld from
         the page until it has received the record.
         """
-        page.hears[run] = said
-        telling = asyncio.get_running_loop().create_task(self._tell(page, run))
-        self._telling.add(telling)
-        telling.add_done_callback(self._telling.discard)
+        page.records_in_progress[run] = begin
+        sending = asyncio.get_running_loop().create_task(self._notify(page, run))
+        self._sending.add(sending)
+        sending.add_done_callback(self._sending.discard)
 
-    async def _tell(self, page: Page, run: str) -> None:
+    async def _notify(self, page: Page, run: str) -> None:
         record = self._records[run]
-        while page.hears[run] < len(record) and self._records.get(run) is record and page in self._pages:
-            page.hears[run] += 1
-            await page.send(record[page.hears[run] - 1])
+        while (
+            page.records_in_progress[run] < len(record)
+            and self._records.get(run) is record
+            and page in self._pages
+        ):
+            page.records_in_progress[run] += 1
+            await page.send(record[page.records_in_progress[run] - 1])
             await page.room()
-        del page.hears[run]
+        del page.records_in_progress[run]

@@ -20,11 +20,11 @@ from pydantic import TypeAdapter
 
 from armblocks.errors import InputError
 from armblocks.studio.protocol.message import AnyOf
-from armblocks.studio.protocol.messages import runs as say
+from armblocks.studio.protocol.messages import runs as run_messages
 from armblocks.studio.runs.workers import Worker
 
-TellRun = Callable[[say.Message | bytes], Awaitable[None]]
-_EVENTS: TypeAdapter[say.RunEvent] = TypeAdapter(Annotated[say.RunEvent, AnyOf()])
+NotifyRun = Callable[[run_messages.Message | bytes], Awaitable[None]]
+_EVENTS: TypeAdapter[run_messages.RunEvent] = TypeAdapter(Annotated[run_messages.RunEvent, AnyOf()])
 STOP_SECONDS = 0.8
 """Time after which a worker that has not obeyed ``stop`` is killed, s."""
 SILENT_SECONDS = 600.0
@@ -37,16 +37,16 @@ ENDED = ("done", "stopped", "failed")
 
 
 class RunProcess:
-    """One run of one document. The hub creates it; ``tell`` receives its events and frames in its loop."""
+    """One run of one document. The hub creates it; ``notify`` receives its events and frames in its loop."""
 
-    def __init__(self, key: str, document: str, worker: Worker, tell: TellRun) -> None:
+    def __init__(self, key: str, document: str, worker: Worker, notify: NotifyRun) -> None:
         self.key = key
         self.document = document
         self.state = "running"
         self.job: dict[str, Any] = {}
         """The job that was sent to the worker."""
         self._worker = worker
-        self._tell = tell
+        self._notify = notify
         self._loop = asyncio.get_running_loop()
         self._queue: asyncio.Queue[bytes | None] = asyncio.Queue()
         self._commands: SimpleQueue[bytes | None] = SimpleQueue()
@@ -61,16 +61,16 @@ class RunProcess:
         """Send the worker its job, see :func:`armblocks.studio.runs.worker.work`."""
         self.job = {**job, "run": self.key, "document": self.document}
         self._commands.put(json.dumps(self.job).encode())
-        for going in (self._read, self._write):
-            Thread(target=going, args=(self._worker.pipe,), daemon=True).start()
+        for transfer in (self._read, self._write):
+            Thread(target=transfer, args=(self._worker.pipe,), daemon=True).start()
         self._passing = self._loop.create_task(self._pass_on())
 
-    def obey(self, request: say.RunCommand) -> None:
+    def obey(self, request: run_messages.RunCommand) -> None:
         """Send a command to the worker; raises ``InputError`` if the run has ended."""
         if self.state in ENDED:
             raise InputError("the run has ended", where="run", fix="start the model again")
         self._commands.put(request.model_dump_json().encode())
-        if isinstance(request, say.Control) and request.action == "stop":
+        if isinstance(request, run_messages.Control) and request.action == "stop":
             self._loop.call_later(STOP_SECONDS, self._force)
 
     def end(self) -> None:
@@ -123,40 +123,40 @@ class RunProcess:
             return await self._queue.get()
 
     async def _pass_on(self) -> None:
-        last: say.RunProgress | None = None
+        last: run_messages.RunProgress | None = None
         while (message := await self._heard()) is not None:
             if self._broken:
                 continue  # the worker is being killed; its last messages are not valid
             if message[:1] == b"S":
-                await self._tell_samples(message[1:])
+                await self._pass_samples(message[1:])
                 continue
             event = _EVENTS.validate_json(message[1:])
-            if isinstance(event, say.RunProgress):
+            if isinstance(event, run_messages.RunProgress):
                 self.state, last = event.state, event
-            await self._tell(event)
+            await self._notify(event)
         self._commands.put(None)
         if self.state not in ENDED:
             await asyncio.to_thread(self._worker.process.join, JOIN_SECONDS)
             self.state = "stopped" if self._forced else "failed"
-            await self._tell(self._lost(last))
+            await self._notify(self._lost(last))
 
-    async def _tell_samples(self, frame: bytes) -> None:
+    async def _pass_samples(self, frame: bytes) -> None:
         """Pass a frame on; end the run if the disk cannot store it."""
         try:
-            await self._tell(frame)
+            await self._notify(frame)
         except OSError as error:
             self._broken = f"the samples of the run cannot be stored ({error.strerror}); the run was ended"
             self._worker.process.kill()
 
-    def _lost(self, last: say.RunProgress | None) -> say.RunProgress:
+    def _lost(self, last: run_messages.RunProgress | None) -> run_messages.RunProgress:
         """The final progress message for a worker that ended without one."""
-        fault = say.Fault(
+        fault = run_messages.Fault(
             what=self._broken or _cause(self._worker.process.exitcode),
             where="run",
             allowed="a run within the memory and time limits",
             fix="run the model again; if it happens again, record fewer samples or shorten the run",
         )
-        return say.RunProgress(
+        return run_messages.RunProgress(
             run=self.key,
             state="stopped" if self._forced else "failed",
             time=last.time if last else 0.0,

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import tempfile
 
-from armblocks.studio.protocol.outbox import Said
+from armblocks.studio.protocol.outbox import Payload
 
 
 class RunRecord:
@@ -25,7 +25,7 @@ class RunRecord:
     def __len__(self) -> int:
         return len(self._spots)
 
-    def __getitem__(self, index: int) -> Said:
+    def __getitem__(self, index: int) -> Payload:
         if index in self._words:
             return self._words[index]
         begin, size, text = self._spots[index]
@@ -33,18 +33,18 @@ class RunRecord:
         data = self._file.read(size)
         return data.decode() if text else data
 
-    def append(self, said: Said) -> None:
+    def append(self, payload: Payload) -> None:
         """Store a message; raises ``OSError`` for a frame that cannot be written to disk."""
-        data = said.encode() if isinstance(said, str) else said
+        data = payload.encode() if isinstance(payload, str) else payload
         try:
             self._write(data)
         except OSError:
-            if not isinstance(said, str):
+            if not isinstance(payload, str):
                 raise
-            self._words[len(self._spots)] = said
+            self._words[len(self._spots)] = payload
             self._spots.append((self._size, 0, True))
             return
-        self._spots.append((self._size, len(data), isinstance(said, str)))
+        self._spots.append((self._size, len(data), isinstance(payload, str)))
         self._size += len(data)
 
     def _write(self, data: bytes) -> None:

@@ -39,20 +39,20 @@ async def report_of(job: Mapping[str, Any]) -> bytes:
 
 def _received(pipe: Connection) -> bytes:
     try:
-        said = pipe.recv_bytes() if pipe.poll(MOST_SECONDS) else b""
+        reply = pipe.recv_bytes() if pipe.poll(MOST_SECONDS) else b""
     except EOFError:
-        said = b""
-    if not said:
+        reply = b""
+    if not reply:
         raise SimulationError(
             "the report exceeded its time or memory limit",
             where="report",
             fix="shorten the run, or use 'armblocks run'",
         )
-    if said[:1] == b"E":
+    if reply[:1] == b"E":
         raise SimulationError(
-            said[1:].decode(), where="report", fix="shorten the run, or use 'armblocks run'"
+            reply[1:].decode(), where="report", fix="shorten the run, or use 'armblocks run'"
         )
-    return said[1:]
+    return reply[1:]
 
 
 def write(pipe: Connection, job: dict[str, Any]) -> None:

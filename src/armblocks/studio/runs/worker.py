@@ -32,7 +32,7 @@ from armblocks.face.model import CompiledDiagram
 from armblocks.simulation import SimulationResult
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.protocol.frames import sample_frame, thinned
-from armblocks.studio.protocol.messages import runs as say
+from armblocks.studio.protocol.messages import runs as run_messages
 from armblocks.studio.runs.history import RunHistory
 from armblocks.studio.runs.pace import Pace
 from armblocks.studio.runs.tunables import tunables
@@ -130,7 +130,7 @@ class _Run:
     def _go(self) -> None:
         history = begun(self.job)
         self.stride = stride_of(history.run)
-        self._tell_start(history.run)
+        self._notify_start(history.run)
         self.began = perf_counter()
         self.pace.count_from(0.0)
         while True:
@@ -182,8 +182,8 @@ class _Run:
                 case "control", "back":
                     self._go_back(history, self.count - 1)
                 case "rewind", _:
-                    told = int(np.searchsorted(self.times, float(command["time"]), "right"))
-                    self._go_back(history, told if self.stride == 1 else told * self.stride // 2)
+                    sent = int(np.searchsorted(self.times, float(command["time"]), "right"))
+                    self._go_back(history, sent if self.stride == 1 else sent * self.stride // 2)
                 case "speed", _:
                     self.pace.speed = command["speed"]
                     self.pace.count_from(self.time)
@@ -204,15 +204,17 @@ class _Run:
             self._progress(error.what, _fault(error))
         else:
             self.tuned[parameter] = value
-            self._tell(say.RunTuned(run=self.key, time=self.time, parameter=parameter, value=value))
+            self._notify(
+                run_messages.RunTuned(run=self.key, time=self.time, parameter=parameter, value=value)
+            )
 
     def _go_back(self, history: RunHistory, recorded: int) -> None:
         """Return to at most ``recorded`` recorded instants; tuned values apply from there on."""
         history.back_to(max(recorded, 1))
         self.count, self.time = history.recorded, history.run.time
-        told = self.count if self.stride == 1 else int(np.searchsorted(self.times, self.time, "right"))
-        self.times = self.times[:told]
-        self._tell(say.RunRewound(run=self.key, time=self.time, count=told))
+        sent = self.count if self.stride == 1 else int(np.searchsorted(self.times, self.time, "right"))
+        self.times = self.times[:sent]
+        self._notify(run_messages.RunRewound(run=self.key, time=self.time, count=sent))
         self._become("paused")
 
     def _stand_where_shown(self, history: RunHistory) -> None:
@@ -223,24 +225,24 @@ class _Run:
 
     # -- messages to the hub ---------------------------------------------------------------------------------
 
-    def _tell(self, event: say.Message) -> None:
+    def _notify(self, event: run_messages.Message) -> None:
         self.pipe.send_bytes(b"J" + event.model_dump_json().encode())
 
-    def _tell_start(self, run: DiagramRun) -> None:
+    def _notify_start(self, run: DiagramRun) -> None:
         compiled, diagram = run.simulation.compiled, run.diagram
-        self._tell(
-            say.RunStarted(
+        self._notify(
+            run_messages.RunStarted(
                 document=self.document,
                 run=self.key,
                 stop_time=run.stop_time,
                 channels=[
-                    say.Channel(
+                    run_messages.Channel(
                         name=slot.name, shape=list(slot.shape), unit=slot.unit, entries=list(slot.entries)
                     )
                     for slot in run.simulation.signals_layout
                 ],
                 views=[
-                    say.ViewOf(
+                    run_messages.ViewOf(
                         block=name,
                         kind=view.kind.value,
                         signals=list(view.signals),
@@ -284,11 +286,11 @@ class _Run:
             self.time = float(partial.time[-1])
 
     def _progress(
-        self, message: str = "", fault: say.Fault | None = None, solver: str = "", reason: str = ""
+        self, message: str = "", fault: run_messages.Fault | None = None, solver: str = "", reason: str = ""
     ) -> None:
         factor = self.time / max(perf_counter() - self.began, 1e-9)
-        self._tell(
-            say.RunProgress(
+        self._notify(
+            run_messages.RunProgress(
                 run=self.key,
                 state=self.state,
                 time=self.time,
@@ -323,5 +325,5 @@ def _defect(error: Exception) -> SimulationError:
     )
 
 
-def _fault(error: ArmblocksError) -> say.Fault:
-    return say.Fault(what=error.what, where=error.where, allowed=error.allowed, fix=error.fix)
+def _fault(error: ArmblocksError) -> run_messages.Fault:
+    return run_messages.Fault(what=error.what, where=error.where, allowed=error.allowed, fix=error.fix)

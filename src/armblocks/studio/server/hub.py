@@ -99,7 +99,7 @@ class Hub:
     async def welcome(self, page: Page) -> None:
         """Add a page that has connected, and send it the welcome message."""
         self._pages.add(page)
-        await page.tell(
+        await page.notify(
             Welcome(
                 version=version("armblocks"),
                 library=list(library()),
@@ -130,7 +130,7 @@ class Hub:
             numbered = _NUMBERED.match(text)
             if numbered is None:
                 raise NoRequestError(str(error)) from None
-            await page.tell(Reply(number=int(numbered[1]), fault=NO_REQUEST))
+            await page.notify(Reply(number=int(numbered[1]), fault=NO_REQUEST))
             return
         number, fault, value = envelope.number, None, None
         try:
@@ -140,7 +140,7 @@ class Hub:
         except Exception as error:
             LOG.exception("a request failed because of a defect")
             fault = DEFECT.model_copy(update={"what": f"{DEFECT.what} ({type(error).__name__})"})
-        await page.tell(Reply(number=number, value=value, fault=fault))
+        await page.notify(Reply(number=number, value=value, fault=fault))
 
     async def _ping(self, _: Page, request: Ping) -> None:
         pass
@@ -179,10 +179,10 @@ class Hub:
 
     async def _robot_saved(self, robot: Robot) -> None:
         """Update the diagrams that use a robot whose file was saved, as one undo step each."""
-        for found in self._diagrams:
-            after = with_robot(found.document.diagram, robot)
-            if after is not found.document.diagram:
-                await self.documents.replace(found, f"new form of {robot.name}", after)
+        for open_file in self._diagrams:
+            after = with_robot(open_file.document.diagram, robot)
+            if after is not open_file.document.diagram:
+                await self.documents.replace(open_file, f"new form of {robot.name}", after)
 
 
 @lru_cache(maxsize=64)

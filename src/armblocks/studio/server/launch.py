@@ -45,11 +45,11 @@ def serve(
 
     web = built_page()
     project = ProjectFolder(folder)
-    kept = StateFolder(project.root)
-    listener = _listener_as_before(kept) if port == 0 and not afresh else None
+    state_folder = StateFolder(project.root)
+    listener = _listener_as_before(state_folder) if port == 0 and not afresh else None
     listener = listener or _listener(port)
     taken: int = listener.getsockname()[1]
-    keys = Keys(taken, kept.begin_session(taken, afresh=afresh).secret)
+    keys = Keys(taken, state_folder.begin_session(taken, afresh=afresh).secret)
     hub = HubToCome(project)
     app = studio_app(hub, keys, frozenset(f"{host}:{taken}" for host in LOOPBACK), web)
     fragment = f"#{quote(model)}" if model else ""
@@ -78,9 +78,9 @@ def serve(
         hub.made.result()  # raises the error that prevented the creation of the hub
 
 
-def _listener_as_before(kept: StateFolder) -> socket.socket | None:
+def _listener_as_before(state_folder: StateFolder) -> socket.socket | None:
     """Listen at the port of the previous server, if it is free, so that its pages can reconnect."""
-    last = kept.session()
+    last = state_folder.session()
     if last is not None:
         with contextlib.suppress(InputError):
             return _listener(last.port)
@@ -99,6 +99,6 @@ def _listener(port: int) -> socket.socket:
             f"port {port} cannot be used ({error.strerror})",
             where="armblocks studio",
             allowed="a free port, or 0 for any",
-            fix="choose another --port, or close the program that holds this one",
+            fix="choose another --port, or close the program that uses this one",
         ) from None
     return listener

@@ -93,7 +93,9 @@ def pasted(diagram: Diagram, copied: Diagram, names: Mapping[str, str], shift: f
     shifted = {
         name: dataclasses.replace(note, x=note.x + shift, y=note.y + shift) for name, note in notes.items()
     }
-    blocks = {names.get(name, name): _at_home(block, diagram) for name, block in copied.blocks.items()}
+    blocks = {
+        names.get(name, name): _with_known_names(block, diagram) for name, block in copied.blocks.items()
+    }
     return dataclasses.replace(
         diagram,
         blocks={**diagram.blocks, **blocks},
@@ -105,7 +107,7 @@ def pasted(diagram: Diagram, copied: Diagram, names: Mapping[str, str], shift: f
     )
 
 
-def _at_home(block: Block, diagram: Diagram) -> Block:
+def _with_known_names(block: Block, diagram: Diagram) -> Block:
     """Replace the formulas of a block that contain undeclared names by their values."""
     known = set(diagram.mask_values)
     foreign = [name for name, text in block.formulas if not formula_names(text) <= known]

@@ -30,8 +30,8 @@ class OpenDocument(OpenFile[Document]):
 class OpenDocuments(OpenFiles[OpenDocument]):
     """The open diagrams of one project folder; see :class:`.OpenFiles`."""
 
-    def __init__(self, folder: ProjectFolder, kept: StateFolder, resolve_robot: ResolveRobot) -> None:
-        super().__init__(folder, kept, DiagramKind(folder, resolve_robot))
+    def __init__(self, folder: ProjectFolder, state_folder: StateFolder, resolve_robot: ResolveRobot) -> None:
+        super().__init__(folder, state_folder, DiagramKind(folder, resolve_robot))
 
     def open_bytes(self, data: bytes, name: str) -> OpenDocument:
         """Open the content of a file from outside the project as a new diagram."""

@@ -59,9 +59,9 @@ def _rank(name: str, block: Block, word: str) -> tuple[int, str]:
     for rule in block.parameters():
         if rule.kind is ParameterKind.DIAGRAM:
             continue
-        said = f"{rule.name} = {_text(parameter_json(block.parameter_value(rule.name)))}"
-        if word in said.lower():
-            return 3, said if len(said) <= MOST_TEXT else f"{said[: MOST_TEXT - 1]}…"
+        text_of_rule = f"{rule.name} = {_text(parameter_json(block.parameter_value(rule.name)))}"
+        if word in text_of_rule.lower():
+            return 3, text_of_rule if len(text_of_rule) <= MOST_TEXT else f"{text_of_rule[: MOST_TEXT - 1]}…"
     return _NOT, ""
 
 

@@ -49,21 +49,21 @@ class DiagramPresenter(Presenter[OpenDocument]):
         """Open the diagram of a file from outside the project."""
         return Opening([self._documents.open_bytes(data, name)])
 
-    def place(self, found: OpenDocument, wished: Place, *, known: bool) -> Place:
+    def place(self, open_file: OpenDocument, wished: Place, *, known: bool) -> Place:
         """Return the path of the sheet; the top sheet if a reconnecting page shows a deleted one."""
         try:
-            inside(found.document.diagram, wished)
+            inside(open_file.document.diagram, wished)
         except UnknownNameError:
             if known:
                 raise
             return ()
         return wished
 
-    def content(self, found: OpenDocument, place: Place) -> DiagramContent:
+    def content(self, open_file: OpenDocument, place: Place) -> DiagramContent:
         """Return the sheet at a path."""
-        diagram = found.document.diagram
+        diagram = open_file.document.diagram
         shown, linked = inside(diagram, place), linked_part(diagram, place)
-        drawn = sheet(shown, self._lines.on(found.key, place).of(shown))
+        drawn = sheet(shown, self._lines.on(open_file.key, place).of(shown))
         if linked:
             link = inside(diagram, linked).link
             drawn = drawn.model_copy(update={"linked": list(linked), "link": link})
@@ -71,34 +71,34 @@ class DiagramPresenter(Presenter[OpenDocument]):
             inside=list(place),
             sheet=drawn,
             settings=dataclasses.asdict(diagram.settings),
-            run=self._runs.of(found.key),
+            run=self._runs.of(open_file.key),
         )
 
-    def change(self, found: OpenDocument, before: Diagram, place: Place) -> DiagramChange:
+    def change(self, open_file: OpenDocument, before: Diagram, place: Place) -> DiagramChange:
         """Return the changes of the sheet at a path."""
-        diagram = found.document.diagram
-        old, new, lines = inside(before, place), inside(diagram, place), self._lines.on(found.key, place)
+        diagram = open_file.document.diagram
+        old, new, lines = inside(before, place), inside(diagram, place), self._lines.on(open_file.key, place)
         return DiagramChange(
             sheet=sheet_change(old, new, other_lines(lines.of(old), lines.of(new))),
             settings=dataclasses.asdict(diagram.settings),
         )
 
-    def shown(self, page: Page, found: OpenDocument, *, known: bool) -> None:
+    def shown(self, page: Page, open_file: OpenDocument, *, known: bool) -> None:
         """Send the page the run of the diagram, and start the background check."""
         if not known:
-            self._runs.shown(page, found.key)
-        self.changed(found)
+            self._runs.shown(page, open_file.key)
+        self.changed(open_file)
 
-    def changed(self, found: OpenDocument) -> None:
+    def changed(self, open_file: OpenDocument) -> None:
         """Start the background check after a pause in the edits; a check in progress is cancelled."""
-        if found.checking is not None:
-            found.checking.cancel()
-        found.checking = asyncio.get_running_loop().create_task(self._check(found))
+        if open_file.checking is not None:
+            open_file.checking.cancel()
+        open_file.checking = asyncio.get_running_loop().create_task(self._check(open_file))
 
-    async def _check(self, found: OpenDocument) -> None:
+    async def _check(self, open_file: OpenDocument) -> None:
         await asyncio.sleep(STILL_SECONDS)
-        diagram, version_now = found.document.diagram, found.document.version
+        diagram, version_now = open_file.document.diagram, open_file.document.version
         findings, wires = await asyncio.to_thread(check, diagram)
-        if found.document.version == version_now:
-            event = Checked(document=found.key, version=version_now, findings=findings, wires=wires)
-            await self._pages.tell_of(found.key, event)
+        if open_file.document.version == version_now:
+            event = Checked(document=open_file.key, version=version_now, findings=findings, wires=wires)
+            await self._pages.notify_showing(open_file.key, event)

@@ -13,7 +13,7 @@ from armblocks.errors import UnknownNameError
 from armblocks.studio.documents.desk import DocumentDesk
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.protocol.answers import Answers
-from armblocks.studio.protocol.messages import sheets as say
+from armblocks.studio.protocol.messages import sheets as sheet_messages
 from armblocks.studio.protocol.messages.sheet_edits import SetMask
 from armblocks.studio.protocol.page import Page
 from armblocks.studio.sheet.clipping import clipped
@@ -46,22 +46,24 @@ class SheetQueries:
 
     def register(self, answers: Answers) -> None:
         """Register the handlers of these requests."""
-        answers.on(say.Look, self._look)
-        answers.on(say.RouteWires, self._route)
-        answers.on(say.AskOutline, self._outline)
-        answers.on(say.AskMask, self._mask)
-        answers.on(say.Copy, self._copy)
-        answers.on(say.Find, self._find)
-        answers.on(say.TypedValue, self._typed_value)
-        answers.on(say.TypedSettings, self._typed_settings)
+        answers.on(sheet_messages.Look, self._look)
+        answers.on(sheet_messages.RouteWires, self._route)
+        answers.on(sheet_messages.AskOutline, self._outline)
+        answers.on(sheet_messages.AskMask, self._mask)
+        answers.on(sheet_messages.Copy, self._copy)
+        answers.on(sheet_messages.Find, self._find)
+        answers.on(sheet_messages.TypedValue, self._typed_value)
+        answers.on(sheet_messages.TypedSettings, self._typed_settings)
 
     def _sheet(self, document: str, path: Sequence[str] = ()) -> Diagram:
         return inside(self._diagrams[document].document.diagram, path)
 
-    async def _look(self, page: Page, request: say.Look) -> None:
+    async def _look(self, page: Page, request: sheet_messages.Look) -> None:
         await self._documents.show(page, self._diagrams[request.document], tuple(request.inside))
 
-    async def _route(self, _: Page, request: say.RouteWires) -> dict[str, say.WireLines]:
+    async def _route(
+        self, _: Page, request: sheet_messages.RouteWires
+    ) -> dict[str, sheet_messages.WireLines]:
         sheet = self._sheet(request.document, request.inside)
         lines = self._lines.on(request.document, tuple(request.inside))
         connections, bends = sheet.connections, sheet.bends
@@ -73,24 +75,24 @@ class SheetQueries:
         after = lines.dragged(sheet, places, connections, bends, request.passed)
         return {source: shown for source, shown in after.items() if before.get(source) != shown}
 
-    async def _outline(self, _: Page, request: say.AskOutline) -> say.Outline:
+    async def _outline(self, _: Page, request: sheet_messages.AskOutline) -> sheet_messages.Outline:
         return outline(self._sheet(request.document))
 
-    async def _mask(self, _: Page, request: say.AskMask) -> SetMask:
+    async def _mask(self, _: Page, request: sheet_messages.AskMask) -> SetMask:
         path = [*request.inside, request.block] if request.block else request.inside
         return mask_of(self._sheet(request.document, path)).model_copy(update={"block": request.block})
 
-    async def _copy(self, _: Page, request: say.Copy) -> str:
+    async def _copy(self, _: Page, request: sheet_messages.Copy) -> str:
         sheet = self._sheet(request.document, request.inside)
         return clipped(sheet, request.blocks, request.notes, self._resolve_robot, self._folder.root)
 
-    async def _find(self, _: Page, request: say.Find) -> list[say.Found]:
+    async def _find(self, _: Page, request: sheet_messages.Find) -> list[sheet_messages.Found]:
         return find(self._sheet(request.document), request.text)
 
-    async def _typed_settings(self, _: Page, request: say.TypedSettings) -> dict[str, str]:
+    async def _typed_settings(self, _: Page, request: sheet_messages.TypedSettings) -> dict[str, str]:
         return setting_faults(self._sheet(request.document).settings, request.values)
 
-    async def _typed_value(self, _: Page, request: say.TypedValue) -> Any:
+    async def _typed_value(self, _: Page, request: sheet_messages.TypedValue) -> Any:
         known, scope = BLOCKS[request.type].parameters(), dict[str, Value]()
         if request.document:
             level = self._sheet(request.document, request.inside)

@@ -1,8 +1,9 @@
-"""Where a wire may run: what blocks and the lines of other nets leave free, and what each way costs.
+"""The free space for wires between blocks and other nets, and the cost of routes in it.
 
 Hard rules keep a drawing unambiguous: a distance to blocks, and a distance between a line and the corners,
-ports, dots and parallel lines of other nets. They come in levels, from comfortable to tight; the tightest is
-what a reader can still tell apart. Costs make a drawing pleasant: short, few bends, few crossings, off names.
+ports, dots and parallel lines of other nets. ``LEVELS`` lists these distances from wide to narrow; with the
+narrowest ones lines can still be distinguished. Costs prefer short lines with few bends and few crossings,
+away from block names.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ Extent: TypeAlias = tuple[float, float, float, float]
 Piece: TypeAlias = tuple[Point, Point]
 
 RESERVED = 5.0
-"""px directly before a port that belong to its net alone."""
+"""Distance before a port that is reserved for its net, px."""
 _CROSSING = 26.0
 _BRANCH = 20.0
 _NEAR = 9.5
@@ -38,16 +39,17 @@ _BLOCK_MARGIN = 18.0
 _BLOCK_MARGIN_PRICE = 0.25
 _APPROACH = 46.0
 _APPROACH_PRICE = 4.0
-"""px before a port that other nets use only where there is no better place, and the price per px there."""
+"""Distance before a port that other nets avoid, px, and the additional cost per px there."""
 _MIDDLE_PRICE = 1 / 16
 _LITTLE = 64.0
-"""px of detour for which no better way is sought further around: a bend and a crossing."""
+"""Detour that is accepted without a search in a wider window, px: about a bend and a crossing."""
 _ON_EDGE = 1e-6
 
 
 @dataclass(frozen=True)
 class Level:
-    """Distances in px: stub of a wire at its port, to blocks, to other nets, and where lines may run."""
+    """Distances in px: length of stubs, distances to blocks and to other nets, lanes beside blocks and
+    wires."""
 
     stub: float
     clearance: float
@@ -55,14 +57,14 @@ class Level:
     block_lanes: tuple[float, ...]
     wire_lane: float
     apart: float
-    """Minimum distance of the lines of the grid."""
+    """Minimum distance of grid lines."""
     window: float
-    """How far around the ends of a wire it may run."""
+    """Margin of the search window around the ends of a wire."""
     detour: float
-    """How much longer than the best conceivable way a way may be: further around may be a better one."""
+    """Accepted relative excess over the lower bound of the cost; beyond it, the next window is searched."""
 
     def most(self, least: float) -> float:
-        """What a way may cost of which the best conceivable one costs ``least``."""
+        """The maximum accepted cost of a route whose lower bound is ``least``."""
         return least + _LITTLE + self.detour * (least + 200.0)
 
 
@@ -94,18 +96,19 @@ def meet(a: Extent, b: Extent) -> bool:
 
 
 def extents(pieces: Floats, *, at_ports: bool = False) -> list[Extent]:
-    """The areas around straight pieces in which they matter to other nets; ``at_ports``: directly before."""
+    """The areas in which segments influence other nets; ``at_ports``: segments that are reserved for
+    ports."""
     x0, y0, x1, y1 = _wider(pieces, _APPROACH if at_ports else _NEAR).T.tolist()
     return list(zip(x0, y0, x1, y1))
 
 
 def sorted_ends(pieces: Floats) -> Floats:
-    """Straight pieces (n, 4) from their upper left end to their lower right end."""
+    """Segments (n, 4) from the upper left to the lower right end."""
     return np.hstack([np.minimum(pieces[:, :2], pieces[:, 2:]), np.maximum(pieces[:, :2], pieces[:, 2:])])
 
 
-class Room:
-    """The blocks of a sheet, and the lines that are laid."""
+class FreeSpace:
+    """The blocks of a sheet, and the lines of routed nets."""
 
     def __init__(self, sides: Sequence[Sequence[float]]) -> None:
         found = np.array(sides, dtype=np.float64).reshape(-1, 8)
@@ -118,21 +121,21 @@ class Room:
         self._count = 0
 
     def extent(self, k: int) -> Extent:
-        """The area around a block in which it matters to wires."""
+        """The area around a block in which it influences routes."""
         x0, y0, x1, y1 = self._extents[k].tolist()
         return x0, y0, x1, y1
 
     def reserve(self, ends: Sequence[tuple[Floats, int]]) -> None:
-        """Take all lines away, and keep the places before the ports of every net free for it."""
+        """Remove all lines, and reserve the space before the ports of every net."""
         self._pieces = np.vstack([np.empty((0, 4)), *(pieces for pieces, _ in ends)])
         owners = [number for pieces, number in ends for _ in range(len(pieces))]
         self._owners = np.array(owners, dtype=np.int64)
         self._approaches = self._count = len(self._pieces)
 
     def lay(self, pieces: Floats, number: int) -> None:
-        """Add the pieces (n, 4) of a net, see :func:`sorted_ends`."""
+        """Add the segments (n, 4) of a net, see :func:`sorted_ends`."""
         begin, end = self._count, self._count + len(pieces)
-        while end > len(self._pieces):  # twice as much room as before
+        while end > len(self._pieces):  # double the capacity
             self._pieces = np.vstack([self._pieces, np.empty_like(self._pieces)])
             self._owners = np.hstack([self._owners, np.empty_like(self._owners)])
         self._pieces[begin:end] = pieces
@@ -169,7 +172,7 @@ def _wider(areas: Floats, margin: float) -> Floats:
 
 
 def _meets(areas: Floats, line: Floats) -> bool:
-    """Whether a straight line from its upper left end to its lower right end enters one of open areas."""
+    """Whether a line, from its upper left to its lower right end, intersects one of these open areas."""
     return bool(
         np.any(
             (areas[:, 0] < line[2])
@@ -186,7 +189,7 @@ def _sorted_line(line: Sequence[float]) -> Floats:
 
 
 class Surroundings:
-    """The blocks and foreign lines in an area, and the ways of one net through it."""
+    """The blocks and the lines of other nets in an area, and the search for routes of one net in it."""
 
     def __init__(self, extent: Extent, blocks: Floats, names: Floats, pieces: Floats, ends: Floats) -> None:
         self._extent = extent
@@ -199,20 +202,21 @@ class Surroundings:
         self._corners = np.vstack([pieces[:, [0, 1, 0, 1]], pieces[:, [2, 3, 2, 3]]])
 
     def is_legal_stub(self, line: Sequence[float], level: Level, port: Point, out: tuple[int, int]) -> bool:
-        """Whether a stub may lie at a port, which has its block behind it. A line may cross its other end."""
-        return self._is_clear(line, level, [(port, out)]) and self.may_turn(port, level)
+        """Whether a stub at a port is legal; the block of the port is ignored, and lines may cross the other
+        end."""
+        return self._is_clear(line, level, [(port, out)]) and self.may_bend(port, level)
 
     def is_legal(
         self, line: Sequence[float], level: Level, ports: Sequence[tuple[Point, tuple[int, int]]]
     ) -> bool:
-        """Whether a straight piece may lie, of which some ends are ports with their blocks behind them."""
+        """Whether a segment is legal; the blocks of the ports at its ends are ignored."""
         ends = (line[0], line[1]), (line[2], line[3])
-        return self._is_clear(line, level, ports) and all(self.may_turn(end, level) for end in ends)
+        return self._is_clear(line, level, ports) and all(self.may_bend(end, level) for end in ends)
 
     def _is_clear(
         self, line: Sequence[float], level: Level, ports: Sequence[tuple[Point, tuple[int, int]]]
     ) -> bool:
-        """Whether a straight piece only crosses other lines, and no corner of theirs is near it."""
+        """Whether a segment crosses other lines only at right angles and away from their corners."""
         piece = _sorted_line(line)
         blocks = self._blocks
         for port, out in ports:
@@ -227,18 +231,18 @@ class Surroundings:
     def is_free(
         self, line: Sequence[float], level: Level, ports: Sequence[tuple[Point, tuple[int, int]]]
     ) -> bool:
-        """Whether a straight line may lie and meets nothing, so that no other way is better."""
+        """Whether a straight line is legal and intersects nothing, so that no other route is better."""
         piece = _sorted_line(line)
         if _meets(_wider(self._names, 3.0), piece) or _meets(_wider(self._pieces, _NEAR), piece):
             return False
         return self.is_legal(line, level, ports)
 
-    def may_turn(self, point: Point, level: Level) -> bool:
-        """Whether a corner or a dot may be at a point."""
+    def may_bend(self, point: Point, level: Level) -> bool:
+        """Whether a corner or a dot at this point is legal."""
         return not _meets(_wider(self._pieces, level.gap), np.array([*point, *point]))
 
-    def way(self, source: End, start: Point, goal: Point, target: End, level: Level) -> list[Point]:
-        """The corners of the best way from the end of a source's stub to that of a target's."""
+    def path(self, source: End, start: Point, goal: Point, target: End, level: Level) -> list[Point]:
+        """The corners of the cheapest route between the stubs of the source and the target."""
         own: list[Piece] = [((source.x, source.y), start), (goal, (target.x, target.y))]
         grid = self._grid(own, [], level, (start, goal) if source.dx else None)
         begins = np.full(grid.turn.shape, np.inf)
@@ -257,9 +261,8 @@ class Surroundings:
         target: End,
         level: Level,
     ) -> list[Point]:
-        """The corners of the best way from the lines of the net itself to the end of a target's stub.
-
-        No way begins at one of the ``dots``, or near one of the ``closed`` points.
+        """The corners of the cheapest route from the lines of the net itself to a target's stub.
+        No route starts at one of the ``dots``, or near one of the ``closed`` points.
         """
         grid = self._grid([(goal, (target.x, target.y))], tree, level, None)
         on_tree = np.zeros(grid.turn.shape, dtype=np.bool_)
@@ -287,7 +290,7 @@ class Surroundings:
     def _grid(
         self, stubs: Sequence[Piece], tree: Sequence[Piece], level: Level, middle: tuple[Point, Point] | None
     ) -> Grid:
-        """The grid of an area; the ways of the net avoid its own ``stubs``, and begin on its ``tree``."""
+        """The grid of an area. Routes of the net avoid its own ``stubs`` and start on its ``tree``."""
         xs, ys = self._lines([*stubs, *tree], level, middle)
         own = np.array([_sorted_line((*a, *b)) for a, b in (*stubs, *tree)]).reshape(-1, 4)
         solid = np.array([_sorted_line((*a, *b)) for a, b in stubs]).reshape(-1, 4)
@@ -336,7 +339,7 @@ class Surroundings:
     def _edges(
         self, order: list[int], line: Floats, levels: Floats, own: Floats, solid: Floats, level: Level
     ) -> Floats:
-        """Costs of the edges along parallel lines: ``order`` takes rectangles to along and across them."""
+        """Costs of the edges of parallel grid lines; ``order`` permutes rectangles to (along, across)."""
         begin, _, low, high = order
         along = self._level if begin == 0 else self._upright
         across = self._upright if begin == 0 else self._level
@@ -360,7 +363,7 @@ class Surroundings:
 
 
 def _thicker(areas: Floats, margin: float, axis: int, other: float | None = None) -> Floats:
-    """Areas wider along one axis: by ``margin`` below, and as much, or ``other``, above."""
+    """Areas enlarged along one axis: by ``margin`` below, by ``other`` (by default ``margin``) above."""
     found = areas.copy()
     found[:, axis] -= margin
     found[:, axis + 2] += margin if other is None else other
@@ -368,7 +371,7 @@ def _thicker(areas: Floats, margin: float, axis: int, other: float | None = None
 
 
 def _least(source: End, start: Point, goal: Point, target: End) -> float:
-    """What a way costs at least, whatever is there."""
+    """The lower bound of the cost of a route: its cost without obstacles."""
     across, down = abs(goal[0] - start[0]), abs(goal[1] - start[1])
     if (source.dx != 0) != (target.dx != 0):
         return across + down + BEND
@@ -376,7 +379,7 @@ def _least(source: End, start: Point, goal: Point, target: End) -> float:
 
 
 def _owns(blocks: Floats, port: Point, out: tuple[int, int]) -> Truths:
-    """The block of a port: the one whose side the port is on. None where blocks lie on each other there."""
+    """The block that has a port on its side; no block if several overlap there."""
     (x, y), (dx, dy) = port, out
     edge = blocks[:, (0 if dx < 0 else 2) if dx else (1 if dy < 0 else 3)]
     beside = (blocks[:, 1] <= y) & (y <= blocks[:, 3]) if dx else (blocks[:, 0] <= x) & (x <= blocks[:, 2])

@@ -21,13 +21,14 @@ def tape_of(traced: TracedFunction) -> Tape:
     return tape_from(traced)
 
 
-def keep_tape(tape: Tape) -> None:
-    """Put a tape on disk under its digest."""
+def store_tape(tape: Tape) -> None:
+    """Store a tape in the disk cache under its digest."""
     cache.store(_name(tape.digest), tape.to_bytes())
 
 
-def kept_tape(digest: str, trace: Callable[[], TracedFunction]) -> Tape:
-    """The tape of that digest from disk; if it is absent or damaged, it is recomputed with ``trace()``."""
+def cached_tape(digest: str, trace: Callable[[], TracedFunction]) -> Tape:
+    """The tape with this digest from the disk cache; a missing or damaged one is recomputed with
+    ``trace()``."""
     stored = cache.load(_name(digest))
     if stored is not None:
         try:

@@ -7,14 +7,14 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from armblocks.compiler import cache
-from armblocks.compiler.kept import keep_tape, kept_tape, slots_from_json, slots_to_json, tape_of
+from armblocks.compiler.cached_tapes import cached_tape, slots_from_json, slots_to_json, store_tape, tape_of
 from armblocks.compiler.kernel import Kernel
 
 if TYPE_CHECKING:
     from armblocks.equations import TracedFunction
 
 
-def recall(key: str, trace: Callable[[], TracedFunction]) -> Kernel:
+def cached_kernel(key: str, trace: Callable[[], TracedFunction]) -> Kernel:
     """The kernel of the equations that ``key`` identifies.
 
     ``key`` must cover everything that the equations depend on (their kind, and all numbers traced into them);
@@ -27,7 +27,7 @@ def recall(key: str, trace: Callable[[], TracedFunction]) -> Kernel:
     if kernel is None:
         traced = trace()
         tape = tape_of(traced)
-        keep_tape(tape)
+        store_tape(tape)
         cache.store(name, _write(traced, tape.digest))
         kernel = Kernel(traced.name, traced.inputs, traced.outputs, tape.digest, lambda: tape)
     return kernel
@@ -50,4 +50,4 @@ def _read(data: bytes, key: str, trace: Callable[[], TracedFunction]) -> Kernel 
         name, digest = str(record["name"]), str(record["tape"])
     except (ValueError, KeyError, TypeError):
         return None
-    return Kernel(name, inputs, outputs, digest, lambda: kept_tape(digest, trace))
+    return Kernel(name, inputs, outputs, digest, lambda: cached_tape(digest, trace))
