@@ -13,8 +13,8 @@ export class Refusal extends Error {
   }
 }
 
-/** `up`; `down`: no reply; `stranger`: the server replies but does not accept the session of this page. */
-export type Line = 'up' | 'down' | 'stranger'
+/** `up`; `down`: no reply; `rejected`: the server replies but does not accept the session of this page. */
+export type Line = 'up' | 'down' | 'rejected'
 
 interface Waiting {
   request: Request
@@ -82,7 +82,7 @@ export class Connection {
       if (this.socket !== socket) return
       this.flowing = false
       this.forget('attach')
-      void strange().then((stranger) => this.onLine(stranger ? 'stranger' : 'down'))
+      void isRejected().then((rejected) => this.onLine(rejected ? 'rejected' : 'down'))
       setTimeout(() => this.connect(), this.delay)
       this.delay = Math.min(2 * this.delay, LONGEST_DELAY_MS)
     }
@@ -149,8 +149,8 @@ export class Connection {
   }
 }
 
-/** Whether the server replies but rejects this page: it was restarted with a new login. */
-async function strange(): Promise<boolean> {
+/** Whether the server replies but rejects this page because it was restarted with a new login. */
+async function isRejected(): Promise<boolean> {
   try {
     const answer = await fetch(new URL('index.html', location.href), { method: 'HEAD', cache: 'no-store' })
     return answer.status === 401

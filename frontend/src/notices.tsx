@@ -17,7 +17,7 @@ export function Notices() {
           the same folder.
         </Alert>
       )}
-      {started && line === 'stranger' && (
+      {started && line === 'rejected' && (
         <Alert
           color="orange"
           icon={<IconAlertTriangle />}

@@ -36,7 +36,7 @@ function spot(place: Panel['place']) {
   return side === 'below' ? { position, initialHeight: size } : { position, initialWidth: size }
 }
 
-/** A panel that is rendered when it is first visible, so that hidden panels cost nothing. */
+/** A panel that is rendered when it is first visible, hidden panels are not rendered. */
 export function inFront(Part: ComponentType): Body {
   return function Panel({ api }) {
     const [seen, setSeen] = useState(api.isVisible)

@@ -93,7 +93,7 @@ def test_every_operation_and_store_is_in_one_piece_of_limited_length() -> None:
     for piece in done.pieces:
         assert piece.last - piece.first + ACCESS_WEIGHT * len(piece.stores) <= 2 * LENGTH
     # Storage is reused: the last 300 values are in use, not all 1500.
-    assert done.room < 2 * BACK + LENGTH
+    assert done.size < 2 * BACK + LENGTH
 
 
 @pytest.mark.parametrize("effort", ["LONG", "VERY_LONG"])

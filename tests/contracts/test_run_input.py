@@ -83,7 +83,7 @@ def test_a_stop_time_before_the_initial_state_is_refused() -> None:
     for stop in (0.5, 1.0):
         with pytest.raises(ArmblocksError) as refused:
             ab.simulate(ramp(), stop_time=stop, initial_state=state)
-        assert "the run goes on from 1 s" in message(refused.value)
+        assert "the run continues from 1 s" in message(refused.value)
 
 
 def test_an_initial_state_of_another_diagram_is_refused() -> None:

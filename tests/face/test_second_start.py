@@ -40,7 +40,7 @@ def test_a_second_start_of_a_shipped_model_does_not_trace(
         assert np.asarray(second[path]).tobytes() == np.asarray(first[path]).tobytes()
     longer = 1.25 * float(first.time[-1])
     resumed = ab.simulate(ab.load_diagram(name), initial_state=first.final_state, stop_time=longer)
-    assert "exactly as the run before" in resumed.run.reason
+    assert "exactly as the previous run" in resumed.run.reason
 
 
 def made(factor: float) -> Callable[[Any], Any]:

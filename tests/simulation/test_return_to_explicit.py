@@ -77,7 +77,7 @@ def test_an_interrupted_run_returns_at_the_same_step(cuts: list[float], tmp_path
         state.save(tmp_path / "state")
         state = RunState.load(tmp_path / "state")
     rest = run("auto", STOP, state)
-    assert "exactly as the run before" in rest.run.reason
+    assert "exactly as the previous run" in rest.run.reason
     same = np.isin(whole.time, rest.time)
     assert same.sum() > 50
     assert rest.signals[:, np.isin(rest.time, whole.time)].tobytes() == whole.signals[:, same].tobytes()

@@ -24,7 +24,7 @@ from armblocks.integration.system import CompiledSystem, compile_system
 from armblocks.simulation import RunState, simulate
 
 
-def event_right_after_the_start() -> Diagram:
+def event_just_after_the_start() -> Diagram:
     """A mass is accelerated from height 0; once the height is positive, a subsystem sets the force to 0."""
     inside = DiagramBuilder("inside")
     inside.add("push", Outport(port=1, initial=1.0), inside.add("none", Constant(value=0.0)))
@@ -36,7 +36,7 @@ def event_right_after_the_start() -> Diagram:
 
 
 SYSTEMS = {
-    "pushed": compile_system(trace_diagram(event_right_after_the_start())),
+    "pushed": compile_system(trace_diagram(event_just_after_the_start())),
     "van_der_pol": compile_system(van_der_pol_pid()),
     "ball": compile_system(bouncing_ball(0.9)),
     "sampled": compile_system(sampled_loop(0.3)),
@@ -67,7 +67,7 @@ def test_an_interrupted_run_equals_an_uninterrupted_one_bit_for_bit(
             part.final_state.save(tmp_path / "state")
             state = RunState.load(tmp_path / "state")
         rest = simulate(system, options(4.0), initial_state=state)
-        assert "exactly as the run before" in rest.run.reason
+        assert "exactly as the previous run" in rest.run.reason
         assert rest.time[0] == cuts[-1]
         same = np.isin(rest.time, whole.time)
         assert same.sum() >= 14
@@ -77,7 +77,7 @@ def test_an_interrupted_run_equals_an_uninterrupted_one_bit_for_bit(
         assert rest.final_state.states.tobytes() == whole.final_state.states.tobytes()
 
 
-def test_a_run_continues_from_a_step_whose_end_is_rounded_beside_the_stop_time() -> None:
+def test_a_run_continues_from_a_step_that_ends_at_the_stop_time_to_rounding() -> None:
     """Steps of 0.1 s end at times such as 0.9999999999999999 s, which count as the time of a sample."""
     builder = DiagramBuilder("falling")
     push = builder.add("push", Constant())
@@ -113,7 +113,7 @@ def test_a_run_with_other_settings_restarts_from_the_values() -> None:
     result = simulate(
         SYSTEMS["sampled"], SimulationOptions(stop_time=2.0, solver="dop853"), initial_state=state
     )
-    assert "started anew" in result.run.reason
+    assert "with a restart of the solver" in result.run.reason
     assert result["plant/x"][0] == state.states[0]
     assert result["plant/x"][-1] == pytest.approx(0.7**6 * (1 - 0.2), rel=1e-12)
 
@@ -133,14 +133,14 @@ def test_a_state_of_another_diagram_or_with_nan_is_refused() -> None:
 
 
 def test_a_stop_time_before_the_time_of_the_state_is_refused() -> None:
-    with pytest.raises(InputError, match=r"stop_time is 0\.5 s, and the run goes on from 1 s"):
+    with pytest.raises(InputError, match=r"stop_time is 0\.5 s, and the run continues from 1 s"):
         simulate(SYSTEMS["sampled"], SimulationOptions(stop_time=0.5), initial_state=first_second())
 
 
 @pytest.mark.parametrize("content", [b"", b"PK", b"not a state at all", b"\x93NUMPY"])
 def test_a_file_that_is_not_a_state_is_refused(content: bytes, tmp_path: Path) -> None:
     (tmp_path / "state").write_bytes(content)
-    with pytest.raises(FormatError, match="this file holds no state of a run"):
+    with pytest.raises(FormatError, match="this file contains no run state"):
         RunState.load(tmp_path / "state")
 
 
@@ -148,6 +148,6 @@ def test_a_run_with_changed_parameters_restarts_from_the_values() -> None:
     system = compile_system(oscillator())
     state = first_second(system)
     result = simulate(system, SimulationOptions(stop_time=2.0), {"mass.omega": 3.0}, initial_state=state)
-    assert "started anew" in result.run.reason
+    assert "with a restart of the solver" in result.run.reason
     expected = np.cos(2.0) * np.cos(3.0) - 2.0 * np.sin(2.0) / 3.0 * np.sin(3.0)
     assert result["mass/x"][-1] == pytest.approx(expected, abs=1e-5)

@@ -197,10 +197,10 @@ def test_an_interrupted_automatic_run_gives_the_same_bits(cuts: list[float], tmp
         state.save(tmp_path / "state")
         state = RunState.load(tmp_path / "state")
     rest = simulate(STIFF_LAG, options(1.0), initial_state=state)
-    assert "exactly as the run before" in rest.run.reason
+    assert "exactly as the previous run" in rest.run.reason
     if cuts[-1] > 0.03:
         assert rest.run.solver == "rodas5p"
-        assert "as the run before found the system stiff" in rest.run.reason
+        assert "because the previous run found the system stiff" in rest.run.reason
     same = np.isin(whole.time, rest.time)
     assert same.sum() > 700
     assert rest.signals[:, np.isin(rest.time, whole.time)].tobytes() == whole.signals[:, same].tobytes()

@@ -289,7 +289,7 @@ def test_a_continued_run_uses_the_saved_history(tmp_path: Path) -> None:
         assert rest["x/y"][rest.time > 3.75].tolist() == whole["x/y"][after].tolist()
         other = SimulationOptions(stop_time=8.0, sample_time=0.1, solver="dop853", rtol=1e-9, atol=1e-11)
         anew = simulate(compiled, other, initial_state=state)
-        assert "started anew" in anew.run.reason
+        assert "with a restart of the solver" in anew.run.reason
         close(anew["x/y"][anew.time > 3.75], whole["x/y"][after], 1e-6)
 
 

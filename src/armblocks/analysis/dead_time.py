@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.equations.evaluation import EvaluatedSystem, Point, Slopes
+from armblocks.equations.evaluation import EvaluatedSystem, Jacobians, Point
 
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]
@@ -59,7 +59,7 @@ class DeadTime:
     places: Places
     names: tuple[str, ...]
     delays: Array
-    inputs: Slopes
+    inputs: Jacobians
 
     @property
     def count(self) -> int:
@@ -72,7 +72,9 @@ class DeadTime:
         return self.inputs.z[:, self.places]
 
 
-def dead_time(evaluated: EvaluatedSystem, point: Point, inputs: Slopes, readers: list[Slopes]) -> DeadTime:
+def dead_time(
+    evaluated: EvaluatedSystem, point: Point, inputs: Jacobians, readers: list[Jacobians]
+) -> DeadTime:
     """The delays that ``readers`` depend on, directly or through other delays; ``inputs``: derivatives of
     their inputs."""
     system = evaluated.system
@@ -84,7 +86,9 @@ def dead_time(evaluated: EvaluatedSystem, point: Point, inputs: Slopes, readers:
     for _ in range(places.size):
         read = read | inputs.z[np.ix_(np.flatnonzero(read), places)].any(axis=0)
     kept: Places = np.flatnonzero(read)
-    chosen = Slopes(t=inputs.t[kept], x=inputs.x[kept], z=inputs.z[kept], w=inputs.w[kept], p=inputs.p[kept])
+    chosen = Jacobians(
+        t=inputs.t[kept], x=inputs.x[kept], z=inputs.z[kept], w=inputs.w[kept], p=inputs.p[kept]
+    )
     kept_places = places[kept]
     return DeadTime(
         places=kept_places,
@@ -114,7 +118,7 @@ class Approximated:
         self.names = tuple(f"{name} pade[{k}]" for name in dead.names for k in range(order))
         went_in = self(given)
         rate = np.hstack([np.zeros((size, given.x.shape[1])), P]) + R @ went_in.x
-        self.rates = Slopes(
+        self.rates = Jacobians(
             t=np.zeros((size, 1)), x=rate, z=R @ went_in.z, w=np.zeros((size, 0)), p=R @ went_in.p
         )
 
@@ -124,22 +128,22 @@ class Approximated:
         others[:, self.dead.places] = 0.0
         return others
 
-    def __call__(self, slopes: Slopes) -> Slopes:
+    def __call__(self, j: Jacobians) -> Jacobians:
         """The derivatives with the approximations in place of delayed values."""
-        late = slopes.z[:, self.dead.places]
-        wider = np.hstack([slopes.x, np.zeros((slopes.x.shape[0], self.by_x.shape[1] - slopes.x.shape[1]))])
-        return Slopes(
-            t=slopes.t,
+        late = j.z[:, self.dead.places]
+        wider = np.hstack([j.x, np.zeros((j.x.shape[0], self.by_x.shape[1] - j.x.shape[1]))])
+        return Jacobians(
+            t=j.t,
             x=wider + late @ self.by_x,
-            z=self._others(slopes.z) + late @ self.by_z,
-            w=slopes.w,
-            p=slopes.p + late @ self.by_p,
+            z=self._others(j.z) + late @ self.by_z,
+            w=j.w,
+            p=j.p + late @ self.by_p,
         )
 
-    def flow(self, slopes: Slopes) -> Slopes:
+    def flow(self, j: Jacobians) -> Jacobians:
         """The derivatives of ``[x'; q']``."""
-        own, rates = self(slopes), self.rates
-        return Slopes(
+        own, rates = self(j), self.rates
+        return Jacobians(
             t=np.vstack([own.t, rates.t]),
             x=np.vstack([own.x, rates.x]),
             z=np.vstack([own.z, rates.z]),

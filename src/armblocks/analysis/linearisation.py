@@ -25,7 +25,7 @@ from armblocks.analysis.linear_system import LinearSystem
 from armblocks.analysis.operating_point import OperatingPoint
 from armblocks.equations import HybridSystem, Signature
 from armblocks.equations.clock_ratios import common_period, exact_clocks
-from armblocks.equations.evaluation import EvaluatedSystem, Point, Slopes
+from armblocks.equations.evaluation import EvaluatedSystem, Jacobians, Point
 from armblocks.errors import InputError, SimulationError, UnknownNameError
 from armblocks.extras import from_extra
 
@@ -64,14 +64,14 @@ def linearise(
     """
     system = evaluated.system
     unknowns = _unknowns(evaluated, point)
-    flow, seen = _slopes(evaluated, point, unknowns, ends)
+    flow, seen = _jacobians(evaluated, point, unknowns, ends)
     names, units = _elements(system.states)
 
-    def ticked(ticking: tuple[int, ...]) -> Slopes:
+    def ticked(ticking: tuple[int, ...]) -> Jacobians:
         """The derivatives of ``z`` after a tick by the values before the tick."""
-        slopes = _without(evaluated.update_slopes(point, np.array(ticking, dtype=np.float64)), unknowns)
-        _check_finite(system, _elements(system.discrete)[0], slopes, "the discrete variable")
-        return late(slopes) if late else slopes
+        jacobians = _without(evaluated.update_jacobians(point, np.array(ticking, dtype=np.float64)), unknowns)
+        _check_finite(system, _elements(system.discrete)[0], jacobians, "the discrete variable")
+        return late(jacobians) if late else jacobians
 
     late = _approximated(evaluated, point, unknowns, [flow, seen], delay_order)
     if late:
@@ -123,8 +123,8 @@ def exact_response(evaluated: EvaluatedSystem, point: Point, ends: Ends, frequen
             fix="linearize with a delay_order, and use the frequency_response of the result",
         )
     unknowns = _unknowns(evaluated, point)
-    flow, seen = _slopes(evaluated, point, unknowns, ends)
-    inputs = _without(evaluated.delay_input_slopes(point), unknowns)
+    flow, seen = _jacobians(evaluated, point, unknowns, ends)
+    inputs = _without(evaluated.delay_input_jacobians(point), unknowns)
     dead = dead_time(evaluated, point, inputs, [flow, seen])
     opened = LinearSystem(
         flow.x,
@@ -145,12 +145,12 @@ def exact_response(evaluated: EvaluatedSystem, point: Point, ends: Ends, frequen
     return np.asarray(opened[:, :ny, :nu] + opened[:, :ny, nu:] @ v, dtype=np.complex128)
 
 
-def _slopes(
-    evaluated: EvaluatedSystem, point: Point, unknowns: Slopes | None, ends: Ends
-) -> tuple[Slopes, Slopes]:
+def _jacobians(
+    evaluated: EvaluatedSystem, point: Point, unknowns: Jacobians | None, ends: Ends
+) -> tuple[Jacobians, Jacobians]:
     """The derivatives of the flow and of the outputs. Raises an error if one is not finite."""
-    flow = _without(evaluated.derivative_slopes(point), unknowns)
-    seen = _without(evaluated.signal_slopes(point), unknowns)
+    flow = _without(evaluated.derivative_jacobians(point), unknowns)
+    seen = _without(evaluated.signal_jacobians(point), unknowns)
     _check_finite(evaluated.system, _elements(evaluated.system.states)[0], flow, "the rate of state")
     _check_finite(evaluated.system, ends.outputs, seen, "the output")
     return flow, seen
@@ -159,8 +159,8 @@ def _slopes(
 def _approximated(
     evaluated: EvaluatedSystem,
     point: Point,
-    unknowns: Slopes | None,
-    readers: list[Slopes],
+    unknowns: Jacobians | None,
+    readers: list[Jacobians],
     order: int | None,
 ) -> Approximated | None:
     """The approximation of the dead time, or ``None`` without dead time."""
@@ -181,11 +181,11 @@ def _approximated(
             allowed=f"an integer from 1 to {HIGHEST_ORDER}",
             fix="3 is a good start",
         )
-    everybody = [*readers]
+    all_readers = [*readers]
     if system.clocks:
-        everybody.append(_without(evaluated.update_slopes(point, np.ones(len(system.clocks))), unknowns))
-    inputs = _without(evaluated.delay_input_slopes(point), unknowns)
-    return Approximated(dead_time(evaluated, point, inputs, everybody), order)
+        all_readers.append(_without(evaluated.update_jacobians(point, np.ones(len(system.clocks))), unknowns))
+    inputs = _without(evaluated.delay_input_jacobians(point), unknowns)
+    return Approximated(dead_time(evaluated, point, inputs, all_readers), order)
 
 
 def _is_order(given: object) -> bool:
@@ -204,14 +204,14 @@ def _elements(layout: Signature) -> tuple[tuple[str, ...], tuple[str, ...]]:
     return tuple(name for name, _ in pairs), tuple(unit for _, unit in pairs)
 
 
-def _unknowns(evaluated: EvaluatedSystem, point: Point) -> Slopes | None:
+def _unknowns(evaluated: EvaluatedSystem, point: Point) -> Jacobians | None:
     """The derivatives of the unknowns of the implicit equations by all other variables; ``None`` without
     unknowns."""
     system = evaluated.system
     if not system.algebraic.size:
         return None
-    slopes = evaluated.residual_slopes(point)
-    matrix = slopes.w
+    j = evaluated.residual_jacobians(point)
+    matrix = j.w
     if not np.isfinite(matrix).all() or np.linalg.cond(matrix) > 1e14:
         raise SimulationError(
             f"the implicit equations of '{', '.join(system.algebraic.names)}' are singular at this point",
@@ -223,25 +223,25 @@ def _unknowns(evaluated: EvaluatedSystem, point: Point) -> Slopes | None:
     def follow(right: Array) -> Array:
         return np.asarray(-np.linalg.solve(matrix, right), dtype=np.float64)
 
-    return Slopes(t=follow(slopes.t), x=follow(slopes.x), z=follow(slopes.z), w=matrix, p=follow(slopes.p))
+    return Jacobians(t=follow(j.t), x=follow(j.x), z=follow(j.z), w=matrix, p=follow(j.p))
 
 
-def _without(slopes: Slopes, unknowns: Slopes | None) -> Slopes:
+def _without(j: Jacobians, unknowns: Jacobians | None) -> Jacobians:
     """Total derivatives, with the implicit unknowns eliminated."""
     if unknowns is None:
-        return slopes
-    return Slopes(
-        t=slopes.t + slopes.w @ unknowns.t,
-        x=slopes.x + slopes.w @ unknowns.x,
-        z=slopes.z + slopes.w @ unknowns.z,
-        w=slopes.w,
-        p=slopes.p + slopes.w @ unknowns.p,
+        return j
+    return Jacobians(
+        t=j.t + j.w @ unknowns.t,
+        x=j.x + j.w @ unknowns.x,
+        z=j.z + j.w @ unknowns.z,
+        w=j.w,
+        p=j.p + j.w @ unknowns.p,
     )
 
 
-def _check_finite(system: HybridSystem, names: Sequence[str], slopes: Slopes, what: str) -> None:
+def _check_finite(system: HybridSystem, names: Sequence[str], j: Jacobians, what: str) -> None:
     for row, name in enumerate(names):
-        if not all(np.isfinite(part[row]).all() for part in (slopes.x, slopes.z, slopes.p)):
+        if not all(np.isfinite(part[row]).all() for part in (j.x, j.z, j.p)):
             raise SimulationError(
                 f"the derivative of {what} '{name}' is not finite",
                 where=system.name,
@@ -252,9 +252,9 @@ def _check_finite(system: HybridSystem, names: Sequence[str], slopes: Slopes, wh
 
 def _over_a_period(
     system: HybridSystem,
-    ticked: Callable[[tuple[int, ...]], Slopes],
-    flow: Slopes,
-    seen: Slopes,
+    ticked: Callable[[tuple[int, ...]], Jacobians],
+    flow: Jacobians,
+    seen: Jacobians,
     moved: NDArray[np.intp],
 ) -> tuple[tuple[Array, Array, Array, Array], float]:
     """The map of ``[x; z]`` over one period, and the output right after its first tick."""
@@ -272,9 +272,9 @@ def _over_a_period(
     times = [time for time, _ in instants]
     for index, (time, ticking) in enumerate(instants):
         if ticking not in ticks:
-            slopes = ticked(ticking)
+            j = ticked(ticking)
             jump = np.eye(n + m + k)
-            jump[n : n + m] = np.hstack([slopes.x[moved], slopes.z[np.ix_(moved, moved)], slopes.p[moved]])
+            jump[n : n + m] = np.hstack([j.x[moved], j.z[np.ix_(moved, moved)], j.p[moved]])
             ticks[ticking] = jump
         whole = ticks[ticking] @ whole
         if index == 0:

@@ -65,7 +65,7 @@ def initial_point(evaluated: EvaluatedSystem, p: Array) -> Point:
         z = evaluated.update(point, ticking)
         point = solved(evaluated, Point(t=0.0, x=x, z=z, w=point.w, p=p))
     if system.discrete.size:
-        z = evaluated.settled(point)
+        z = evaluated.consistent_modes(point)
         point = solved(evaluated, Point(t=0.0, x=x, z=z, w=point.w, p=p))
     return point
 
@@ -122,8 +122,8 @@ def solved(evaluated: EvaluatedSystem, point: Point) -> Point:
 
     residual = evaluated.residual(point)
     for _ in range(MOST_ITERATIONS):
-        slopes = evaluated.residual_slopes(at(w)).w
-        step = np.linalg.lstsq(slopes, -residual, rcond=None)[0]
+        jacobian = evaluated.residual_jacobians(at(w)).w
+        step = np.linalg.lstsq(jacobian, -residual, rcond=None)[0]
         if np.isfinite(step).all() and np.abs(step).max() <= 1e-14 * max(1.0, float(np.abs(w).max())):
             w = w + step
             break

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from armblocks.analysis.operating_point import OperatingPoint, operating_point, solved
 from armblocks.equations import HybridSystem, Signature
-from armblocks.equations.evaluation import EvaluatedSystem, Point, Slopes
+from armblocks.equations.evaluation import EvaluatedSystem, Jacobians, Point
 from armblocks.errors import SimulationError
 
 Array = NDArray[np.float64]
@@ -101,22 +101,22 @@ def trim_system(problem: TrimProblem) -> TrimResult:
     """Solve a problem. Raises ``SimulationError`` if there is no equilibrium; ``partial`` is the last
     point."""
     search = _Search(problem)
-    point, iterations, chasing = _modes_afterwards(search)
-    if chasing or not search.rests(point):
-        other, used = search.run(problem.start, settling=True)
+    point, iterations, inconsistent = _modes_afterwards(search)
+    if inconsistent or not search.is_solution(point):
+        other, used = search.run(problem.start, update_modes=True)
         iterations += used
-        if search.rests(other) and not search.unsettled(other):
-            point, chasing = other, []
+        if search.is_solution(other) and not search.inconsistent_modes(other):
+            point, inconsistent = other, []
     result = search.result(point, iterations)
-    if chasing:
+    if inconsistent:
         raise SimulationError(
-            f"the modes {', '.join(chasing[:NAMED])} remain inconsistent",
+            f"the modes {', '.join(inconsistent[:NAMED])} remain inconsistent",
             where=problem.system.name,
             allowed="an operating point inside one piece of every switching block",
             fix="start from a point on the intended side, or change the limits",
             partial=result,
         )
-    if not search.rests(point):
+    if not search.is_solution(point):
         raise _failure(problem, search, point, result)
     return result
 
@@ -129,10 +129,10 @@ def _modes_afterwards(search: _Search) -> tuple[Point, int, list[str]]:
     while True:
         point, used = search.run(point)
         iterations += used
-        moving = search.unsettled(point)
-        z = search.settled(point)
-        if not moving or z.tobytes() in seen or len(seen) == MOST_MODES:
-            return point, iterations, moving
+        changing = search.inconsistent_modes(point)
+        z = search.consistent_modes(point)
+        if not changing or z.tobytes() in seen or len(seen) == MOST_MODES:
+            return point, iterations, changing
         seen.append(point.z.tobytes())
         point = dataclasses.replace(point, z=z)
 
@@ -203,32 +203,32 @@ class _Search:
         parts += [evaluated.residual(point), evaluated.signals(point) - problem.targets]
         return np.concatenate(parts)
 
-    def _slope_blocks(self, point: Point) -> list[tuple[Slopes, Places, Places]]:
+    def _jacobian_rows(self, point: Point) -> list[tuple[Jacobians, Places, Places]]:
         """Derivatives of the equations in their order: the derivatives, the selected rows, and for each row
         the index of the entry of z that the equation subtracts."""
         problem, evaluated = self.problem, self.evaluated
-        flow = evaluated.derivative_slopes(point)
-        nobody = np.zeros(0, dtype=np.intp)
-        blocks = [(flow, problem.resting, nobody)]
+        flow = evaluated.derivative_jacobians(point)
+        none = np.zeros(0, dtype=np.intp)
+        blocks = [(flow, problem.resting, none)]
         if self.ticked.size:
-            blocks.append((evaluated.update_slopes(point, self.ticking), self.ticked, self.ticked))
+            blocks.append((evaluated.update_jacobians(point, self.ticking), self.ticked, self.ticked))
         if self.delayed.size:
-            going_in = evaluated.delay_input_slopes(point)
-            blocks.append((going_in, np.arange(self.delayed.size), self.delayed))
-        blocks.append((evaluated.residual_slopes(point), np.arange(point.w.size), nobody))
-        blocks.append((evaluated.signal_slopes(point), np.arange(problem.rows.size), nobody))
+            input_jacobians = evaluated.delay_input_jacobians(point)
+            blocks.append((input_jacobians, np.arange(self.delayed.size), self.delayed))
+        blocks.append((evaluated.residual_jacobians(point), np.arange(point.w.size), none))
+        blocks.append((evaluated.signal_jacobians(point), np.arange(problem.rows.size), none))
         return blocks
 
-    def slopes(self, point: Point) -> Array:
+    def jacobian(self, point: Point) -> Array:
         """Derivatives of the equations by the unknowns."""
         problem = self.problem
         rows: list[Array] = []
-        for slopes, chosen, taken_off in self._slope_blocks(point):
-            by_z = slopes.z[np.ix_(chosen, self.moved)]
-            if taken_off.size:
-                by_z = by_z - (taken_off[:, None] == self.moved)
-            by_x = slopes.x[np.ix_(chosen, problem.free_states)]
-            rows.append(np.hstack([by_x, by_z, slopes.w[chosen], slopes.p[chosen]]))
+        for j, chosen, subtracted in self._jacobian_rows(point):
+            by_z = j.z[np.ix_(chosen, self.moved)]
+            if subtracted.size:
+                by_z = by_z - (subtracted[:, None] == self.moved)
+            by_x = j.x[np.ix_(chosen, problem.free_states)]
+            rows.append(np.hstack([by_x, by_z, j.w[chosen], j.p[chosen]]))
         return np.vstack(rows)
 
     def errors(self, point: Point) -> Array:
@@ -238,60 +238,62 @@ class _Search:
         equation and its residual, multiplied by the inverse Jacobian, bound the error of the unknowns (Golub
         and Van Loan, Matrix Computations, 4th ed., 2.6).
         """
-        matrix = self.slopes(point)
+        matrix = self.jacobian(point)
         if not np.isfinite(matrix).all():  # the search has failed
             return np.zeros(len(self.unknowns))
         free = point.p[self.problem.free_parameters]
         sizes: list[Array] = []
-        for slopes, chosen, taken_off in self._slope_blocks(point):
-            terms = np.abs(slopes.x[chosen]) @ np.abs(point.x) + np.abs(slopes.z[chosen]) @ np.abs(point.z)
-            terms += np.abs(slopes.w[chosen]) @ np.abs(point.w) + np.abs(slopes.p[chosen]) @ np.abs(free)
-            if taken_off.size:
-                terms += np.abs(point.z[taken_off])
+        for j, chosen, subtracted in self._jacobian_rows(point):
+            terms = np.abs(j.x[chosen]) @ np.abs(point.x) + np.abs(j.z[chosen]) @ np.abs(point.z)
+            terms += np.abs(j.w[chosen]) @ np.abs(point.w) + np.abs(j.p[chosen]) @ np.abs(free)
+            if subtracted.size:
+                terms += np.abs(point.z[subtracted])
             sizes.append(terms)
         equations = ROUNDOFFS * np.concatenate(sizes) + np.abs(self.residuals(point))
         return np.abs(np.linalg.pinv(matrix)) @ equations
 
-    def rests(self, point: Point) -> bool:
+    def is_solution(self, point: Point) -> bool:
         """Whether every equation holds to the tolerance."""
         residuals = self.residuals(point)
         return bool(
             np.isfinite(residuals).all() and np.abs(residuals).max(initial=0.0) <= self.problem.tolerance
         )
 
-    def settled(self, point: Point) -> Array:
+    def consistent_modes(self, point: Point) -> Array:
         """``z`` with consistent modes; the entries that clocks update are unchanged."""
         if not point.z.size:
             return point.z
-        return np.where(self.sampled, point.z, self.whole.settled(point))
+        return np.where(self.sampled, point.z, self.whole.consistent_modes(point))
 
-    def unsettled(self, point: Point) -> list[str]:
+    def inconsistent_modes(self, point: Point) -> list[str]:
         """The inconsistent modes at a point."""
         names = _elements(self.problem.system.discrete)
-        return [names[k] for k in np.flatnonzero(self.settled(point) != point.z).tolist()]
+        return [names[k] for k in np.flatnonzero(self.consistent_modes(point) != point.z).tolist()]
 
-    def run(self, start: Point, *, settling: bool = False) -> tuple[Point, int]:
-        """Take damped steps until they no longer reduce the residuals; ``settling``: update the modes at each
-        trial."""
+    def run(self, start: Point, *, update_modes: bool = False) -> tuple[Point, int]:
+        """Take damped steps until they no longer reduce the residuals.
+
+        ``update_modes``: update the modes at each trial.
+        """
         point = self.spread(np.clip(self.gathered(start), self.lower, self.upper), start)
-        if settling:
-            point = dataclasses.replace(point, z=self.settled(point))
+        if update_modes:
+            point = dataclasses.replace(point, z=self.consistent_modes(point))
         residuals = self.residuals(point)
         damping, scale = 1e-3, np.zeros(len(self.unknowns))
         for iteration in range(MOST_ITERATIONS):
             if float(np.abs(residuals).max(initial=0.0)) <= 1e-6 * self.problem.tolerance:
                 return point, iteration
-            slopes = self.slopes(point)
-            if not np.isfinite(slopes).all() or not np.isfinite(residuals).all():
+            jacobian = self.jacobian(point)
+            if not np.isfinite(jacobian).all() or not np.isfinite(residuals).all():
                 return point, iteration
-            scale = np.maximum(scale, np.linalg.norm(slopes, axis=0))
+            scale = np.maximum(scale, np.linalg.norm(jacobian, axis=0))
             while True:
                 if damping > 1e12:
                     return point, iteration
-                step = self._step(point, slopes, residuals, damping, scale)
+                step = self._step(point, jacobian, residuals, damping, scale)
                 trial = self.spread(self.gathered(point) + step, point)
-                if settling:
-                    trial = dataclasses.replace(trial, z=self.settled(trial))
+                if update_modes:
+                    trial = dataclasses.replace(trial, z=self.consistent_modes(trial))
                 left = self.residuals(trial)
                 if np.isfinite(left).all() and np.linalg.norm(left) < np.linalg.norm(residuals):
                     break
@@ -299,16 +301,18 @@ class _Search:
             point, residuals, damping = trial, left, max(damping / 30.0, 1e-18)
         return point, MOST_ITERATIONS
 
-    def _step(self, point: Point, slopes: Array, residuals: Array, damping: float, scale: Array) -> Array:
+    def _step(self, point: Point, jacobian: Array, residuals: Array, damping: float, scale: Array) -> Array:
         """One step of the damped normal equations. Unknowns that would leave their bounds stay at them."""
         here = self.gathered(point)
         weights = np.sqrt(damping) * np.where(scale > 0.0, scale, 1.0)
         free = np.ones(here.size, dtype=np.bool_)
         step = np.zeros(here.size)
         for _ in range(here.size + 1):
-            matrix = np.vstack([slopes[:, free], np.diag(weights[free])])
+            matrix = np.vstack([jacobian[:, free], np.diag(weights[free])])
             # The right-hand side includes the steps of the unknowns that are at their bounds.
-            right = np.concatenate([-(residuals + slopes[:, ~free] @ step[~free]), np.zeros(int(free.sum()))])
+            right = np.concatenate(
+                [-(residuals + jacobian[:, ~free] @ step[~free]), np.zeros(int(free.sum()))]
+            )
             step[free] = np.linalg.lstsq(matrix, right, rcond=None)[0]
             beyond = free & ((here + step < self.lower) | (here + step > self.upper))
             if not beyond.any():
@@ -319,7 +323,7 @@ class _Search:
 
     def result(self, point: Point, iterations: int) -> TrimResult:
         """The result at a point, by name."""
-        if self.rests(point):
+        if self.is_solution(point):
             point = solved(self.whole, point)
         values = self.gathered(point)
         bounded = (values <= self.lower) | (values >= self.upper)
@@ -370,10 +374,10 @@ def _left(name: str, value: float) -> str:
 def _why(
     problem: TrimProblem, search: _Search, point: Point, worst: Sequence[str], result: TrimResult
 ) -> str:
-    slopes = search.slopes(point)
-    if not np.isfinite(slopes).all():
+    jacobian = search.jacobian(point)
+    if not np.isfinite(jacobian).all():
         return "points with finite derivatives; they are not finite at this point"
-    rows = {name: slopes[k] for k, name in enumerate(search.equations)}
+    rows = {name: jacobian[k] for k, name in enumerate(search.equations)}
     fixed = [name for name in worst if not rows[name].any()]
     if fixed:
         return f"equations that depend on a free variable; {', '.join(fixed[:NAMED])} depends on none"

@@ -119,14 +119,14 @@ def _add_block(module: Module, tape: Tape, layout: BatchLayout, lanes: int, name
     declared += [(f"ptr noalias{' readonly' if p[0] == 'i' else ''}", f"%{p}") for p in _pointers(tape)]
     body = Body(module, lanes)
     if is_long(tape):
-        doubtful = emit_pieces(body, tape, name, declared, stores, inputs_of, store)
+        undecided = emit_pieces(body, tape, name, declared, stores, inputs_of, store)
     else:
         registers = emit_operations(body, tape, inputs_of(body))
         for k in stores:
             store(body, registers, k)
-        doubtful = None
+        undecided = None
         if body.undecided is not None:
-            doubtful = body.let(f"bitcast {body.bit} {body.undecided} to i{lanes}")
+            undecided = body.let(f"bitcast {body.bit} {body.undecided} to i{lanes}")
     if lanes == 1:
         result, inlined = "void", "noinline"
         body.do("ret void")
@@ -136,7 +136,7 @@ def _add_block(module: Module, tape: Tape, layout: BatchLayout, lanes: int, name
         # access.
         result, inlined = "i1", "alwaysinline"
         declared = [(kind.split()[0], argument) for kind, argument in declared]
-        body.do(f"ret i1 {'false' if doubtful is None else body.let(f'icmp ne i{lanes} {doubtful}, 0')}")
+        body.do(f"ret i1 {'false' if undecided is None else body.let(f'icmp ne i{lanes} {undecided}, 0')}")
     arguments = ", ".join(f"{kind} {argument}" for kind, argument in declared)
     head = f"define internal {result} @{name}({arguments}) nounwind {inlined} {{\nentry:\n"
     module.add(name, head + "\n".join(body.lines) + "\n}")

@@ -186,7 +186,7 @@ class Body:
         """Disjunction of conditions."""
         return self.let(f"or {self.bit} {a}, {b}")
 
-    def doubt(self, condition: str) -> None:
+    def mark_undecided(self, condition: str) -> None:
         """Mark lanes in which this body's results are invalid and must be computed with one lane."""
         self.undecided = condition if self.undecided is None else self.either(self.undecided, condition)
 

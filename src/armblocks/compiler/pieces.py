@@ -41,7 +41,7 @@ class Cut:
 
     pieces: tuple[Piece, ...]
     places: dict[int, int]
-    room: int
+    size: int
 
 
 def is_long(tape: Tape) -> bool:
@@ -104,7 +104,7 @@ def _with_places(tape: Tape, stores: Stores, pieces: Sequence[Piece]) -> Cut:
     ends: dict[int, list[int]] = {}
     places: dict[int, int] = {}
     free: list[int] = []
-    room = 0
+    size = 0
     crossing = sorted(register for register, piece in last_read.items() if piece > made[register])
     starts: dict[int, list[int]] = {}
     for register in crossing:
@@ -112,12 +112,12 @@ def _with_places(tape: Tape, stores: Stores, pieces: Sequence[Piece]) -> Cut:
     for number in range(len(pieces)):
         for register in starts.get(number, []):
             if not free:
-                free.append(room)
-                room += 1
+                free.append(size)
+                size += 1
             places[register] = free.pop()
             ends.setdefault(last_read[register], []).append(places[register])
         free += ends.pop(number, [])
-    return Cut(pieces=tuple(pieces), places=places, room=room)
+    return Cut(pieces=tuple(pieces), places=places, size=size)
 
 
 def emit_pieces(
@@ -132,17 +132,17 @@ def emit_pieces(
     """Add the functions of a tape's pieces, and to ``caller`` the calls of all of them.
 
     ``arguments`` are the types and names of the arguments that ``caller`` passes on. ``inputs_of(body)``
-    returns the way in which a body reads the inputs, ``storing(body, registers, k)`` stores group ``k`` of
-    ``stores``. The result has a bit for each lane that must be evaluated with one lane; ``None``: there is
-    none.
+    returns the functions with which a body reads the inputs, ``storing(body, registers, k)`` stores group
+    ``k`` of ``stores``. The result has a bit for each lane that must be evaluated with one lane; ``None`` if
+    there are no such lanes.
     """
     module, lanes = caller.module, caller.lanes
     done = cut(tape, stores)
-    kept = WorkSpace(caller, done.room)
-    declared = ", ".join([f"{kind} {argument}" for kind, argument in arguments] + ["ptr noalias %kept"])
-    passed = [f"{kind.split()[0]} {argument}" for kind, argument in arguments] + [f"ptr {kept.address}"]
+    memory = WorkSpace(caller, done.size)
+    declared = ", ".join([f"{kind} {argument}" for kind, argument in arguments] + ["ptr noalias %memory"])
+    passed = [f"{kind.split()[0]} {argument}" for kind, argument in arguments] + [f"ptr {memory.address}"]
     bits = f"i{lanes}"
-    doubtful: str | None = None
+    undecided: str | None = None
     for number, piece in enumerate(done.pieces):
         body = Body(module, lanes)
         _emit_piece(body, tape, done, piece, inputs_of(body), storing)
@@ -153,12 +153,12 @@ def emit_pieces(
             caller.do(call)
         else:
             body.do(f"ret {bits} {body.let(f'bitcast {body.bit} {body.undecided} to {bits}')}")
-            doubt = caller.let(call)
-            doubtful = doubt if doubtful is None else caller.let(f"or {bits} {doubt}, {doubtful}")
+            new = caller.let(call)
+            undecided = new if undecided is None else caller.let(f"or {bits} {new}, {undecided}")
         head = f"define internal {result} @{symbol}({declared}) nounwind noinline {{\nentry:\n"
         module.add(symbol, head + "\n".join(body.lines) + "\n}")
-    kept.free()
-    return doubtful
+    memory.free()
+    return undecided
 
 
 def _emit_piece(
@@ -171,7 +171,7 @@ def _emit_piece(
 ) -> None:
     def address(register: int) -> str:
         place = done.places[register] * body.lanes
-        return body.let(f"getelementptr inbounds double, ptr %kept, i64 {place}")
+        return body.let(f"getelementptr inbounds double, ptr %memory, i64 {place}")
 
     def load(register: int) -> str:
         if register < tape.first_operation:

@@ -60,8 +60,8 @@ class DiagramBuilder:
     The names of blocks become the paths of signals, ``"height/y"``. A diagram inside a block is built in
     place, and its signals are ``"controller/error/y"``::
 
-        with builder.subsystem("controller", wanted, position) as inner:
-            error = inner.add("error", Sum(signs="+-"), inner.input("wanted"), inner.input("position"))
+        with builder.subsystem("controller", reference, position) as inner:
+            error = inner.add("error", Sum(signs="+-"), inner.input("reference"), inner.input("position"))
             inner.output("force", inner.add("gain", Gain(gain=5.0), error))
         builder.connect(builder["controller"], motor["force"])
 

@@ -38,7 +38,7 @@ class Point:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Slopes:
+class Jacobians:
     """Derivatives of one function by time (m, 1), states (m, nx), discrete variables (m, nz), unknowns (m,
     nw), and selected parameters (m, k)."""
 
@@ -75,7 +75,7 @@ class EvaluatedSystem:
         self._parameters = list(parameters)
         self._signals = None if signals is None else list(signals)
         self._functions: dict[str, Function] = {}
-        self._slopes: dict[str, Function] = {}
+        self._jacobians: dict[str, Function] = {}
 
     def _rows(self, traced: TracedFunction) -> SX:
         chosen = self._signals if traced is self.system.signals else None
@@ -89,23 +89,23 @@ class EvaluatedSystem:
             )
         return _numbers(self._functions[traced.name], arguments).reshape(-1)
 
-    def _differentiate(self, traced: TracedFunction, arguments: Sequence[Array]) -> Slopes:
+    def _differentiate(self, traced: TracedFunction, arguments: Sequence[Array]) -> Jacobians:
         t, x, z, w, p = traced.arguments[:5]
-        if traced.name not in self._slopes:
+        if traced.name not in self._jacobians:
             chosen = p[self._parameters] if self._parameters else SX(0, 1)
             by = vertcat(t, x, z, w, chosen)
-            slopes = jacobian(self._rows(traced), by)
-            function = Function("j", list(traced.arguments), [slopes], {"cse": True})
+            matrix = jacobian(self._rows(traced), by)
+            function = Function("j", list(traced.arguments), [matrix], {"cse": True})
             if reads_tables(function):  # evaluated column by column
-                function = Function("j", list(traced.arguments), [vec(densify(slopes))], {"cse": True})
-            self._slopes[traced.name] = function
+                function = Function("j", list(traced.arguments), [vec(densify(matrix))], {"cse": True})
+            self._jacobians[traced.name] = function
         count = self._rows(traced).numel()
-        whole = _numbers(self._slopes[traced.name], arguments).reshape(
+        whole = _numbers(self._jacobians[traced.name], arguments).reshape(
             (count, 1 + x.numel() + z.numel() + w.numel() + len(self._parameters)), order="F"
         )
         ends = np.cumsum([1, x.numel(), z.numel(), w.numel()]).tolist()
         by_t, by_x, by_z, by_w, by_p = np.split(whole, ends, axis=1)
-        return Slopes(t=by_t, x=by_x, z=by_z, w=by_w, p=by_p)
+        return Jacobians(t=by_t, x=by_x, z=by_z, w=by_w, p=by_p)
 
     # Values.
 
@@ -129,7 +129,7 @@ class EvaluatedSystem:
         """``z`` (nz,) after the ticks of the clocks with ``ticking[k] = 1``."""
         return self._call(self.system.update, [*point.ends, ticking])
 
-    def settled(self, point: Point) -> Array:
+    def consistent_modes(self, point: Point) -> Array:
         """``z`` (nz,) with all modes consistent with the present values."""
         events = np.zeros(len(self.system.guard_directions))
         reset = self._call(self.system.reset, [*point.ends, events])
@@ -146,19 +146,19 @@ class EvaluatedSystem:
 
     # Derivatives.
 
-    def derivative_slopes(self, point: Point) -> Slopes:
+    def derivative_jacobians(self, point: Point) -> Jacobians:
         """Derivatives of ``x'``."""
         return self._differentiate(self.system.derivative, point.ends)
 
-    def signal_slopes(self, point: Point) -> Slopes:
+    def signal_jacobians(self, point: Point) -> Jacobians:
         """Derivatives of the chosen signals."""
         return self._differentiate(self.system.signals, point.ends)
 
-    def residual_slopes(self, point: Point) -> Slopes:
+    def residual_jacobians(self, point: Point) -> Jacobians:
         """Derivatives of ``r``."""
         return self._differentiate(self.system.residual, point.ends)
 
-    def update_slopes(self, point: Point, ticking: Array) -> Slopes:
+    def update_jacobians(self, point: Point, ticking: Array) -> Jacobians:
         """Derivatives of the new ``z`` at a tick."""
         return self._differentiate(self.system.update, [*point.ends, ticking])
 
@@ -172,7 +172,7 @@ class EvaluatedSystem:
         """The inputs of the delays, and their time derivatives (2 nd,)."""
         return self._call(self._delays.inputs, point.ends)
 
-    def delay_input_slopes(self, point: Point) -> Slopes:
+    def delay_input_jacobians(self, point: Point) -> Jacobians:
         """Derivatives of the inputs of the delays."""
         return self._differentiate(self._delays.inputs, point.ends)
 

@@ -110,7 +110,7 @@ def make_plan(
     stop, step = float(options.stop_time), options.step
     if start > 0.0 and stop <= start:
         raise InputError(
-            f"stop_time is {stop:g} s, and the run goes on from {start:g} s",
+            f"stop_time is {stop:g} s, and the run continues from {start:g} s",
             where=system.name,
             allowed=f"a time after {start:g} s: stop_time counts from 0, not from the saved state",
             fix=f"for 1 s more, stop_time={start + 1.0:g}",

@@ -121,9 +121,9 @@ class RunMethod:
         checkpoint = state.checkpoint if state.settings == self.settings else None
         if stiff is not None and checkpoint is not None and checkpoint.method == stiff.name:
             self._tableau, self.solver, self._changed = stiff, stiff.name, True
-            self._reason = f"auto: {stiff.title}, as the run before found the system stiff"
-        how = "exactly as the run before" if checkpoint is not None else "started anew"
-        self._resumption = f"; goes on from {state.time:g} s, {how}"
+            self._reason = f"auto: {stiff.title}, because the previous run found the system stiff"
+        how = "exactly as the previous run" if checkpoint is not None else "with a restart of the solver"
+        self._resumption = f"; continues from {state.time:g} s, {how}"
         start = RunPoint(
             time=state.time,
             x=state.states,

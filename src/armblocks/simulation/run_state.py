@@ -111,7 +111,7 @@ class RunState:
             )
         except (ValueError, KeyError, TypeError, OSError, zipfile.BadZipFile, EOFError) as error:
             raise FormatError(
-                "this file holds no state of a run",
+                "this file contains no run state",
                 where=str(path),
                 allowed="what RunState.save wrote",
                 fix="save the state again: result.final_state.save(path)",

@@ -48,10 +48,10 @@ class Pipe:
     """The worker's end of a pipe without commands."""
 
     def __init__(self) -> None:
-        self.message: list[bytes] = []
+        self.messages: list[bytes] = []
 
     def send_bytes(self, data: bytes) -> None:
-        self.message.append(data)
+        self.messages.append(data)
 
     def poll(self, _: float) -> bool:
         return False
@@ -74,9 +74,9 @@ def test_a_long_run_sends_extremes_and_a_short_run_all_samples(
         "tuned": {},
     }
     run_worker._Run(pipe, job).run()  # pyright: ignore
-    events = [json.loads(data[1:]) for data in pipe.message if data[:1] == b"J"]
+    events = [json.loads(data[1:]) for data in pipe.messages if data[:1] == b"J"]
     assert events[-1]["state"] == "done"
-    frames = [read_frame(data[1:]) for data in pipe.message if data[:1] == b"S"]
+    frames = [read_frame(data[1:]) for data in pipe.messages if data[:1] == b"S"]
     sent = 0
     for header, _, _ in frames:
         assert header["first"] == sent

@@ -12,7 +12,7 @@ from crashed_disk import Disk, carry_out, going
 from armblocks.errors import ArmblocksError, FormatError, InputError
 from armblocks.formats import load_robot, write_robot
 from armblocks.studio.documents import open_files
-from armblocks.studio.documents.older_journals import as_of_today
+from armblocks.studio.documents.older_journals import converted
 from armblocks.studio.protocol.messages import documents as document_messages
 from armblocks.studio.protocol.messages.robot_edits import AddJoint, RenameLink, SetCell
 from armblocks.studio.protocol.messages.sheet_edits import ArrangeBlocks, Rename
@@ -55,7 +55,7 @@ JOURNAL_OF_0_2: list[tuple[dict[str, Any], document_messages.Alteration]] = [
 def test_journaled_requests_of_version_0_2_0_are_converted(
     written: dict[str, Any], meant: document_messages.Alteration
 ) -> None:
-    assert type(meant).model_validate({**as_of_today(written), "document": ""}) == meant
+    assert type(meant).model_validate({**converted(written), "document": ""}) == meant
 
 
 def requests(seed: int, count: int) -> list[Any]:

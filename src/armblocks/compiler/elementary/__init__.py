@@ -66,8 +66,8 @@ _WITH_RARE_CASES = frozenset({Opcode.TAN, Opcode.MODULO, Opcode.REMAINDER})
 
 def _call(body: Body, opcode: Opcode, values: Sequence[str]) -> str:
     symbol = f"armblocks_{opcode.name.lower()}_{body.lanes}"
-    doubting = body.lanes > 1 and opcode in _WITH_RARE_CASES
-    result = f"{{ {body.real}, {body.bit} }}" if doubting else body.real
+    has_rare_cases = body.lanes > 1 and opcode in _WITH_RARE_CASES
+    result = f"{{ {body.real}, {body.bit} }}" if has_rare_cases else body.real
 
     def define() -> str:
         inner = Body(body.module, body.lanes)
@@ -83,7 +83,7 @@ def _call(body: Body, opcode: Opcode, values: Sequence[str]) -> str:
 
     body.module.define(symbol, define)
     returned = body.let(f"call {result} @{symbol}({', '.join(f'{body.real} {value}' for value in values)})")
-    if not doubting:
+    if not has_rare_cases:
         return returned
-    body.doubt(body.let(f"extractvalue {result} {returned}, 1"))
+    body.mark_undecided(body.let(f"extractvalue {result} {returned}, 1"))
     return body.let(f"extractvalue {result} {returned}, 0")

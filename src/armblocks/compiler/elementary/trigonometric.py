@@ -90,7 +90,7 @@ def _reduce(body: Body, magnitude: str) -> _Reduced:
     quarter = body.bits(rounded)
     huge = body.compare("ogt", magnitude, body.number(_MODERATE))
     if body.lanes > 1:
-        body.doubt(huge)
+        body.mark_undecided(huge)
         return _Reduced(angle, rest, quarter)
 
     _define_reduction(body.module)
