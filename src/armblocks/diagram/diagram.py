@@ -189,8 +189,8 @@ class Diagram:
             raise UnknownNameError("block", name, self.blocks, where=f"diagram '{self.name}'")
         return self.blocks[name]
 
-    def keep(self, name: str, work_out: Callable[[], _Kept]) -> _Kept:
+    def keep(self, name: str, compute: Callable[[], _Kept]) -> _Kept:
         """The result of a pure function of this diagram, cached with the diagram under a name."""
         if name not in self._kept:
-            self._kept[name] = work_out()
+            self._kept[name] = compute()
         return cast("_Kept", self._kept[name])
