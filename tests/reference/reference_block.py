@@ -216,8 +216,8 @@ class BlockNumbers:
         self.begun = True
         for name in self.names("start"):
             self.arrays[f"x:{name}"][:] = self.value("start", name)
-        for mode in self.remembered:
-            self.arrays[f"x:{mode.before}"][:] = 0.0
+        for name in (*(mode.name for mode in self.modes), *(mode.before for mode in self.remembered)):
+            self.arrays[f"x:{name}"][:] = 0.0
 
     def remember(self) -> None:
         """Store modes with memory, and the discrete states that belong to them, as the previous values."""

@@ -352,13 +352,17 @@ class Network:
     def tick(self, t: float, clocks: list[int]) -> None:
         """Evaluate the outputs of all blocks that tick, then update their discrete states."""
         self._mark(set(clocks))
+        self.evaluate(t)
+        restarted: set[str] = set()
         for _ in range(2):  # a restart at this tick changes the values that are read
-            self.evaluate(t)
             again = [b for b in self.blocks.values() if b.clock in (None, *self.ticking) and b.restarts]
+            again = [block for block in again if block.name not in restarted]
             if not again:
                 break
             for block in again:
                 block.restart()
+                restarted.add(block.name)
+            self.evaluate(t)
         new: list[tuple[np.ndarray, np.ndarray]] = []
         for block in self.blocks.values():
             if block.clock in self.ticking and block.on:

@@ -169,12 +169,11 @@ def block_equations(
 def _trace(structure: _Structure) -> BlockEquations:
     own = features_of(structure.block, dict(structure.input_shapes))
     if structure.hidden:
-        ticking = structure.settled or structure.clocked
-        own = conditional(own, structure.hidden, clocked=structure.clocked, ticking=ticking)
+        own = conditional(own, structure.hidden, clocked=structure.clocked, ticking=structure.settled)
     # Conditions whose change is an event are modes; the others are evaluated directly.
     located = () if structure.settled else tuple(entry for entry in own.conditions if entry.located)
     asked = tuple(entry for entry in own.conditions if entry not in located)
-    features = with_modes_of_conditions(with_memory(own), located)
+    features = with_modes_of_conditions(with_memory(own, clocked=structure.clocked), located)
     past = tuple(
         State(f"{line.name}{mark}", line.shape, line.doc) for mark in ("", "'") for line in features.delays
     )

@@ -87,15 +87,18 @@ def while_on(features: Features, kinds: Iterable[SlotKind]) -> Features:
 
 
 def restarted_before_a_tick(features: Features) -> Features:
-    """With equations that see the initial states wherever the block is restarted."""
+    """With equations that see the initial states wherever the block is restarted; its modes have no past."""
+    zeros = {mode.name: SX(0.0) for mode in features.modes}
 
-    def begun(at: Arguments) -> Arguments:
-        starts = _starts(features, at)
+    def begun(at: Arguments, modes: Signals) -> Arguments:
+        starts = {**_starts(features, at), **modes}
         return at.with_states(
             {name: if_else(at.u[RESTART] != 0.0, start, at.x[name]) for name, start in starts.items()}
         )
 
-    return features.at_arguments(begun)
+    found = features.at_arguments(lambda at: begun(at, {}))
+    modes = features.equations[SlotKind.MODE]
+    return found.with_equations({SlotKind.MODE: lambda at: modes(begun(at, zeros))})
 
 
 def executed_when_fired(features: Features) -> Features:
@@ -116,17 +119,22 @@ def executed_when_fired(features: Features) -> Features:
 def restarted(features: Features, modes: Equation, *, clocked: bool) -> Features:
     """With states and modes that are reset at a restart, and guards that are silent until its instant ends.
 
-    ``modes`` gives the modes of the block regardless of its control.
+    ``modes`` gives the modes of the block regardless of its control. ``clocked``: the block works at the
+    ticks of a clock. After a restart by a tick, discrete states keep their values after the tick; continuous
+    states and modes are reset.
     """
     resets, updates = features.equations[SlotKind.RESET], features.equations[SlotKind.UPDATE]
+    ticked = {state.name for state in features.discrete} if clocked else set[str]()
 
     def reset(at: Arguments) -> Signals:
         after = dict(resets(at))
         again = at.u[RESTART] != 0.0
+        starts = _starts(features, at)
         if clocked:
             after[_DONE] = if_else(again, 0.0, at.x[_DONE])
-            again = logic_and(again, at.x[_DONE] == 0.0)
-        starts = _starts(features, at)
+            done = at.x[_DONE] != 0.0
+            kept = {name: after.get(name, at.x[name]) for name in ticked}
+            starts |= {name: if_else(done, value, starts[name]) for name, value in kept.items()}
         begins = {**starts, **_first_modes(modes, at.with_states(starts))}
         for name, value in begins.items():
             after[name] = if_else(again, value, after.get(name, at.x[name]))
@@ -200,10 +208,11 @@ def _plain(values: Signals) -> dict[str, SX]:
     return {name: value for name, value in values.items() if not name.startswith("?")}
 
 
-def _starts(features: Features, at: Arguments) -> Signals:
+def _starts(features: Features, at: Arguments) -> dict[str, SX]:
     """The initial states after a restart; the previous values of modes are 0."""
     before = {name_before(name) for name in at.x} & set(at.x)
-    return {**features.starts(at.p), **{name: SX(0.0) for name in sorted(before)}}
+    starts = {name: SX(value) for name, value in features.starts(at.p).items()}
+    return starts | {name: SX(0.0) for name in sorted(before)}
 
 
 def _first_modes(modes: Equation, at: Arguments) -> Signals:

@@ -17,22 +17,27 @@ from armblocks.diagram.port import Condition, Guard, State
 from armblocks.equations import Slot, unflatten
 
 
-def with_memory(features: Features) -> Features:
+def with_memory(features: Features, *, clocked: bool) -> Features:
     """Add a discrete state for every mode with hysteresis: its value before the event time.
 
-    Such a mode follows from this value, not from values during mode iteration.
+    Such a mode follows from this value, not from values during mode iteration. ``clocked``: the block
+    works at the ticks of a clock, which do not change this value.
     """
     remembering = [mode for mode in features.modes if mode.remembers]
     if not remembering:
         return features
-    modes = features.equations[SlotKind.MODE]
+    modes, updates = features.equations[SlotKind.MODE], features.equations[SlotKind.UPDATE]
 
     def earlier(at: Arguments) -> Signals:
         return modes(at.with_states({mode.name: at.x[mode.before] for mode in remembering}))
 
+    def updated(at: Arguments) -> Signals:
+        return {**updates(at), **{mode.before: at.x[mode.before] for mode in remembering}}
+
     before = (dataclasses.replace(mode, name=mode.before) for mode in remembering)
     return dataclasses.replace(
-        features.with_equations({SlotKind.MODE: earlier}), discrete=(*features.discrete, *before)
+        features.with_equations({SlotKind.MODE: earlier, **({SlotKind.UPDATE: updated} if clocked else {})}),
+        discrete=(*features.discrete, *before),
     )
 
 

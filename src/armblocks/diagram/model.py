@@ -58,6 +58,9 @@ def diagram_model(diagram: Diagram) -> Model:
     flow, tick = Network(diagram, equations), Network(diagram, equations, ticking=True)
     if sampling.clocks:
         settled = {name: _equations(diagram, name, shapes, settled=True) for name in free}
+        for name, clock in sampling.clock_of.items():
+            period = sampling.clocks[clock].period
+            settled[name] = _equations(diagram, name, shapes, period=period, settled=True)
         tick = Network(diagram, equations | settled, ticking=True)
     return Model(
         shapes=shapes,

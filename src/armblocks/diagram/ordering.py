@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from armblocks.diagram.block_equations import BlockEquations
 from armblocks.diagram.diagram import Diagram
-from armblocks.diagram.features import SlotKind
+from armblocks.diagram.features import AT_TICKS, SlotKind
 from armblocks.diagram.port import PortRef
 from armblocks.errors import AlgebraicLoopError
 
@@ -97,9 +97,9 @@ class Network:
             clocked = self.diagram.clocked(name)
             if clocked and not self.ticking:
                 yield Node(name, HELD, 0)
-                # Events of a sampled block between its ticks: guards and resets.
+                # Equations of a sampled block between its ticks, such as those of its modes and guards.
                 for (kind, _), index in self.equations[name].group_of.items():
-                    if kind in (SlotKind.GUARD, SlotKind.RESET):
+                    if kind not in AT_TICKS:
                         yield Node(name, index, 0)
             if clocked is not self.ticking:
                 continue

@@ -150,13 +150,13 @@ def _updated(model: Model, symbols: Symbols, flow: Tracing, loops: Implicit) -> 
     for node in model.tick_order.order:
         tick.evaluate(node)
     equations, discrete = model.tick.equations, dict(symbols.discrete)
-    discrete |= _captured(model, symbols, flow)
     for name in model.sampling.clock_of:
         for index, group in enumerate(equations[name].groups):
             for slot in group.slots:
                 if slot.kind in (SlotKind.OUTPUT, SlotKind.UPDATE):
                     value = tick.value(Value(Node(name, index, 0), slot.kind, slot.name))
                     discrete[f"{name}/{slot.name}"] = value
+    discrete |= _captured(model, symbols, flow, discrete)
     updated, products = vertcat(*discrete.values(), SX(0, 1)), vertcat(*tick.products, SX(0, 1))
     if not tick.unknowns:
         return updated, products
@@ -184,14 +184,14 @@ def _keeps_left_limits(model: Model) -> bool:
     return any(kind is SlotKind.CAPTURE for equations in found for kind, _ in equations.group_of)
 
 
-def _captured(model: Model, symbols: Symbols, flow: Tracing) -> dict[str, SX]:
-    """Updates of states that store left limits: evaluated by an update without a tick."""
+def _captured(model: Model, symbols: Symbols, flow: Tracing, after_tick: Mapping[str, SX]) -> dict[str, SX]:
+    """Updates of states that store left limits: captured by an update without a tick."""
     ticking = dot(symbols.m, symbols.m) if symbols.m.numel() else SX(0.0)
     return {
         f"{name}/{slot}": if_else(
             ticking == 0.0,
             flow.value(_value(model.flow, name, kind, slot)),
-            symbols.discrete[f"{name}/{slot}"],
+            after_tick[f"{name}/{slot}"],
         )
         for name, equations in model.flow.equations.items()
         for kind, slot in equations.group_of
