@@ -26,7 +26,9 @@ from armblocks.matlab.source import formula_source
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 ARGUMENTS = {
-    **dict.fromkeys(("diag", "inv", "transpose", "trace", "size"), ("A",)),
+    **dict.fromkeys(("diag", "inv", "transpose", "trace"), ("A",)),
+    **dict.fromkeys(("sum", "prod", "mean", "any", "all", "size"), ("A", "2")),
+    **dict.fromkeys(("power", "pow"), ("abs(v)", "w")),
     **dict.fromkeys(("cross", "dot"), ("v", "w")),
     **dict.fromkeys(("transl", "SE3"), ("v",)),
     **dict.fromkeys(("zeros", "ones", "eye"), ("2", "3")),
@@ -95,6 +97,18 @@ def test_numbers_constants_and_symbols_have_the_same_values(name: str) -> None:
         ("sum(mean([1 2; 3 4]))", 5.0),
         ("norm([3 4])", 5.0),
         ("norm([1 2; 2 4], 'fro')", 5.0),
+        ("norm(sum([1 2; 3 4; 5 6], 1)  - [9 12])", 0.0),
+        ("norm(sum([1 2; 3 4; 5 6], 2)' - [3 7 11])", 0.0),
+        ("norm(prod([1 2; 3 4], 2)' - [2 12])", 0.0),
+        ("norm(any([0 0; 0 2], 2)' - [0 1])", 0.0),
+        ("10*size([1 2; 3 4; 5 6], 1) + size([1 2; 3 4; 5 6], 2)", 32.0),
+        ("linspace(3, 5, 1)", 5.0),
+        ("numel(0:1:1-1e-11)", 1.0),
+        ("numel(0:0.1:1) + numel(1:-0.1:0) + numel(-0.3:0.1:0.3)", 29.0),
+        ("numel(5:-2:0)*10 + (5:-2:0)(3)", 31.0),
+        ("inf - inf == inf - inf", 0.0),
+        ("nan == nan", 0.0),
+        ("(0*inf > 0) + (0*inf < 0) + (0*inf == 0)", 0.0),
         ("dot([1 2 3], [4 5 6])", 32.0),
         ("sum(cross([1 0 0], [0 1 0]) == [0 0 1])", 3.0),
         ("trace([1 2; 3 4])", 5.0),
@@ -116,6 +130,74 @@ def test_values_are_those_of_matlab(text: str, value: float) -> None:
     found = read_script(f"x = {text};".encode(), "x.m").variables["x"]
     assert np.ravel(found).tolist() == [value]
     assert casadi.evalf(Formula(text, "here").trace({})).full().ravel().tolist() == [value]
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("sum([1 2 3], 1)", [[1.0, 2.0, 3.0]]),
+        ("sum([1 2 3], 2)", [[6.0]]),
+        ("any([0; 2], 2)", [[0.0], [1.0]]),
+        ("mean([1; 3], 1)", [[2.0]]),
+        ("sum(zeros(0, 3))", [[0.0, 0.0, 0.0]]),
+        ("size([1 2 3], 2)", [[3.0]]),
+        ("[5 6 7]([1 2; 3 1])", [[5.0, 6.0], [7.0, 5.0]]),
+        ("[5; 6; 7]([1 3])", [[5.0], [7.0]]),
+        ("(5)([1; 1; 1])", [[5.0], [5.0], [5.0]]),
+        ("[1 2; 3 4]([4 1])", [[4.0, 1.0]]),
+        ("[3 4 5]([3 4 5] > 3)", [[4.0, 5.0]]),
+        ("[3 4]([3 4] > 0)", [[3.0, 4.0]]),
+        ("[3; 4]([true true])", [[3.0], [4.0]]),
+        ("[1 2; 3 4]([1 2; 3 4] > 1)", [[3.0], [2.0], [4.0]]),
+        ("[1 2; 3 4](~[0 1], :)", [[1.0, 2.0]]),
+        ("[1 2; 3 4](any([1 0; 0 0]), 1)", [[1.0]]),
+        ("sum([3 4] > 3) + ([3 4] > 3)", [[1.0, 2.0]]),
+        ("[1 2; 3 4]^-2*[1 2; 3 4]^2 - eye(2) < 1e-12", [[1.0, 1.0], [1.0, 1.0]]),
+    ],
+)
+def test_arrays_of_scripts_have_the_shapes_of_matlab(text: str, value: list[list[float]]) -> None:
+    found = read_script(f"x = {text};".encode(), "x.m").variables["x"]
+    assert np.asarray(found, dtype=float).tolist() == value
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("u'*u", r"a transposed vector and a vector are combined by '\*'.*dot\(v, w\)"),
+        ("u*u'", "a transposed vector"),
+        ("u'*A*u", r"a row of a matrix or product and a vector.*dot\(v, A\*w\)"),
+        ("u*A*u", "a row of a matrix or product"),
+        ("-A(1, :)*u", "a row of a matrix"),
+        ("sum(A)*u", "a row of a matrix"),
+        ("(2*diag(A) + 1)*u", "a column of a matrix"),
+        ("A(:, 1)/A(:, 2)", "a column of a matrix"),
+        ("[A(:, 2) A(:, 1)]", "a column of a matrix, or a matrix times a vector, is combined"),
+        ("[A*u; u]", "a column of a matrix, or a matrix times a vector, is combined"),
+        ("u(:, 1)", "a vector has two indices, but is neither row nor column"),
+        ("u(1, end)", "a vector has two indices"),
+        ("sum(u, 2)", "a vector of a formula is neither row nor column"),
+        ("sum(A, 3)", "the dimension is not 1 or 2"),
+        ("norm(A)", "would be its largest singular value"),
+        ("A^0.5", "the power of a matrix is not supported for this exponent"),
+        ("u^A", "a power of a matrix|the power of a matrix"),
+        ("A^3^B", "the power of a matrix is not supported"),
+        ("u([1 2 3] > 0)", "an index is a comparison or a logical value"),
+        ("u(true)", "an index is a comparison or a logical value"),
+    ],
+)
+def test_formulas_whose_value_depends_on_the_orientation_of_a_vector_are_refused(
+    text: str, message: str
+) -> None:
+    symbols = {"A": SX.sym("A", 3, 3), "B": SX.sym("B", 3, 3), "u": SX.sym("u", 3)}
+    with pytest.raises(InputError, match=f"(?s){message}"):
+        Formula(text, "here").trace(symbols)
+
+
+def test_vectors_of_formulas_take_two_indices_where_one_of_them_is_1() -> None:
+    found = Formula("[v(2, 1), v(1, 3), A(2, :)(1, 2), A(:, 2)(3, 1), A(:, 2)'(1, 3)]", "here").trace(
+        {"v": SX([4.0, 5.0, 6.0]), "A": SX(np.arange(9.0).reshape(3, 3))}
+    )
+    assert casadi.evalf(found).full().ravel().tolist() == [5.0, 6.0, 4.0, 7.0, 7.0]
 
 
 def test_wrong_arguments_are_refused_with_a_message() -> None:

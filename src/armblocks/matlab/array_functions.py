@@ -15,7 +15,9 @@ from armblocks.matlab.function_kinds import (
     Arithmetic,
     Function,
     MismatchError,
+    along_dimension,
     created,
+    dimension_of,
     whole,
 )
 
@@ -28,11 +30,11 @@ MOST_ELEMENTS = 100_000
 
 def _mean(by: Arithmetic, x: Any) -> Any:
     rows, columns = by.shape(x)
-    return by.quotient(by.total(x), by.constant(np.array([[float(rows if rows > 1 else columns)]])))
+    return by.quotient(by.total(x), by.constant(np.array([[float(rows if rows != 1 else columns)]])))
 
 
 def _norm(by: Arithmetic, x: Any, kind: Any = None) -> Any:
-    if kind is None and by.has_orientation and 1 not in by.shape(x):
+    if kind is None and 1 not in by.shape(x):
         raise MismatchError("the argument is a matrix, whose norm(A) would be its largest singular value")
     if not (kind is None or (isinstance(kind, str) and kind == "fro")):
         raise MismatchError("the option is not known; allowed is 'fro'")
@@ -73,8 +75,11 @@ def _count(measure: Callable[[int, int], int]) -> Callable[..., Any]:
     return compute
 
 
-def _size(by: Arithmetic, x: Any) -> Any:
-    return by.constant(np.array([[float(extent) for extent in by.shape(x)]]))
+def _size(by: Arithmetic, x: Any, dimension: Any = None) -> Any:
+    if dimension is None:
+        return by.constant(np.array([[float(extent) for extent in by.shape(x)]]))
+    along = dimension_of(by, x, dimension)
+    return by.constant(np.array([[float(by.shape(x)[along - 1])]]))
 
 
 # Arrays of a given size, from plain numbers.
@@ -104,13 +109,27 @@ def range_of(first: float, step: float, last: float) -> NDArray[np.float64]:
     steps = (last - first) / step if step else math.nan
     if not (math.isfinite(step) and math.isfinite(steps)):
         raise MismatchError("the steps go away from the last number")
-    # The number of steps that fit, with a tolerance for rounding, so that 0:0.1:1 reaches 1.
-    count = number_of_elements(max(0.0, math.floor(steps * (1 + 4e-16) + 1e-10) + 1.0))
-    return (first + step * np.arange(count, dtype=np.float64)).reshape(1, -1)
+    # As in MATLAB: a last number within rounding belongs to the range, and the upper half of the elements is
+    # counted from the end (MathWorks, "How does the COLON operator work?").
+    tolerance = 2.0 * 2.0**-52 * max(abs(first), abs(last))
+    direction = math.copysign(1.0, step)
+    count = float(round(steps))
+    if direction * (first + count * step - last) > tolerance:
+        count -= 1.0
+    count = float(number_of_elements(max(0.0, count + 1.0))) - 1.0
+    end = first + count * step
+    end = last if direction * (end - last) > -tolerance else end
+    k = np.arange(count + 1.0)
+    found = np.where(2.0 * k <= count, first + k * step, end - (count - k) * step)
+    if count > 0.0 and count % 2.0 == 0.0:
+        found[int(count) // 2] = (first + end) / 2.0
+    return found.reshape(1, -1)
 
 
 def _linspace(first: Any, last: Any, count: Any = 100.0) -> NDArray[np.float64]:
     first, last, count = (float(np.ravel(number)[0]) for number in (first, last, count))
+    if count == 1.0:
+        return np.array([[last]])
     share = np.arange(number_of_elements(count), dtype=np.float64) / max(1.0, count - 1.0)
     return (first * (1.0 - share) + last * share).reshape(1, -1)
 
@@ -187,15 +206,14 @@ FUNCTIONS_OF_ARRAYS: Mapping[str, Function] = {
     "linspace": created(
         "first, last, n", "n numbers with equal distances; 100 without n.", _linspace, optional=1
     ),
-    "sum": whole("x", "The sum of the elements.", ARRAYS, lambda by, x: by.total(x), reserved=True),
-    "prod": whole(
-        "x", "The product of the elements.", ARRAYS, lambda by, x: by.folded(lambda a, b: a * b, x)
+    "sum": along_dimension("The sum of the elements.", ARRAYS, lambda by, x: by.total(x), reserved=True),
+    "prod": along_dimension(
+        "The product of the elements.", ARRAYS, lambda by, x: by.folded(lambda a, b: a * b, x)
     ),
-    "mean": whole("x", "The mean of the elements.", ARRAYS, _mean),
+    "mean": along_dimension("The mean of the elements.", ARRAYS, _mean),
     "norm": whole(
         "x, 'fro'",
-        "The length of a vector; of a matrix, `norm(A, 'fro')` is the root of the sum of all squares, "
-        "in formulas also `norm(A)`.",
+        "The length of a vector; of a matrix, `norm(A, 'fro')` is the root of the sum of all squares.",
         ARRAYS,
         _norm,
         optional=1,
@@ -220,7 +238,14 @@ FUNCTIONS_OF_ARRAYS: Mapping[str, Function] = {
     "length": whole(
         "x", "The larger of rows and columns.", ARRAYS, _count(lambda m, n: max(m, n) if m * n else 0)
     ),
-    "size": whole("x", "Rows and columns; in formulas, vectors are columns.", ARRAYS, _size),
+    "size": whole(
+        "x, k",
+        "Rows and columns, in formulas those of a column for vectors; `size(A, 1)` is the number of rows, "
+        "`size(A, 2)` that of columns.",
+        ARRAYS,
+        _size,
+        optional=1,
+    ),
 }
 RIGID_MOTIONS: Mapping[str, Function] = {
     "transl": whole(

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import reduce
-from typing import Protocol, TypeGuard, runtime_checkable
+from typing import Protocol, TypeGuard, cast, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +16,21 @@ from armblocks.matlab.source import Place
 from armblocks.rounded_functions import power
 
 Array = NDArray[np.float64]
-"""MATLAB's only number: a matrix, always with two axes. A scalar is (1, 1), the empty matrix is (0, 0)."""
+"""MATLAB's only number: a matrix, always with two axes. A scalar is (1, 1), the empty matrix is (0, 0).
+
+The results of comparisons and logical operators are arrays of Booleans, as they select elements when they are
+indices. :func:`array_of` makes numbers of them.
+"""
 
 MOST_WORK = 20_000_000
 """Maximum number of elements that one script may compute, which limits time and memory."""
 ROUNDED_WORK = 1000
 """Cost of a sine or a power relative to a sum."""
+
+
+EXPONENTS = range(-64, 65)
+"""Exponents of matrices."""
+POWERS_OF_MATRICES = "numbers, or a square matrix with a whole exponent from -64 to 64"
 
 
 @dataclass
@@ -53,6 +62,11 @@ def empty() -> Array:
 def is_array(value: object) -> TypeGuard[Array]:
     """Whether a value is an array of numbers."""
     return isinstance(value, np.ndarray)
+
+
+def is_logical(value: object) -> TypeGuard[NDArray[np.bool_]]:
+    """Whether a value is the result of a comparison or of a logical operator."""
+    return is_array(value) and value.dtype.kind == "b"
 
 
 @runtime_checkable
@@ -97,9 +111,9 @@ def text_of(place: Place, value: object, what: str) -> str:
 
 
 def array_of(place: Place, value: object, what: str) -> Array:
-    """A value that must be a matrix."""
+    """A value that must be a matrix; logical values become numbers."""
     if is_array(value):
-        return value
+        return np.asarray(value, dtype=np.float64)
     raise place.error(f"{what} is {kind_of(value)}", allowed="numbers")
 
 
@@ -161,7 +175,7 @@ def _elementwise(place: Place, budget: Budget, operator: str, a: Array, b: Array
     if operator == "^" and np.any((a < 0) & (b != np.floor(b))):
         raise place.error("a root of a negative number is complex", allowed="real numbers")
     if operator in _COMPARED:
-        return _COMPARED[operator](a, b).astype(np.float64)
+        return cast("Array", _COMPARED[operator](a, b))
     return _SCALAR_OPERATIONS[operator](a, b)
 
 
@@ -189,14 +203,15 @@ def _solve(place: Place, budget: Budget, a: Array, b: Array) -> Array:
 
 def _matrix_power(place: Place, budget: Budget, a: Array, b: Array) -> Array:
     exponent = float(b[0, 0]) if b.size == 1 else math.nan
-    if a.shape[0] != a.shape[1] or exponent not in range(65):
+    if a.shape[0] != a.shape[1] or exponent not in EXPONENTS:
         raise place.error(
             f"'^' of {kind_of(a)} and {kind_of(b)}",
-            allowed="numbers, or a square matrix with a whole exponent from 0 to 64",
+            allowed=POWERS_OF_MATRICES,
             fix="write .^ for powers element by element",
         )
     budget.spend(place, a.size * (a.shape[0] + 8))
-    return reduce(_product, [a] * int(exponent), np.eye(len(a)))
+    factor = _solve(place, budget, a, np.eye(len(a))) if exponent < 0 else a
+    return reduce(_product, [factor] * abs(int(exponent)), np.eye(len(a)))
 
 
 def _product(a: Array, b: Array) -> Array:
@@ -229,7 +244,9 @@ def stacked(place: Place, budget: Budget, rows: Sequence[Sequence[object]]) -> A
         )
     check_size(place, sum(band.shape[0] for band in bands), widths[0])
     budget.spend(place, sum(band.size for band in bands))
-    return np.vstack(bands)
+    found = np.vstack(bands)
+    logical = all(is_logical(value) for row in rows for value in row)
+    return cast("Array", found != 0.0) if logical else found
 
 
 def index_of(place: Place, value: object, most: int, shown: str = "") -> int:
@@ -265,14 +282,22 @@ def positions(
     index = indices[0]
     if index is None:
         return chosen[0].reshape(-1, 1)
-    if 1 in shape or not is_array(index):
-        return chosen[0].reshape((-1, 1) if columns == 1 and rows > 1 else (1, -1))
-    return chosen[0].reshape(index.shape, order="F")
+    given = index.shape if is_array(index) else (0, 0)
+    if is_logical(index):
+        given = (1, chosen[0].size) if given[0] == 1 else (chosen[0].size, 1)
+    if 1 in shape and rows * columns != 1 and (1 in given or 0 in given):
+        return chosen[0].reshape((-1, 1) if columns == 1 else (1, -1))
+    return chosen[0].reshape(given, order="F")
 
 
 def _chosen(place: Place, index: object, extent: int, shown: str) -> NDArray[np.intp]:
     if index is None:
         return np.arange(extent)
+    if is_logical(index):
+        chosen = np.flatnonzero(index.ravel(order="F"))
+        if chosen.size and chosen[-1] >= extent:
+            index_of(place, scalar(float(chosen[-1] + 1)), extent, shown)
+        return chosen
     numbers = array_of(place, index, "an index").ravel(order="F")
     found = [index_of(place, scalar(float(number)), max(extent, 1), shown) for number in numbers]
     return np.array(found, dtype=np.intp)

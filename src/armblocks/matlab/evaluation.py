@@ -73,6 +73,10 @@ class Values(Protocol[V]):
         """``value'``"""
         ...
 
+    def index(self, place: Place, value: V, written: Expression) -> V:
+        """The value of an index that is ``written`` so."""
+        ...
+
     def element(self, place: Place, value: V, indices: Sequence[V | None], shown: str) -> V:
         """``value(indices)``, where ``None`` is ``:``; ``shown`` is its name in messages, or empty."""
         ...
@@ -141,9 +145,12 @@ class Evaluator(Generic[V]):
         found: list[V | None] = []
         for position, argument in enumerate(arguments):
             self._indexed.append((value, position, len(arguments)))
-            found.append(None if isinstance(argument, All) else self.value(argument))
+            found.append(None if isinstance(argument, All) else self._index(argument))
             self._indexed.pop()
         return found
+
+    def _index(self, argument: Expression) -> V:
+        return self._values.index(self._source.place(argument.at), self.value(argument), argument)
 
     def _name(self, place: Place, name: str) -> V:
         found = self._variables.get(name)

@@ -12,7 +12,7 @@ from armblocks.matlab.functions import TABLE
 from armblocks.matlab.operators import COMPARISONS
 from armblocks.matlab.parser import parse_formula
 from armblocks.matlab.source import Position, formula_source
-from armblocks.matlab.symbols import Symbol, Symbols
+from armblocks.matlab.symbols import Oriented, Symbol, Symbols
 from armblocks.matlab.syntax import Chain, Expression, Name, Parentheses, Postfix, levels, parts_of
 
 LONGEST = 4000
@@ -88,7 +88,7 @@ class Formula:
             raise self._source.place(expression.at).error(
                 f"the text '{found[:40]}' is not a number", allowed="numbers and names without quotes"
             )
-        return found
+        return found.value if isinstance(found, Oriented) else found
 
 
 def _names(tree: Expression) -> Iterator[tuple[str, bool]]:

@@ -110,6 +110,10 @@ class Arithmetic(Protocol):
         """A vector of these elements, with the orientation of ``model``."""
         ...
 
+    def constant_number(self, value: Any) -> float:
+        """A constant number; NaN for anything else."""
+        ...
+
     def from_rows(self, rows: Sequence[Sequence[Any]]) -> Any:
         """A matrix of numbers and elements."""
         ...
@@ -222,6 +226,33 @@ def whole(
         compute=compute,
         **more,
     )
+
+
+def along_dimension(
+    meaning: str, group: str, compute: Callable[[Arithmetic, Any], Any], **more: Any
+) -> Function:
+    """A function that reduces a vector to a number, and a matrix by column or along a dimension."""
+
+    def reduced(by: Arithmetic, x: Any, dimension: Any = None) -> Any:
+        if dimension is None:
+            return compute(by, x)
+        along, shape = dimension_of(by, x, dimension), by.shape(x)
+        if shape[along - 1] == 1 and shape != (1, 1):  # arrays of numbers only: each element by itself
+            return np.array([compute(by, np.array([[entry]])) for entry in by.entries(x)]).reshape(shape)
+        return compute(by, x) if along == 1 else by.transposed_matrix(compute(by, by.transposed_matrix(x)))
+
+    whole_meaning = f"{meaning[:-1]}; of a matrix by column, with `(A, 2)` by row."
+    return whole("x, k", whole_meaning, group, reduced, optional=1, **more)
+
+
+def dimension_of(by: Arithmetic, x: Any, dimension: Any) -> int:
+    """1 for the rows, 2 for the columns. Raises :class:`MismatchError` for other values."""
+    found = by.constant_number(dimension)
+    if found not in (1.0, 2.0):
+        raise MismatchError("the dimension is not 1 or 2")
+    if not by.has_orientation and 1 in by.shape(x) and by.shape(x) != (1, 1):
+        raise MismatchError("a vector of a formula is neither row nor column: leave out the dimension")
+    return int(found)
 
 
 def created(

@@ -13,10 +13,10 @@ from armblocks.matlab.function_kinds import (
     TRIGONOMETRY,
     Arithmetic,
     Function,
+    along_dimension,
     constant,
     elementwise,
     rounded,
-    whole,
 )
 
 # Rounding and remainders, with the formulas of the blocks Rounding Function and Modulo.
@@ -57,8 +57,8 @@ CONSTANTS_BY_NAME: Mapping[str, Function] = {
     "eps": constant(2.0**-52, "The distance from 1 to the next larger number."),
     "deg": constant(math.pi / 180.0, "One degree in rad: `45*deg`.", reserved=True),
     "rad": constant(1.0, "One radian: `0.5*rad`.", reserved=True),
-    "true": constant(1.0, "1"),
-    "false": constant(0.0, "0"),
+    "true": constant(True, "1"),
+    "false": constant(False, "0"),
 }
 LOGARITHM = rounded("log", "Natural logarithm.", POWERS, 0.0)
 POWER = elementwise(
@@ -144,8 +144,12 @@ FUNCTIONS_OF_NUMBERS: Mapping[str, Function] = {
         lambda by, x, y: (x != 0.0) != (y != 0.0),
     ),
     "not": elementwise("x", "1 where x is 0, as `~x`.", CHOICE, lambda by, x: x == 0.0),
-    "any": whole("x", "1 where one element is not 0.", CHOICE, lambda by, x: by.folded(by.either, x != 0.0)),
-    "all": whole("x", "1 where all elements are not 0.", CHOICE, lambda by, x: by.folded(by.both, x != 0.0)),
+    "any": along_dimension(
+        "1 where one element is not 0.", CHOICE, lambda by, x: by.folded(by.either, x != 0.0)
+    ),
+    "all": along_dimension(
+        "1 where all elements are not 0.", CHOICE, lambda by, x: by.folded(by.both, x != 0.0)
+    ),
     "min": elementwise(
         "x, y",
         "The smaller of two numbers, element by element; `min(x)` is the smallest element.",

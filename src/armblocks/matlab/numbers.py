@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from functools import reduce
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from armblocks.matlab.arrays import (
     Budget,
     array_of,
     is_array,
+    is_logical,
     kind_of,
     number_of,
     operate,
@@ -110,7 +112,9 @@ class NumberArithmetic:
 
     def total(self, value: Array) -> Array:
         """The sum of a vector, or the sums of the columns of a matrix."""
-        return self.folded(np.add, value) if value.size else scalar(0.0)
+        if value.size:
+            return self.folded(np.add, value)
+        return np.zeros((1, value.shape[1])) if value.shape[0] == 0 and value.shape[1] > 1 else scalar(0.0)
 
     def length_of(self, value: Array) -> Array:
         """The square root of the sum of the squares of all elements."""
@@ -123,6 +127,10 @@ class NumberArithmetic:
     def vector_like(self, entries: Sequence[Any], model: Array) -> Array:
         """A vector of these elements, with the orientation of ``model``."""
         return np.array(entries, dtype=np.float64).reshape((-1, 1) if model.shape[1] == 1 else (1, -1))
+
+    def constant_number(self, value: Array) -> float:
+        """A constant number; NaN for anything else."""
+        return float(value[0, 0]) if value.size == 1 else math.nan
 
     def from_rows(self, rows: Sequence[Sequence[Any]]) -> Array:
         """A matrix of numbers and elements."""
@@ -181,7 +189,7 @@ class Numbers:
         """``~value``"""
         array = array_of(place, value, "the operand of '~'")
         self.budget.spend(place, array.size)
-        return (array == 0.0).astype(np.float64)
+        return cast("Array", array == 0.0)
 
     def operate(self, place: Place, operator: str, left: object, right: object) -> Array:
         """``left operator right`` of arithmetic or a comparison."""
@@ -200,7 +208,7 @@ class Numbers:
                 )
             self.budget.spend(place, max(found.size, other.size))
             found = joined(found, other)
-        return found.astype(np.float64)
+        return cast("Array", found)
 
     def matrix(self, place: Place, rows: Sequence[Sequence[object]]) -> Plain:
         """``[a b; c d]`` of arrays, or of texts in one row."""
@@ -229,7 +237,11 @@ class Numbers:
         """``value'``"""
         array = array_of(place, value, "the operand of the transpose")
         self.budget.spend(place, array.size)
-        return array.T.copy()
+        return cast("Array", (array != 0.0).T) if is_logical(value) else array.T.copy()
+
+    def index(self, place: Place, value: Plain, written: Expression) -> Plain:
+        """The value of an index: positions, or a logical array that selects elements."""
+        return value
 
     def element(self, place: Place, value: object, indices: Sequence[object], shown: str) -> Array:
         """``value(indices)``, where ``None`` is ``:``."""
@@ -264,6 +276,8 @@ class Numbers:
     ) -> Plain:
         """``name(arguments)`` of a function in the table. Complex results are errors."""
         function = TABLE[name]
+        if name in ("power", "pow") and len(arguments) == 2:
+            return self.operate(place, ".^", *arguments)
         plain: list[Any] = [
             value if isinstance(value, str) and function.may_be_text(k) else _argument(place, value, name)
             for k, value in enumerate(arguments)
@@ -281,9 +295,9 @@ class Numbers:
         self.budget.spend(place, size * (ROUNDED_WORK if function.elementary else 1))
         with np.errstate(all="ignore"):
             found = call_function(self._arithmetic, place, name, plain, np.asarray)
-        found = np.asarray(found, dtype=np.float64)
-        self.budget.spend(place, found.size)
-        return found
+        array = cast("Array", found if is_logical(found) else np.asarray(found, dtype=np.float64))
+        self.budget.spend(place, array.size)
+        return array
 
 
 def _argument(place: Place, value: object, name: str) -> Array:

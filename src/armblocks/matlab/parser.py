@@ -203,7 +203,10 @@ class Parser:
         return Range(tuple(parts), at)
 
     def _signed(self) -> Expression:
-        """A sequence of signs and its operand; a power binds tighter than a sign."""
+        """A sequence of signs and its operand; a power binds tighter than a sign.
+
+        A transpose has the precedence of a power: ``A^2'`` is ``(A^2)'``.
+        """
         signs = self._signs()
         at = self.token.at
         found = self._postfix()
@@ -211,7 +214,12 @@ class Parser:
         while self._level() is Level.POWER:
             token = self.take()
             behind = self._signs()
-            rest.append(Operation(token.text, _with_signs(behind, self._postfix()), token.at))
+            rest.append(Operation(token.text, _with_signs(behind, self._postfix(exponent=True)), token.at))
+            if self._at_transpose():
+                power, steps = Chain(found, tuple(rest), at), list[Step]()
+                while self._at_transpose():
+                    steps.append(Transpose(self.take().at))
+                found, rest = Postfix(power, tuple(steps), at), []
         return _with_signs(signs, Chain(found, tuple(rest), at) if rest else found)
 
     def _signs(self) -> list[Token]:
@@ -223,11 +231,17 @@ class Parser:
 
     # -- operands ----------------------------------------------------------------------------------------
 
-    def _postfix(self) -> Expression:
+    def _at_transpose(self) -> bool:
+        return self.at_operator("'", ".'") and not (self.in_matrix and self.token.spaced)
+
+    def _postfix(self, *, exponent: bool = False) -> Expression:
+        """An operand and what follows it; an ``exponent`` ends before a transpose."""
         at = self.token.at
         base = self._primary()
         steps: list[Step] = []
-        while (step := self._step(base, bool(steps))) is not None:
+        while not (exponent and self._at_transpose()):
+            if (step := self._step(base, bool(steps))) is None:
+                break
             steps.append(step)
         if steps and isinstance(base, Postfix):
             return Postfix(base.base, (*base.steps, *steps), at)

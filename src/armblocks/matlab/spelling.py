@@ -22,6 +22,7 @@ from armblocks.matlab.syntax import (
     Range,
     Step,
     Text,
+    Transpose,
 )
 
 
@@ -94,7 +95,12 @@ def _bracketed(expression: Expression, loosest: Level) -> str:
 
 
 def _operand_of_power(expression: Expression, loosest: Level) -> str:
-    """An exponent: its signs need no brackets, ``2^-1``, unless a power follows them, ``2^(-1^2)``."""
+    """An exponent: its signs need no brackets, ``2^-1``, unless a power follows them, ``2^(-1^2)``.
+
+    A transpose in an exponent needs brackets, because ``A^b'`` is ``(A^b)'``.
+    """
     if isinstance(expression, Prefix):
-        return expression.operator + _bracketed(expression.operand, Level.OPERAND)
+        return expression.operator + _operand_of_power(expression.operand, Level.OPERAND)
+    if isinstance(expression, Postfix) and any(isinstance(step, Transpose) for step in expression.steps):
+        return f"({spelling(expression)})"
     return _bracketed(expression, loosest)

@@ -3,11 +3,17 @@
 A vector is neither row nor column: ``[1 2]`` and ``[1; 2]`` are the same, and ``[v; w]`` has the rows v and
 w. Two vectors are multiplied element by element, as in Simulink's Fcn block (an error in MATLAB for two
 rows); with a matrix ``*`` is the matrix product, as in MATLAB, and ``.*`` is elementwise.
+
+Where the orientation of a vector decides in MATLAB, and the text of the formula shows it, as in ``u'*A*u`` or
+``A(1, :)*A(:, 2)``, the formula is refused: see :class:`Oriented`.
 """
 
 from __future__ import annotations
 
+import math
+import operator
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import reduce
 from typing import Any
 
@@ -17,41 +23,54 @@ from casadi import SX, evalf, horzcat, if_else, logic_and, logic_not, logic_or, 
 from numpy.typing import NDArray
 
 from armblocks.equations import elementary
-from armblocks.errors import UnknownNameError
+from armblocks.errors import ArmblocksError, UnknownNameError
 from armblocks.matlab.array_functions import range_of
-from armblocks.matlab.arrays import positions
+from armblocks.matlab.arrays import EXPONENTS, POWERS_OF_MATRICES, positions
 from armblocks.matlab.calls import call_function
 from armblocks.matlab.function_kinds import MismatchError
 from armblocks.matlab.functions import TABLE
 from armblocks.matlab.source import Place
-from armblocks.matlab.syntax import Expression
+from armblocks.matlab.syntax import Expression, is_logical
 from armblocks.spatial.rotation import cos_exact, sin_exact
 
-Symbol = SX | str
+
+@dataclass(frozen=True)
+class Oriented:
+    """A vector that is a ``row`` or ``column`` of a matrix, a product with a matrix, or ``transposed``."""
+
+    value: SX
+    kind: str
+
+
+Symbol = SX | str | Oriented
 """Texts are arguments of functions only."""
 
 
-def _quotient(left: SX, right: SX) -> SX:
-    """CasADi evaluates every constant divided by zero as plus infinity, also -1/0 and 0/0."""
-    if not (left.is_constant() and right.is_constant()):
-        return left / right
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return SX(np.divide(evalf(left).full(), evalf(right).full()))
+def _exact(operation: Callable[[Any, Any], Any]) -> Callable[[SX, SX], SX]:
+    """The operation, of constants in IEEE arithmetic: CasADi gives 0 for inf - inf, and 1 for nan == nan."""
+
+    def found(left: SX, right: SX) -> SX:
+        if not (left.is_constant() and right.is_constant()):
+            return operation(left, right)
+        with np.errstate(all="ignore"):
+            return SX(np.asarray(operation(evalf(left).full(), evalf(right).full()), dtype=np.float64))
+
+    return found
 
 
 _OPERATIONS: Mapping[str, Callable[[SX, SX], SX]] = {
-    "+": lambda left, right: left + right,
-    "-": lambda left, right: left - right,
-    "*": lambda left, right: left * right,
-    "/": _quotient,
-    "\\": lambda left, right: _quotient(right, left),
+    "+": _exact(operator.add),
+    "-": _exact(operator.sub),
+    "*": _exact(operator.mul),
+    "/": _exact(lambda left, right: left / right),
+    "\\": _exact(lambda left, right: right / left),
     "^": lambda left, right: elementary("power", left, right),
-    "<": lambda left, right: left < right,
-    "<=": lambda left, right: left <= right,
-    ">": lambda left, right: right < left,
-    ">=": lambda left, right: right <= left,
-    "==": lambda left, right: left == right,
-    "~=": lambda left, right: left != right,
+    "<": _exact(operator.lt),
+    "<=": _exact(operator.le),
+    ">": _exact(lambda left, right: right < left),
+    ">=": _exact(lambda left, right: right <= left),
+    "==": _exact(operator.eq),
+    "~=": _exact(operator.ne),
 }
 
 
@@ -94,7 +113,7 @@ class SymbolArithmetic:
 
     def quotient(self, left: SX, right: SX) -> SX:
         """``left ./ right``"""
-        return _quotient(left, right)
+        return _OPERATIONS["/"](left, right)
 
     def remainder(self, left: SX, right: SX) -> SX:
         """The exact remainder with the sign of the dividend."""
@@ -114,7 +133,7 @@ class SymbolArithmetic:
 
     def constant(self, array: NDArray[np.float64]) -> SX:
         """An array of numbers."""
-        return _plain(SX(array)) if array.size else SX(0, 1)
+        return _plain(SX(np.asarray(array, dtype=np.float64))) if array.size else SX(0, 1)
 
     def shape(self, value: SX) -> tuple[int, int]:
         """Rows and columns; a vector is a column."""
@@ -142,6 +161,10 @@ class SymbolArithmetic:
     def vector_like(self, entries: Sequence[Any], model: SX) -> SX:
         """A vector of these elements."""
         return vertcat(*entries)
+
+    def constant_number(self, value: SX) -> float:
+        """A constant number; NaN for anything else."""
+        return float(value) if value.numel() == 1 and value.is_constant() else math.nan
 
     def from_rows(self, rows: Sequence[Sequence[Any]]) -> SX:
         """A matrix of numbers and elements."""
@@ -185,7 +208,7 @@ class Symbols:
 
     def negative(self, place: Place, value: Symbol) -> Symbol:
         """``-value``"""
-        return -_symbol(place, value)
+        return _oriented_like(-_symbol(place, value), value)
 
     def logical_not(self, place: Place, value: Symbol) -> Symbol:
         """``~value``"""
@@ -196,16 +219,14 @@ class Symbols:
         a, b = _symbol(place, left), _symbol(place, right)
         if operator == "*" and _is_matrix(a, b):
             return _product(place, a, b)
+        if operator in ("*", "/", "\\") and 1 not in (a.numel(), b.numel()):
+            _check_products(place, operator, left, right)
         if operator == "^" and (a.shape[1] > 1 or b.shape[1] > 1):
-            raise place.error(
-                "powers of matrices are not supported",
-                allowed="powers of numbers and vectors",
-                fix="write .^ for powers element by element",
-            )
+            return _matrix_power(place, a, b)
         divisor = b if operator == "/" else a
         if operator in ("/", "\\") and divisor.numel() != 1 and _is_matrix(a, b):
             raise place.error("the divisor is a matrix", allowed="inv(A) * b, or ./ for elementwise division")
-        return _together(place, _OPERATIONS[operator.removeprefix(".")], a, b)
+        return _oriented_like(_together(place, _OPERATIONS[operator.removeprefix(".")], a, b), left, right)
 
     def logic(self, place: Place, operator: str, values: Sequence[Symbol]) -> Symbol:
         """All values joined by one of ``&& || & |``."""
@@ -220,6 +241,13 @@ class Symbols:
         values = [] if rows else [SX(0, 1)]
         for row in rows:
             entries = [_symbol(place, entry) for entry in row]
+            columns = [entry for entry in row if isinstance(entry, Oriented) and entry.kind == "column"]
+            if columns and (len(rows) > 1 or len(row) > 1):
+                raise place.error(
+                    "a column of a matrix, or a matrix times a vector, is combined with others in brackets",
+                    allowed="numbers, vectors, and rows of matrices inside brackets",
+                    fix="write A(:, [2 1]) for columns of one matrix",
+                )
             if any(entry.shape[1] > 1 for entry in entries):
                 raise place.error(
                     "a matrix is inside brackets", allowed="numbers and vectors inside brackets"
@@ -250,12 +278,24 @@ class Symbols:
 
     def transposed(self, place: Place, value: Symbol) -> Symbol:
         """``value'``"""
-        return _plain(_symbol(place, value).T)
+        array = _symbol(place, value)
+        if array.shape[1] > 1 or array.numel() < 2:
+            return _plain(array.T)
+        kind = value.kind if isinstance(value, Oriented) else ""
+        return Oriented(array, {"row": "column", "column": "row"}.get(kind, "transposed"))
+
+    def index(self, place: Place, value: Symbol, written: Expression) -> Symbol:
+        """The value of an index. Raises an error for a logical one."""
+        if is_logical(written):
+            raise place.error(
+                "an index is a comparison or a logical value", allowed="positions counted from 1"
+            )
+        return value
 
     def element(self, place: Place, value: Symbol, indices: Sequence[Symbol | None], shown: str) -> Symbol:
         """``value(indices)`` with constant indices, where ``None`` is ``:``."""
         array = _symbol(place, value)
-        chosen: list[object] = []
+        chosen: list[NDArray[np.float64] | None] = []
         for index in indices:
             numbers = None if index is None else _constant(_symbol(place, index))
             if index is not None and numbers is None:
@@ -264,16 +304,26 @@ class Symbols:
                 )
             chosen.append(numbers)
         rows, columns = array.shape
+        if isinstance(value, Oriented) and value.kind == "row":
+            rows, columns = columns, rows
+        elif len(indices) == 2 and columns == 1 and not isinstance(value, Oriented):
+            chosen = _single_index(place, rows, chosen)
         found = positions(place, (rows, columns), chosen, shown)
         if found.size == 1:
             return array[int(found.flat[0])]
         entries = vertcat(*(array[int(k)] for k in found.ravel(order="F")), SX(0, 1))
-        return _plain(reshape(entries, *found.shape)) if found.size else SX(0, 1)
+        if not found.size:
+            return SX(0, 1)
+        shaped = reshape(entries, *found.shape)
+        return _of_matrix(shaped) if array.shape[1] > 1 else _plain(shaped)
 
     def last_index(self, place: Place, value: Symbol, position: int, count: int) -> Symbol:
         """``end`` as index ``position`` of ``count`` indices."""
         array = _symbol(place, value)
-        return SX(float(array.numel() if count == 1 else array.shape[min(position, 1)]))
+        if count > 1 and array.shape[1] == 1 and array.numel() > 1 and not isinstance(value, Oriented):
+            raise _without_orientation(place)
+        extents = array.shape[::-1] if isinstance(value, Oriented) and value.kind == "row" else array.shape
+        return SX(float(array.numel() if count == 1 else extents[min(position, 1)]))
 
     def cell_element(self, place: Place, value: Symbol, indices: Sequence[Symbol | None]) -> Symbol:
         """Cell arrays exist in scripts only."""
@@ -302,7 +352,10 @@ class Symbols:
         ]
         if function.elementwise and len(given) > 1:
             _check_shapes(place, [value for value in given if isinstance(value, SX)])
-        return _plain(call_function(self._arithmetic, place, name, given, _constant))
+        found = call_function(self._arithmetic, place, name, given, _constant)
+        if any(isinstance(value, SX) and value.shape[1] > 1 for value in given):
+            return _of_matrix(found)
+        return _oriented_like(_plain(found), *arguments) if function.elementwise else _plain(found)
 
     def _known(self) -> set[str]:
         return {*self._names, *(name for name, function in TABLE.items() if function.most == 0)}
@@ -313,7 +366,38 @@ def _symbol(place: Place, value: Symbol) -> SX:
         raise place.error(
             f"the text '{value[:40]}' is not a number", allowed="numbers and names without quotes"
         )
-    return value
+    return value.value if isinstance(value, Oriented) else value
+
+
+def _of_matrix(value: SX) -> Symbol:
+    """A part of a matrix, or a reduction of one: a vector is its row or column."""
+    if value.numel() < 2 or 1 not in value.shape:
+        return value
+    return Oriented(_plain(value), "row" if value.shape[0] == 1 else "column")
+
+
+def _oriented_like(result: SX, *operands: Symbol) -> Symbol:
+    """The result of an operation element by element: a vector with the orientation of its operands."""
+    kinds = [operand.kind for operand in operands if isinstance(operand, Oriented)]
+    return Oriented(result, kinds[0]) if kinds and result.shape[1] == 1 and result.numel() > 1 else result
+
+
+def _without_orientation(place: Place) -> ArmblocksError:
+    return place.error(
+        "a vector has two indices, but is neither row nor column in a formula", allowed="v(2), v(2:3), v(end)"
+    )
+
+
+def _single_index(
+    place: Place, count: int, chosen: Sequence[NDArray[np.float64] | None]
+) -> list[NDArray[np.float64] | None]:
+    """The indices (k, 1) of ``v(k, 1)`` or ``v(1, k)``. Raises an error for others, unless v is a number."""
+    numbers = [float(index[0, 0]) for index in chosen if index is not None and index.size == 1]
+    if count == 1:
+        return list(chosen)
+    if len(numbers) < 2 or 1.0 not in numbers:
+        raise _without_orientation(place)
+    return [np.array([[max(numbers)]]), np.ones((1, 1))]
 
 
 def _constant(value: object) -> NDArray[np.float64] | None:
@@ -331,7 +415,36 @@ def _is_matrix(left: SX, right: SX) -> bool:
     return not (left.numel() == 1 or right.numel() == 1) and (left.shape[1] > 1 or right.shape[1] > 1)
 
 
-def _product(place: Place, left: SX, right: SX) -> SX:
+def _check_products(place: Place, operator: str, left: Symbol, right: Symbol) -> None:
+    """Raise an error for a product of two vectors, one of which is a row, a column or a transpose."""
+    kinds = [value.kind for value in (left, right) if isinstance(value, Oriented)]
+    if kinds:
+        what = {"transposed": "a transposed vector"}.get(kinds[0], f"a {kinds[0]} of a matrix or product")
+        raise place.error(
+            f"{what} and a vector are combined by '{operator}'",
+            allowed="vectors without orientation, which are combined element by element",
+            fix="write dot(v, w) for the scalar product v'*w, dot(v, A*w) for v'*A*w, "
+            ".* and ./ for the operation element by element",
+        )
+
+
+def _matrix_power(place: Place, base: SX, exponent: SX) -> SX:
+    number = _constant(exponent)
+    rows, columns = base.shape
+    if rows != columns or number is None or number.size != 1 or number[0, 0] not in EXPONENTS:
+        raise place.error(
+            "the power of a matrix is not supported for this exponent"
+            if rows == columns
+            else "a power of a matrix that is not square",
+            allowed=POWERS_OF_MATRICES,
+            fix="write .^ for powers element by element",
+        )
+    count = int(number[0, 0])
+    factor = casadi.inv(base) if count < 0 else base
+    return reduce(mtimes, [factor] * abs(count), SX(np.eye(rows)))
+
+
+def _product(place: Place, left: SX, right: SX) -> Symbol:
     """The matrix product; a vector on the left is a row."""
     if left.shape[1] == 1:
         left = left.T
@@ -340,7 +453,7 @@ def _product(place: Place, left: SX, right: SX) -> SX:
             f"a matrix of {_size(left)} is multiplied by one of {_size(right)}",
             allowed="as many columns on the left as rows on the right; .* multiplies elementwise",
         )
-    return _plain(mtimes(left, right))
+    return _of_matrix(mtimes(left, right))
 
 
 def _size(value: SX) -> str:

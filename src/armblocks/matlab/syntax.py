@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from armblocks.matlab.operators import COMPARISONS, LOGIC
 from armblocks.matlab.source import Position
 
 
@@ -198,6 +199,24 @@ def parts_of(expression: Expression) -> tuple[Expression, ...]:
             return (base, *(argument for arguments in given for argument in arguments))
         case _:
             return ()
+
+
+LOGICAL_FUNCTIONS = frozenset(("true", "false", "and", "or", "xor", "not", "any", "all"))
+
+
+def is_logical(expression: Expression) -> bool:
+    """Whether an expression is a comparison, a logical operation, or an array of such."""
+    match expression:
+        case Chain(rest=rest):
+            return rest[0].operator in LOGIC or rest[0].operator in COMPARISONS
+        case Prefix(operator=operator):
+            return operator == "~"
+        case Name(name=name) | Postfix(base=Name(name=name)):
+            return name in LOGICAL_FUNCTIONS
+        case Matrix():
+            return any(is_logical(element) for element in parts_of(expression))
+        case _:
+            return False
 
 
 def levels(expression: Expression) -> Iterator[tuple[Expression, ...]]:

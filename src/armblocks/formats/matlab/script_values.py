@@ -73,6 +73,10 @@ class ScriptValues:
         """``value'``"""
         return value if isinstance(value, LinkArray) else self._numbers.transposed(place, value)
 
+    def index(self, place: Place, value: Value, written: Expression) -> Value:
+        """The value of an index: positions, or a logical array that selects elements."""
+        return value
+
     def element(self, place: Place, value: Value, indices: Sequence[Value | None], shown: str) -> Value:
         """``value(indices)`` of a matrix or of an array of links."""
         if isinstance(value, LinkRecord):
