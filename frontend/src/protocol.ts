@@ -376,7 +376,7 @@ export interface RenameLink {
 export interface SetSettings {
   kind: "settings";
   values: {
-    [k: string]: number | string | null;
+    [k: string]: boolean | number | string | null;
   };
 }
 /**
@@ -671,7 +671,7 @@ export interface TypedSettings {
   kind: "typed_settings";
   document: string;
   values: {
-    [k: string]: number | string | null;
+    [k: string]: boolean | number | string | null;
   };
 }
 /**
@@ -726,7 +726,7 @@ export interface DiagramChange {
   kind: "diagram";
   sheet: SheetChange;
   settings: {
-    [k: string]: number | string | null;
+    [k: string]: boolean | number | string | null;
   };
 }
 /**
@@ -937,7 +937,7 @@ export interface DiagramContent {
   inside: string[];
   sheet: Sheet;
   settings: {
-    [k: string]: number | string | null;
+    [k: string]: boolean | number | string | null;
   };
   run: string | null;
 }
@@ -1116,7 +1116,7 @@ export interface SettingRule {
   title: string;
   unit: string;
   doc: string;
-  default: number | string | null;
+  default: boolean | number | string | null;
 }
 export interface Replies {
   ask_mask: SetMask;

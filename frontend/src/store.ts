@@ -25,7 +25,7 @@ import { samples } from './samples'
 export interface OpenDocument {
   state: DocumentState
   /** The run settings, by the names of `SimulationOptions`. */
-  settings: Record<string, number | string | null>
+  settings: Record<string, boolean | number | string | null>
   /** Names of the subsystems that lead to the displayed sheet. */
   inside: string[]
   name: string

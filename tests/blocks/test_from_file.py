@@ -127,7 +127,7 @@ def test_invalid_tables_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"the table has shape \(2,\).*times \(s\) into the first column"):
         FromFile(data=(0.0, 1.0))
     with pytest.raises(InputError, match=r"row 3 of the table is \[1\.0, 5\.0\].*drop repeated times"):
-        TimeTable([[0.0, 1.0], [1.0, 2.0], [1.0, 5.0]])
+        TimeTable([[0.0, 1.0], [1.0, 2.0], [1.0, 5.0], [1.0, 6.0]])
     with pytest.raises(InputError, match="the value is 'x'"):
         FromFile(data="x")
     with pytest.raises(UnknownNameError, match=r"no file type named '\.txt'"):

@@ -218,4 +218,4 @@ def test_a_run_logs_the_chosen_signals_while_it_runs(
     result = invoke(*arguments, "--log-signals", "x1, x2")
     assert result.exit_code == 0, result.output
     assert pq.read_table("all.parquet").column_names == ["time", "x1/y", "x2/y"]
-    assert "all 101 samples: all.parquet" in result.output
+    assert "all 101 rows: all.parquet" in result.output

@@ -83,7 +83,7 @@ def test_a_bad_file_is_refused_with_one_message_and_writes_nothing(
     (tmp_path / "evil.py").write_text("open('stolen', 'w')\ndef f(u): return u\n", encoding="utf-8")
     data = content if isinstance(content, bytes) else content.encode()
     (tmp_path / "tried.json").write_bytes(data)
-    result = invoke("run", "tried.json", "--out", "kept", "--no-figures")
+    result = invoke("run", "tried.json", "--out", "kept", "--no-figures", "--no-jumps")
     said = " ".join(result.stderr.split())
     assert result.exit_code == 2, result.output
     assert said.startswith("error: ")
@@ -245,7 +245,7 @@ def test_the_run_of_a_good_file_agrees_with_its_closed_form(
     content: str, compare: Any, error: float, invoke: Callable[..., Result], tmp_path: Path
 ) -> None:
     (tmp_path / "tried.json").write_text(content, encoding="utf-8")
-    result = invoke("run", "tried.json", "--out", "kept", "--no-figures")
+    result = invoke("run", "tried.json", "--out", "kept", "--no-figures", "--no-jumps")
     assert result.exit_code == 0, result.output
     with (tmp_path / "kept" / "data.csv").open(encoding="utf-8", newline="") as stream:
         names, *rows = csv.reader(stream)

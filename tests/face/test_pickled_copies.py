@@ -22,6 +22,7 @@ from armblocks import errors, formats
 from armblocks.blocks import BLOCKS, FromFile, Gain, Integrator, PythonFunction, Scope, SineWave
 from armblocks.diagram import UserFunction, content_key
 from armblocks.simulation import Samples
+from armblocks.simulation.jumps import Jumps
 
 WAYS: dict[str, Callable[[Any], Any]] = {
     "pickle": lambda value: pickle.loads(pickle.dumps(value)),
@@ -90,6 +91,8 @@ def content(value: Any) -> object:
         return ab.CompiledDiagram, content(value.diagram)
     if isinstance(value, ab.DiagramBuilder):
         return ab.DiagramBuilder, content(value.build())
+    if isinstance(value, Jumps):
+        return Jumps, content(value.table)
     if isinstance(value, errors.ArmblocksError):
         return type(value), str(value), content(vars(value))
     return repr(value) if isinstance(value, float) and math.isnan(value) else value

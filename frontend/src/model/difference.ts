@@ -1,5 +1,5 @@
 import type { RunSamples, Signal } from './run_samples'
-import { valueAt } from './trace'
+import { valueAt, valueBefore } from './trace'
 
 /** The difference between two runs in one element of a signal. */
 export interface Difference {
@@ -14,8 +14,8 @@ const known = new Map<string, Difference>()
 const MOST_KNOWN = 256
 
 /**
- * `compared - baseline` at the instants of the baseline, where both have values. The compared run is
- * interpolated linearly between its samples.
+ * `compared - baseline` at the instants of the baseline, where both have values, on both sides of its jumps.
+ * The compared run is interpolated linearly between its samples.
  */
 export function difference(
   baseline: RunSamples,
@@ -44,7 +44,8 @@ function between(a: Signal, b: Signal, element: number): Difference {
   let at = NaN
   for (let k = 0; k < first.length; k++) {
     const time = a.time[k]!
-    const other = b.time[k] === time ? second.values[k]! : valueAt(second, time)
+    const left = a.time[k + 1] === time
+    const other = left ? valueBefore(second, time) : valueAt(second, time)
     if (Number.isNaN(other)) continue
     const apart = other - first[k]!
     times.push(time)

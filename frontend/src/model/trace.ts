@@ -1,4 +1,4 @@
-import { firstAfter } from './instants'
+import { firstAfter, firstNotBefore } from './instants'
 import type { RunSamples } from './run_samples'
 
 /** One line of a plot. The arrays are read at each frame, because they grow during a run. */
@@ -140,7 +140,41 @@ export function within(
   return { time: time.subarray(begin, end), values: values.subarray(begin, end) }
 }
 
-/** The linearly interpolated value at an instant; NaN outside the samples. */
+/** The left limit at an instant, linearly interpolated; NaN outside the samples. */
+export function valueBefore(trace: { time: Float64Array; values: Float64Array }, at: number): number {
+  const first = firstNotBefore(trace.time, at)
+  return trace.time[first] === at ? trace.values[first]! : valueAt(trace, at)
+}
+
+/**
+ * Traces with a common column of times. A time occurs as often as in the trace with most rows there: at a
+ * jump twice. A trace with one row there has its value in both, a trace without one has none.
+ */
+export function joined(traces: { time: Float64Array; values: Float64Array }[]): Drawn {
+  const next = traces.map(() => 0)
+  const times: number[] = []
+  const columns = traces.map((): (number | undefined)[] => [])
+  for (;;) {
+    const at = Math.min(...traces.map(({ time }, k) => time[next[k]!] ?? Infinity))
+    if (at === Infinity) break
+    const rows = traces.map(({ time }, k) => {
+      let count = 0
+      while (time[next[k]! + count] === at) count++
+      return count
+    })
+    const most = Math.max(...rows)
+    for (let row = 0; row < most; row++) {
+      times.push(at)
+      traces.forEach(({ values }, k) =>
+        columns[k]!.push(rows[k] ? values[next[k]! + Math.min(row, rows[k]! - 1)] : undefined),
+      )
+    }
+    rows.forEach((count, k) => (next[k]! += count))
+  }
+  return [Float64Array.from(times), ...columns]
+}
+
+/** The linearly interpolated value at an instant, after a jump there; NaN outside the samples. */
 export function valueAt({ time, values }: { time: Float64Array; values: Float64Array }, at: number): number {
   const after = firstAfter(time, at)
   if (after === 0 || (after === time.length && time[after - 1] !== at)) return NaN

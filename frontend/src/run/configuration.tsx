@@ -1,4 +1,4 @@
-import { Alert, Button, Group, Modal, NativeSelect, Stack, TextInput } from '@mantine/core'
+import { Alert, Button, Checkbox, Group, Modal, NativeSelect, Stack, TextInput } from '@mantine/core'
 import { useEffect, useState } from 'react'
 import { show, useDialogs } from '../dialogs'
 import { valueText } from '../inspector/value_text'
@@ -19,13 +19,19 @@ export function Configuration() {
 }
 
 /** Format small numbers as typed: 1e-6. */
+const settingText = (value: boolean | number | string | null) =>
+  typeof value === 'boolean' ? String(value) : numberText(value)
+
 const numberText = (value: number | string | null) =>
   typeof value === 'number' && value !== 0 && Math.abs(value) < 1e-3
     ? value.toExponential()
     : valueText(value)
 
 /** Errors of typed settings by name, from the server. */
-function useFaults(document: string, values: Record<string, string | null>): Record<string, string> {
+function useFaults(
+  document: string,
+  values: Record<string, boolean | string | null>,
+): Record<string, string> {
   const [faults, setFaults] = useState<Record<string, string>>({})
   const asked = JSON.stringify(values)
   useEffect(() => {
@@ -75,11 +81,19 @@ function Form({ onClose }: { onClose: () => void }) {
   const welcome = useStudio((s) => s.welcome)
   const run = useStudio((s) => s.run)
   const [start] = useState(() =>
-    Object.fromEntries(Object.entries(settings ?? {}).map(([name, value]) => [name, numberText(value)])),
+    Object.fromEntries(Object.entries(settings ?? {}).map(([name, value]) => [name, settingText(value)])),
   )
   const [typed, setTyped] = useState<Record<string, string>>(start)
   const changed = Object.keys(typed).filter((name) => typed[name] !== start[name])
-  const values = Object.fromEntries(changed.map((name) => [name, typed[name]?.trim() ? typed[name] : null]))
+  const switches = new Set(
+    welcome?.settings.filter((rule) => typeof rule.default === 'boolean').map((r) => r.name),
+  )
+  const values = Object.fromEntries(
+    changed.map((name) => {
+      const text = typed[name]?.trim()
+      return [name, switches.has(name) ? text === 'true' : text || null]
+    }),
+  )
   const faults = useFaults(document, values)
   const wrong = changed.length > 0 && Object.keys(faults).length > 0
   const put = (name: string) => (event: React.ChangeEvent<HTMLInputElement | HTMLSelectElement>) => {
@@ -116,6 +130,19 @@ function Form({ onClose }: { onClose: () => void }) {
                   data={choices}
                   value={typed[name] ?? 'auto'}
                   onChange={put(name)}
+                />
+              )
+            if (switches.has(name))
+              return (
+                <Checkbox
+                  key={name}
+                  className="wide"
+                  {...common}
+                  checked={typed[name] === 'true'}
+                  onChange={(event) => {
+                    const { checked } = event.currentTarget
+                    setTyped((now) => ({ ...now, [name]: String(checked) }))
+                  }}
                 />
               )
             return (

@@ -52,7 +52,9 @@ export function hold(): void {
 
 /** Show an earlier or later recorded instant. */
 export function stepCursor(by: number): void {
-  const index = Math.min(Math.max(samples.indexAt(shownTime()) + by, 0), samples.count - 1)
+  const shown = shownTime()
+  let index = Math.min(Math.max(samples.indexAt(shown) + by, 0), samples.count - 1)
+  while (by < 0 && index > 0 && samples.time[index] === shown) index-- // the other side of a jump
   if (index >= 0) useCursor.setState({ time: samples.time[index]!, playing: false })
 }
 

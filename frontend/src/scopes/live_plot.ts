@@ -1,7 +1,7 @@
 import uPlot from 'uplot'
 import { changed, watch } from '../frames'
 import { Growing } from '../model/growing'
-import { extremes, within, type Drawn, type Extremes, type Trace } from '../model/trace'
+import { extremes, joined, within, type Drawn, type Extremes, type Trace } from '../model/trace'
 import { useCursor } from '../run/cursor'
 import { mayFollow } from '../run/pace'
 import { useRuns } from '../run/runs'
@@ -221,11 +221,7 @@ function drawnOf(
       drawn: [first.time, ...parts.map(({ values }) => values)],
       ends: parts.map(({ time }) => time.length),
     }
-  return {
-    drawn: uPlot.join(
-      parts.map(({ time, values }) => [time, values] as uPlot.AlignedData),
-    ) as unknown as Drawn,
-  }
+  return { drawn: joined(parts) }
 }
 
 function scaled(drawn: Drawn, factor: number): Drawn {

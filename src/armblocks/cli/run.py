@@ -44,6 +44,14 @@ def run(
     sample_time: Annotated[float | None, typer.Option(help="Interval of the recorded samples, s.")] = None,
     rtol: Annotated[float | None, typer.Option(help="Relative tolerance of an adaptive solver.")] = None,
     atol: Annotated[float | None, typer.Option(help="Absolute tolerance of an adaptive solver.")] = None,
+    jumps: Annotated[
+        bool | None,
+        typer.Option(
+            "--jumps/--no-jumps",
+            help="Record both sides of every jump of a signal.",
+            show_default="the model's",
+        ),
+    ] = None,
     from_state: Annotated[
         Path | None, typer.Option(help="Continue from the saved state of an earlier run.")
     ] = None,
@@ -82,7 +90,13 @@ def run(
     parameters = parse_assignments(assignments or [])
     diagram = ab.load_diagram(model, trust=trust)
     settings = _stated(
-        stop_time=stop_time, solver=solver, step=step, sample_time=sample_time, rtol=rtol, atol=atol
+        stop_time=stop_time,
+        solver=solver,
+        step=step,
+        sample_time=sample_time,
+        rtol=rtol,
+        atol=atol,
+        record_jumps=jumps,
     )
     _check_files(diagram, formats or [])
     folder = out or Path(f"{diagram.name}-report")
@@ -101,7 +115,7 @@ def run(
     print_motions(diagram, result, console)
     print_files(files, console)
     if result.log is not None:
-        console.print(f"all {result.log.rows} samples: {result.log.path}", highlight=False)
+        console.print(f"all {result.log.rows} rows: {result.log.path}", highlight=False)
     if open_report:
         typer.launch(str(files.page))
     if failure is not None:

@@ -15,6 +15,9 @@ from armblocks.errors import InputError
 class TimeTable:
     """``rows (n, 1 + m)``: a time (s) and the values at that time; at least two rows, times ascending.
 
+    Two rows with the same time are a jump: the left limits, then the values. The time of the first one is
+    stored as the double before it.
+
     Compared and hashed by content; ``source`` (the file that it comes from) and ``names`` (of the m columns)
     are not compared. Raises ``InputError`` for invalid rows.
     """
@@ -33,13 +36,16 @@ class TimeTable:
                 allowed="(n, 1 + m): n >= 2 rows of a time and m >= 1 values",
                 fix="put the times (s) into the first column",
             )
+        times = rows[:, 0]
+        left = np.append(times[:-1] == times[1:], False)
+        times[left] = np.nextafter(times[left], -np.inf)
         wrong = np.flatnonzero(~(np.diff(rows[:, 0]) > 0.0) | ~np.isfinite(rows[1:]).all(axis=1))
         if wrong.size or not np.isfinite(rows[0]).all():
             row = int(wrong[0]) + 1 if np.isfinite(rows[0]).all() else 0
             raise InputError(
-                f"row {row + 1} of the table is {rows[row].tolist()}",
+                f"row {row + 1} of the table is {np.array(self.rows, dtype=np.float64)[row].tolist()}",
                 where=self.source,
-                allowed="finite numbers, strictly ascending times",
+                allowed="finite numbers, ascending times; a time twice for a jump",
                 fix="sort the rows by time and drop repeated times",
             )
         rows.setflags(write=False)

@@ -203,6 +203,7 @@ def _shape(box: Box) -> Outline:
 def _trend(path: str, view: View | None, result: SimulationResult | None) -> Trend | None:
     if result is None or view is None:
         return None
+    result = result.with_jumps()
     count = len(result.time)
     return Trend(
         time=result.time, inputs=tuple(result[f"{path}/{s}"].reshape(count, -1) for s in view.signals)

@@ -23,6 +23,7 @@ class RunSettings(TypedDict, total=False):
     max_step: float | None
     rtol: float
     atol: float
+    record_jumps: bool
 
 
 _NAMES = frozenset(RunSettings.__annotations__)

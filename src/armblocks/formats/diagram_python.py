@@ -305,7 +305,7 @@ def _text(text: str) -> str:
 
 def _settings(diagram: Diagram) -> Iterator[str]:
     yield "diagram"
-    for name in ("stop_time", "solver", "step", "sample_time", "max_step", "rtol", "atol"):
+    for name in ("stop_time", "solver", "step", "sample_time", "max_step", "rtol", "atol", "record_jumps"):
         value = getattr(diagram.settings, name)
         if name == "stop_time" or value != getattr(type(diagram.settings)(), name):
             yield f"{name}={_value(value)}"

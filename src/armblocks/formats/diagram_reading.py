@@ -161,6 +161,8 @@ def _settings(node: Node, extras: Extras) -> SimulationOptions:
         default = _SETTINGS[name]
         if isinstance(default, str):
             values[name] = member.text()
+        elif isinstance(default, bool):
+            values[name] = member.boolean()
         else:
             values[name] = None if member.value is None and default is None else member.number()
     return dataclasses.replace(SimulationOptions(), **values)  # pyright: ignore[reportArgumentType]

@@ -30,8 +30,10 @@ class DiagramWriter:
         """A diagram with all diagrams inside it."""
         extras = cast("Mapping[str, Mapping[str, object]]", diagram.extras)
         block_extras, layout_extras = extras.get("blocks", {}), extras.get("layout", {})
+        settings = {name: getattr(diagram.settings, name) for name in _SETTINGS}
+        # Open choices, and the recording of jumps as usual, are not written.
         settings = {
-            name: value for name in _SETTINGS if (value := getattr(diagram.settings, name)) is not None
+            name: value for name, value in settings.items() if value is not None and value is not True
         }
         return {
             **extras.get("", {}),

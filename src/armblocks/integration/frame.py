@@ -36,10 +36,11 @@ class Arrays:
 
     ``reals`` and ``counts`` hold the state of the run, ``p`` the parameters. ``samples`` are the instants to
     record and ``out`` their states, ``(N, n)``; ``out_z``, ``out_w`` are likewise the discrete variables and
-    the unknowns. ``ends`` are the ends of the segments between breakpoints and ``clamps`` the latest time at
-    which each segment may evaluate its derivative. ``saved_reals`` and ``saved_counts`` receive the state
-    from which a run with a later end would continue. ``scratch`` is the memory for the linear equations of a
-    step. The loop returns after at most ``max_steps`` accepted steps.
+    the unknowns. ``jumps`` are both sides of the instants, see :class:`Records`. ``ends`` are the ends of the
+    segments between breakpoints and ``clamps`` the latest time at which each segment may evaluate its
+    derivative. ``saved_reals`` and ``saved_counts`` receive the state from which a run with a later end would
+    continue. ``scratch`` is the memory for the linear equations of a step. The loop returns after at most
+    ``max_steps`` accepted steps.
     """
 
     reals: Reals
@@ -51,6 +52,7 @@ class Arrays:
     out: Reals
     out_z: Reals
     out_w: Reals
+    jumps: Reals
     saved_reals: Reals
     saved_counts: Integers
     scratch: Reals

@@ -103,6 +103,7 @@ class Instants(Course):
         # the last place: a sample time after it, however close, is not recorded with it.
         known = time >= f.end.value * SAME_BELOW
         recorded = select(known, until, time)
+        self.before_jump(time)
         self.clocks.capture(time)
         if self.delays:
             self.delays.pass_jumps(time)
@@ -118,11 +119,22 @@ class Instants(Course):
             self.delays.write_change(time)
         self.evaluation.accept_unknowns()
         self.records.samples(time, recorded, None)
+        with f.r.when(self.records.jumps_recorded):
+            self.records.side_of_jump(time, f.count[Count.SAMPLE].value, self.x)
         if self.events:
             self.events.stop(time)
         f.leave_unless(f.count[Count.SEGMENT].value < f.segments, Status.DONE)
         self.begin_piece()
         f.count[Count.STARTED].value = Stage.START
+
+    def before_jump(self, time: Real) -> None:
+        """Record the left limits at an instant. At the start of a run they are the initial values."""
+        f, records = self.frame, self.records
+        with f.r.when(records.jumps_recorded):
+            before = select(time > 0.0, (time.bits() - 1).from_bits(), time)
+            self.point.value = before
+            self.evaluation.solve(self.point.memory, self.x)
+            records.side_of_jump(before, f.count[Count.SAMPLE].value, self.x)
 
     def before_step(self) -> None:
         """Make sure that the history of delayed signals has room for another step."""

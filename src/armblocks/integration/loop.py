@@ -38,7 +38,7 @@ from armblocks.routines.memory import Integers, Reals
 from armblocks.routines.routine import Program, Routine
 from armblocks.routines.values import Integer
 
-POINTERS = 12
+POINTERS = 13
 """Number of arrays among the arguments of the loop; the last argument is the number of steps."""
 
 
@@ -76,6 +76,7 @@ def define_loop(
         out: Reals,
         out_z: Reals,
         out_w: Reals,
+        jumps: Reals,
         saved_reals: Reals,
         saved_counts: Integers,
         scratch: Reals,
@@ -91,6 +92,7 @@ def define_loop(
             out=out,
             out_z=out_z,
             out_w=out_w,
+            jumps=jumps,
             saved_reals=saved_reals,
             saved_counts=saved_counts,
             scratch=scratch,
@@ -132,6 +134,7 @@ class _Loop:
             stages.begin(STEP)
             on = (f.taken.value < f.arrays.max_steps) & (f.time.value < f.pause)
             f.leave_unless(on, Status.PAUSED)
+            self.records.make_room()
             self.course.before_step()
             self.steps.write()
             self.course.accept(stages)

@@ -15,6 +15,7 @@ from armblocks.compiler.native import load_code
 from armblocks.integration.delay_history import ROWS_OF_A_STEP
 from armblocks.integration.elimination_plan import JacobianPattern
 from armblocks.integration.explicit_method import STIFF_CHECKS
+from armblocks.integration.jump_record import JumpRecord
 from armblocks.integration.linear_equations import LinearSpace
 from armblocks.integration.loop import POINTERS, loop_text
 from armblocks.integration.rosenbrock_method import STABLE_CHECKS
@@ -88,6 +89,7 @@ class NativeIntegrator:
         watch_stiffness: bool = False,
         stop: float | None = None,
         span: float | None = None,
+        jumps: bool = False,
     ) -> Integration:
         """A run from ``start`` to ``stop``, ready for its first step.
 
@@ -99,7 +101,8 @@ class NativeIntegrator:
         run continues from there, with the results of the run that wrote it. With ``watch_stiffness`` it
         pauses where a method for stiff systems, or an explicit method again, is faster
         (:attr:`Integration.wants_other`). ``span`` s: approximate length of the run, for the resolution of
-        events near time 0 (default: ``stop``). Arguments are not checked.
+        events near time 0 (default: ``stop``). ``jumps``: record both sides of each instant at which signals
+        may jump. Arguments are not checked.
         """
         if not isinstance(start, RunPoint):
             start = RunPoint(time=float(samples[0]), x=start)
@@ -124,6 +127,8 @@ class NativeIntegrator:
         run.reals[Scalar.SPAN] = stop if span is None else span
         run.reals[Scalar.PAUSE] = np.inf
         run.reals[Scalar.HALT] = np.inf
+        run.jumps.begin(wanted=jumps)
+        run.take_addresses()
         run.watch(max(1, int(run.counts[Count.WATCHING])) if watch_stiffness else 0)
         if stop <= begins and not self.sizes.hybrid:
             run.states[0] = start.x
@@ -147,6 +152,8 @@ class NativeIntegrator:
         new.counts[:] = run.counts
         new.counts[[Count.WATCHED, Count.STIFF, Count.CALM, Count.SHORT]] = 0
         new.watch(1 + int(run.counts[Count.WATCHING]))
+        new.jumps.share(run.jumps)
+        new.take_addresses()
         return new
 
     def advance(self, addresses: tuple[int, ...], max_steps: int) -> Status:
@@ -191,6 +198,7 @@ class Integration:
         # Parameters, sample times, ends of the segments, and the latest evaluation time of each segment.
         self.course = (np.ascontiguousarray(p), np.ascontiguousarray(samples), ends, clamps)
         self._scratch = np.empty(1 if integrator.space is None else integrator.space.length)
+        self.jumps = JumpRecord(self.counts, integrator.sizes)
         self.record(samples, records)
 
     def record(self, samples: Vector, records: tuple[Vector, Vector, Vector] | None = None) -> None:
@@ -205,7 +213,7 @@ class Integration:
         self.counts[Count.SAMPLE] = 0
         self.counts[Count.SAMPLES] = samples.size
         self.course = (p, np.ascontiguousarray(samples), ends, clamps)
-        self._take_addresses()
+        self.take_addresses()
 
     def make_room(self, numbers: int) -> None:
         """Enlarge the array of doubles, which contains the delay history, to at least ``numbers``
@@ -218,11 +226,12 @@ class Integration:
         self._saved = _checkpoint(self, saved, self._saved.counts)
         self._room = numbers
         self.counts[Count.HISTORY_ROOM] = numbers // self.integrator.workspace.history_width
-        self._take_addresses()
+        self.take_addresses()
 
-    def _take_addresses(self) -> None:
+    def take_addresses(self) -> None:
+        """Note the addresses of all arrays, after one of them was replaced."""
         arrays = (self.reals, self.counts, *self.course, self.states, self.discrete, self.algebraic)
-        arrays += (self._saved.reals, self._saved.counts, self._scratch)
+        arrays += (self.jumps.memory, self._saved.reals, self._saved.counts, self._scratch)
         self._addresses = tuple(array.ctypes.data for array in arrays)
 
     def place(self, start: RunPoint, *, step: float, first: bool) -> None:
@@ -274,7 +283,13 @@ class Integration:
         self.course = (p, samples, np.insert(ends, place, time), np.insert(clamps, place, time))
         self.counts[Count.SEGMENT] = 0
         self.counts[Count.SEGMENTS] = self.course[2].size
-        self._take_addresses()
+        self.take_addresses()
+
+    @property
+    def start_of_jumps(self) -> float | None:
+        """The time of the start, which the record of the jumps contains as its first instant; ``None`` if it
+        does not."""
+        return self.time if self.integrator.sizes.hybrid and self.counts[Count.AT_START] else None
 
     def halt_at(self, time: float) -> None:
         """Return from :meth:`advance` before the ticks of the first instant at a time (s) or later."""
@@ -299,8 +314,12 @@ class Integration:
         self.reals[Scalar.PAUSE] = pause
         if self.status is Status.PAUSED:
             self.status = self.integrator.advance(self._addresses, max_steps)
-            while self.status is Status.HISTORY_FULL:
-                self.make_room(2 * self._room)
+            while self.status in (Status.HISTORY_FULL, Status.JUMPS_FULL):
+                if self.status is Status.HISTORY_FULL:
+                    self.make_room(2 * self._room)
+                else:
+                    self.jumps.enlarge(self.time)
+                    self.take_addresses()
                 self.status = self.integrator.advance(self._addresses, max_steps)
         return self.status
 
@@ -318,6 +337,7 @@ class Integration:
         self.counts[:] = checkpoint.counts
         if self.integrator.sizes.delays:
             self.counts[Count.HISTORY_ROOM] = self._room // self.integrator.workspace.history_width
+        self.jumps.enable()
         self.status = Status.PAUSED
 
     def now(self) -> Checkpoint:

@@ -1,14 +1,26 @@
-"""Recording of a run: the samples within each step, and the checkpoint for a longer run."""
+"""Recording of a run: samples within each step, both sides of each jump, the checkpoint for a longer run.
+
+A jump has two rows: the left limit and the value. A row of the record has the time of the evaluation, the
+number of samples recorded before it, ``x``, ``z`` and ``w``.
+"""
 
 from __future__ import annotations
 
 from armblocks.integration.evaluation import Evaluation
 from armblocks.integration.frame import Frame, copy
 from armblocks.integration.method import Method
-from armblocks.integration.workspace import Count, Stage
+from armblocks.integration.workspace import Count, LoopSizes, Stage, Status
 from armblocks.routines.arithmetic import select
 from armblocks.routines.memory import Reals
 from armblocks.routines.values import Boolean, Integer, Real
+
+ROOM_OF_A_STEP = 4
+"""Rows that must be free before a step: a step has one instant at its end."""
+
+
+def row_width(sizes: LoopSizes) -> int:
+    """Length of a row of the record of the jumps."""
+    return 2 + sizes.states + sizes.discrete + sizes.algebraic
 
 
 class Records:
@@ -57,6 +69,30 @@ class Records:
         ):
             if count:
                 copy(f.r, f.vector(place), out.after(sample * count), count)
+
+    def make_room(self) -> None:
+        """Return where the record of the jumps has no memory for another step."""
+        counts = self.frame.counts
+        self.frame.leave_unless(counts[Count.JUMPS] < counts[Count.JUMPS_ROOM], Status.JUMPS_FULL)
+
+    @property
+    def jumps_recorded(self) -> Boolean:
+        """Whether jumps are recorded."""
+        return self.frame.counts[Count.JUMPS_RECORDED] != 0
+
+    def side_of_jump(self, time: Real, sample: Integer, x: Reals) -> None:
+        """Record one side of a jump: ``x``, ``z``, and ``w`` that was solved for them last. ``sample`` is the
+        number of samples before this side."""
+        f, places, sizes = self.frame, self.frame.places, self.frame.sizes
+        number = f.counts[Count.JUMPS]
+        row = f.arrays.jumps.after(number * row_width(sizes))
+        f.counts[Count.JUMPS] = number + 1
+        row[0], row[1] = time, sample.to_real()
+        copy(f.r, x, row.after(2), f.n)
+        if sizes.discrete:
+            copy(f.r, f.vector(places.z), row.after(2 + f.n), sizes.discrete)
+        if sizes.algebraic:
+            copy(f.r, f.vector(places.trial_w), row.after(2 + f.n + sizes.discrete), sizes.algebraic)
 
     def extra_stages_once(self, time: Real, h: Real) -> None:
         """Evaluate the extra stages of the dense output, unless this is already done for the present step."""

@@ -7,6 +7,7 @@ from armblocks.integration.frame import Frame
 from armblocks.integration.method import Method
 from armblocks.integration.records import Records
 from armblocks.integration.workspace import Count, Scalar, Stage, Status
+from armblocks.routines.arithmetic import select
 from armblocks.routines.routine import Part, Stages
 from armblocks.routines.values import Boolean, Real
 
@@ -53,6 +54,8 @@ class Segments(Course):
         f.taken.value = f.taken.value + 1
         with f.r.unless(new_time >= f.end.value):
             stages.go(STEP)
+        with f.r.when(records.jumps_recorded & (f.clamp.value < new_time)):
+            self.jump(new_time)
         f.increase(Count.SEGMENT)
         f.count[Count.STARTED].value = Stage.START
         f.count[Count.FRESH].value = 1
@@ -61,6 +64,16 @@ class Segments(Course):
         f.end.value = f.arrays.ends[segment]
         f.clamp.value = f.arrays.clamps[segment]
         stages.go(START)
+
+    def jump(self, time: Real) -> None:
+        """Record both sides of a breakpoint, where a sample at this time is already recorded."""
+        f = self.frame
+        x, sample = f.vector(f.places.x), f.count[Count.SAMPLE].value
+        first = sample == 0
+        recorded = f.arrays.samples[select(first, 0, sample - 1)] >= time
+        before = select(first | ~recorded, sample, sample - 1)
+        self.records.side_of_jump(f.clamp.value, before, x)
+        self.records.side_of_jump(time, sample, x)
 
 
 def choose_first_step(frame: Frame, method: Method, records: Records, time: Real) -> None:

@@ -30,6 +30,8 @@ class Status(IntEnum):
     """The steps are needlessly short, and the run would need far too many of them."""
     INCONSISTENT_MODES = 9
     """No choice of the modes is consistent."""
+    JUMPS_FULL = 10
+    """The record of the jumps needs more memory: enlarge it and call again."""
 
 
 class Scalar(IntEnum):
@@ -108,7 +110,13 @@ class Count(IntEnum):
     not."""
     CROWDED = 22
     """Consecutive events whose distances are at most ``CROWD`` times the time."""
-    END = 23
+    JUMPS = 23
+    """Rows in the record of the jumps."""
+    JUMPS_ROOM = 24
+    """The loop returns before a step where ``JUMPS`` has reached this number."""
+    JUMPS_RECORDED = 25
+    """Whether jumps are recorded."""
+    END = 26
 
 
 class Stage(IntEnum):

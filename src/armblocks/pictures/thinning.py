@@ -9,13 +9,16 @@ _Array = NDArray[np.float64]
 
 
 def thin_out(time: _Array, values: _Array, columns: int) -> tuple[_Array, _Array]:
-    """At most four points for each column of px: first, minimum, maximum and last, so that peaks stay
-    visible."""
+    """At most four points for each of ``columns`` equal intervals of ascending times: first, minimum, maximum
+    and last, so that peaks stay visible."""
     if len(time) <= 4 * columns:
         return time, values
-    bounds = np.linspace(0, len(time), columns + 1).astype(np.intp)
+    bounds = np.searchsorted(time, np.linspace(float(time[0]), float(time[-1]), columns + 1))
+    bounds[-1] = len(time)
     picked: set[int] = {len(time) - 1}
     for a, b in zip(bounds[:-1].tolist(), bounds[1:].tolist()):
+        if a == b:
+            continue
         piece = values[a:b]
         finite = np.isfinite(piece)
         picked.update((a, b - 1))

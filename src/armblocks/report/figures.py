@@ -76,20 +76,21 @@ def motion_figures(motion: Motion, prefix: str) -> Iterator[Figure]:
 
 def view_figures(diagram: Diagram, result: SimulationResult, width: float = FIGURE_WIDTH) -> Iterator[Figure]:
     """A figure for every Scope, XY Graph and Spectrum of the diagram, in the order of their names."""
+    rows = result.with_jumps()
     for block, view in diagram_views(diagram):
         if view.kind is ViewKind.TRACES:
             yield Figure(
                 name=f"scope-{file_name(view.title or block)}",
                 section="scopes",
                 caption=view.title or block,
-                picture=_scope(diagram, block, view, result, width),
+                picture=_scope(diagram, block, view, rows, width),
             )
         elif view.kind is ViewKind.PATH:
             yield Figure(
                 name=f"xy-{file_name(block)}",
                 section="graphs",
                 caption=view.title or block,
-                picture=_xy_graph(block, view, result),
+                picture=_xy_graph(block, view, rows),
                 narrow=True,
             )
         elif view.kind is ViewKind.SPECTRUM:

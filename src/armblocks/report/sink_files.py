@@ -86,6 +86,8 @@ def write_files(
         count = len(range(0, result.time.size, sink.settings.decimation))
         first = max(0, count - sink.settings.limit) * sink.settings.decimation
         rows = slice(first, None, sink.settings.decimation)
-        result.only({sink.variable: f"{sink.block}/{sink.signal}"}, rows).save(path)
+        result.only({sink.variable: f"{sink.block}/{sink.signal}"}, rows).save(
+            path, jumps=sink.settings.decimation == 1
+        )
         written.append(path)
     return tuple(written)

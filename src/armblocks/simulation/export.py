@@ -3,11 +3,14 @@
 ======== ================================================================ =========================
 suffix   content                                                          description of the run
 ======== ================================================================ =========================
-.csv     a line for each sample: ``time``, then a column for each scalar  none
+.csv     a line for each row: ``time``, then a column for each scalar     none
 .parquet the same columns, as doubles                                     key ``armblocks`` (JSON)
 .npz     ``time`` and an ``(N, *shape)`` array for each signal path       array ``run`` (JSON)
 .mat     ``time`` and a structure for each block, a field for each port   structure ``run``
 ======== ================================================================ =========================
+
+A row is a sample, or one side of a jump: at the time of a jump there are two rows with the same time, first
+the left limits, then the values. A file without these rows has the samples alone.
 
 Parquet needs pyarrow, MAT needs SciPy: the extra ``data``. CSV files have the same bytes with and without
 pyarrow, which only writes them faster. Files are written atomically
@@ -45,25 +48,26 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-def to_dataframe(result: RunData) -> pd.DataFrame:
+def to_dataframe(result: RunData, *, jumps: bool) -> pd.DataFrame:
     """Index ``time`` in s, one column for each scalar; ``attrs`` has the description of the run."""
     with from_extra("data", "data frames"):
         import pandas as pd
 
+    result = result.with_jumps() if jumps else result
     index = pd.Index(result.time, name="time")
     frame = pd.DataFrame(result.signals.T, index=index, columns=list(result.columns()))
     frame.attrs.update(description_of(result))
     return frame
 
 
-def save(result: RunData, path: str | PathLike[str]) -> None:
+def save(result: RunData, path: str | PathLike[str], *, jumps: bool) -> None:
     """Write ``path`` in the format of its suffix, atomically. The module's docstring lists the formats."""
     place = Path(path)
     write = _WRITERS.get(place.suffix.lower())
     if write is None:
         raise UnknownNameError("file type", place.suffix or place.name, list(_WRITERS), where=str(place))
     check_format(place)
-    write_atomically(place, write(result))
+    write_atomically(place, write(result.with_jumps() if jumps else result))
 
 
 def check_format(path: Path) -> None:

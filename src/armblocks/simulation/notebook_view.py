@@ -57,7 +57,8 @@ def result_html(result: RunData) -> str:
         note = f"<strong>Incomplete.</strong> {note or 'The run did not reach its stop time.'}"
     if note:
         parts.append(f'<p class="ab-note">{note}</p>')
-    parts.append(panels_html(result.time, [(slot, result[slot.name]) for slot in result.signals_layout]))
+    rows = result.with_jumps()
+    parts.append(panels_html(rows.time, [(slot, rows[slot.name]) for slot in rows.signals_layout]))
     parts.append("</div>")
     return "".join(parts)
 
@@ -151,10 +152,12 @@ def _outline(time: Array, values: Array, pieces: int = 110) -> tuple[Array, Arra
     text."""
     if time.size <= 2 * pieces:
         return time, values
-    edges = [time.size * k // pieces for k in range(pieces + 1)]
+    edges = np.searchsorted(time, np.linspace(float(time[0]), float(time[-1]), pieces + 1)).tolist()
+    edges[-1] = time.size
     chosen = {0, time.size - 1}
     for a, b in itertools.pairwise(edges):
-        chosen |= {a + int(np.argmin(values[a:b])), a + int(np.argmax(values[a:b]))}
+        if a < b:
+            chosen |= {a + int(np.argmin(values[a:b])), a + int(np.argmax(values[a:b]))}
     places = np.array(sorted(chosen))
     return time[places], values[places]
 

@@ -163,6 +163,13 @@ def check_options(options: SimulationOptions, where: str) -> None:
             fix="1e-6 is a good start, 1e-10 is tight",
         )
     _number("atol", options.atol, where, "a number above 0, in the units of the states", above=0.0)
+    if not isinstance(options.record_jumps, bool):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise InputError(
+            f"record_jumps is {options.record_jumps!r}",
+            where=where,
+            allowed="True or False",
+            fix="choose one",
+        )
     if options.max_step is not None:
         max_step = _number("max_step", options.max_step, where, "a time in s above 0", above=0.0)
         _resolvable("max_step", max_step, stop, where)

@@ -14,6 +14,7 @@ from armblocks.errors import SimulationError
 from armblocks.integration.native_integrator import Integration
 from armblocks.integration.system import CompiledSystem
 from armblocks.simulation.diagnosis import first_bad_signal
+from armblocks.simulation.jumps import Jumps, JumpSearch, JumpTable, merged, merged_states
 from armblocks.simulation.plan import Instants, LogRequest
 from armblocks.simulation.result import SimulationResult
 from armblocks.simulation.run_data import LoggedFile, signal_path
@@ -38,6 +39,8 @@ class Samples:
     signals: Array
     layout: Signature
     aliases: Mapping[str, str]
+    jumps: Jumps
+    """The jumps between the sample before these and the last of them."""
 
     @property
     def end(self) -> int:
@@ -54,12 +57,14 @@ class Samples:
 class Recorded:
     """Samples with finite signals: ``time (N,)`` s, ``states (N, nx)`` and ``signals (ny, N)``.
 
-    ``failure`` is the error for the next sample if one of its signals is not finite.
+    ``jumps`` are both sides of the jumps between them. ``failure`` is the error for the next sample if one of
+    its signals is not finite.
     """
 
     time: Array
     states: Array
     signals: Array
+    jumps: Jumps
     failure: SimulationError | None = None
 
 
@@ -71,6 +76,9 @@ class Recording:
     ) -> None:
         """Raises the errors of opening a log."""
         self._compiled = compiled
+        self._layout = layout
+        self._search = JumpSearch(compiled)
+        """The search of a logged run, from window to window."""
         self.stretches: list[Stretch] = []
         self.window: int | None = None
         """Number of samples in memory of a logged run."""
@@ -115,12 +123,15 @@ class Recording:
         """Signals of the samples from number ``begin`` on that are in memory."""
         parts, compiled = self._rows(begin), self._compiled
         nothing = np.empty((compiled.signals_layout.size, 0))
+        time = _joined([rows.time for rows in parts] or [np.empty(0)])
+        signals = _joined([rows.signals(compiled) for rows in parts] or [nothing], axis=1)
         return Samples(
             begin=parts[0].begin if parts else min(begin, self.recorded),
-            time=_joined([rows.time for rows in parts] or [np.empty(0)]),
-            signals=_joined([rows.signals(compiled) for rows in parts] or [nothing], axis=1),
+            time=time,
+            signals=signals,
             layout=compiled.signals_layout,
             aliases=compiled.aliases,
+            jumps=self._jumps(parts, time, signals),
         )
 
     def good(self) -> Recorded:
@@ -128,16 +139,29 @@ class Recording:
         compiled = self._compiled
         if self._log is not None:
             time, states, signals = self._log.view(compiled.signals_layout.size)
-            return Recorded(time=time, states=states, signals=signals)
+            return Recorded(time=time, states=states, signals=signals, jumps=self._jumps([], time, signals))
         parts = self._rows(0) or [self.stretches[-1].rows()]
         time = _joined([rows.time for rows in parts])
         states = _joined([rows.states for rows in parts])
         signals = _joined([rows.signals(compiled) for rows in parts], axis=1)
         bad = first_bad_signal(compiled, time, signals, _joined([rows.algebraic for rows in parts]))
-        if bad is None:
-            return Recorded(time=time, states=states, signals=signals)
-        failure, count = bad
-        return Recorded(time=time[:count], states=states[:count], signals=signals[:, :count], failure=failure)
+        failure, count = (None, time.size) if bad is None else bad
+        time, states, signals = time[:count], states[:count], signals[:, :count]
+        jumps = self._jumps(parts, time, signals)
+        return Recorded(time=time, states=states, signals=signals, jumps=jumps, failure=failure)
+
+    def _jumps(self, parts: list[Rows], time: Array, signals: Array) -> Jumps:
+        """The jumps between samples, which are evaluated at their first use."""
+        compiled = self._compiled
+
+        def table() -> JumpTable:
+            if not parts:
+                return JumpTable.empty(compiled.signals_layout.size, compiled.states.size)
+            first = parts[0]
+            instants = [part.instants() for part in parts]
+            return JumpSearch(compiled).found(instants, first.begin, time, signals, first.previous)
+
+        return Jumps(self._layout, compiled.aliases, table)
 
     def held(self) -> list[Rows]:
         """The rows that are in memory."""
@@ -154,13 +178,17 @@ class Recording:
     def _write(self, rows: Rows) -> None:
         """Write a window to the log, without the rows that were written before an interruption."""
         assert self._log is not None
-        rows = rows.after(self._log.rows)
+        rows = rows.after(self._log.samples)
         if not rows.time.size:
             return
         signals = rows.signals(self._compiled)
         bad = first_bad_signal(self._compiled, rows.time, signals, rows.algebraic)
         good = rows.time.size if bad is None else bad[1]
-        self._log.append(rows.time[:good], rows.states[:good], signals[:, :good])
+        time, states, signals = rows.time[:good], rows.states[:good], signals[:, :good]
+        jumps = self._search.found([rows.instants()], rows.begin, time, signals, rows.previous)
+        states = merged_states(time, states, jumps)
+        time, signals = merged(time, signals, jumps)
+        self._log.append(time, states, signals, samples=good)
         if bad is not None:
             raise bad[0]
 

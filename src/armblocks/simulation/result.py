@@ -20,20 +20,27 @@ class SimulationResult(RunData):
     ``time`` ``(N,)`` s; ``signals_layout`` the names, shapes and units of the ``ny`` rows of ``signals``
     ``(ny, N)``; ``states`` ``(N, nx)`` by ``states_layout``; ``parameters`` the values that the run used, at
     its end where there were ``parameter_changes``; ``final_state`` the state from which another run
-    continues, ``None`` for a failed run. For a run with a log file, the result has a selection of rows with
-    all extremes of the logged signals; ``log`` has the path of the file.
+    continues, ``None`` for a failed run. ``jumps`` has both sides of each jump between the samples. For a run
+    with a log file, the result has a selection of the file's rows with all extremes of the logged signals;
+    ``log`` has the path of the file.
     """
 
-    def to_dataframe(self) -> pd.DataFrame:
-        """A pandas table: index ``time`` in s, one column for each scalar, named as in :meth:`columns`."""
-        return to_dataframe(self)
+    def to_dataframe(self, *, jumps: bool = False) -> pd.DataFrame:
+        """A pandas table: index ``time`` in s, one column for each scalar, named as in :meth:`columns`.
 
-    def save(self, path: str | PathLike[str]) -> None:
+        With ``jumps`` the rows are those of :meth:`with_jumps`: the index is not unique then.
+        """
+        return to_dataframe(self, jumps=jumps)
+
+    def save(self, path: str | PathLike[str], *, jumps: bool = True) -> None:
         """Write a file by its suffix: ``.csv``, ``.parquet``, ``.npz`` or ``.mat``; atomically.
+
+        The rows are those of :meth:`with_jumps`: two with the same time for each jump. Without ``jumps`` the
+        file has the samples alone.
 
         Raises ``UnknownNameError`` for another suffix and ``FormatError`` if the file cannot be written.
         """
-        save(self, path)
+        save(self, path, jumps=jumps)
 
     def __repr__(self) -> str:
         report = self.run

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from armblocks.equations import Signature, Slot
 from armblocks.errors import UnknownNameError
+from armblocks.simulation.jumps import Jumps, JumpTable, merged, merged_states
 
 if TYPE_CHECKING:
     from armblocks.simulation.run_state import RunState
@@ -85,8 +86,9 @@ class RunData:
     ``time`` ``(N,)`` s; ``signals_layout`` the names, shapes and units of the ``ny`` rows of ``signals``
     ``(ny, N)``; ``states`` ``(N, nx)`` by ``states_layout``; ``parameters`` the values that the run used, at
     its end where there were ``parameter_changes``; ``final_state`` the state from which another run
-    continues, ``None`` for a failed run. For a run with a log file, the result has a selection of rows with
-    all extremes of the logged signals; ``log`` has the path of the file.
+    continues, ``None`` for a failed run. ``given_jumps``: both sides of each jump between the samples. For a
+    run with a log file, the result has a selection of the file's rows with all extremes of the logged
+    signals; ``log`` has the path of the file.
     """
 
     name: str
@@ -102,6 +104,26 @@ class RunData:
     final_state: RunState | None = None
     parameter_changes: tuple[ParameterChange, ...] = ()
     log: LoggedFile | None = None
+    given_jumps: Jumps | None = None
+
+    @property
+    def jumps(self) -> Jumps:
+        """The instants at which signals jump, with the left limits and the values."""
+        if self.given_jumps is not None:
+            return self.given_jumps
+        table = JumpTable.empty(self.signals_layout.size, self.states.shape[1])
+        return Jumps(self.signals_layout, self.aliases, table)
+
+    def with_jumps(self) -> Self:
+        """The result with two more rows for each jump: at the same time, the left limits, then the values.
+
+        A sample at the time of a jump is the second row. Files and figures have these rows. Times are then
+        ascending, but not strictly.
+        """
+        jumps = self.jumps.table
+        time, signals = merged(self.time, self.signals, jumps)
+        states = merged_states(self.time, self.states, jumps)
+        return dataclasses.replace(self, time=time, states=states, signals=signals, given_jumps=None)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -151,7 +173,15 @@ class RunData:
             signals=np.concatenate(places)[:, rows] if places else np.empty((0, self.time[rows].size)),
             states=self.states[rows],
             aliases={},
+            given_jumps=self._some_jumps(slots, names.values(), self.time[rows]),
         )
+
+    def _some_jumps(self, slots: list[Slot], paths: Iterable[str], time: Array) -> Jumps:
+        """The jumps of some signals between the first and the last of some samples."""
+        jumps, ranges = self.jumps, [self.signals_layout.ranges[self.resolve(path)] for path in paths]
+        chosen = np.array([k for part in ranges for k in range(part.start, part.stop)], dtype=np.intp)
+        begin, end = (float(time[0]), float(time[-1])) if time.size else (0.0, 0.0)
+        return Jumps(Signature(tuple(slots)), {}, lambda: jumps.table.only(chosen, begin, end))
 
     def columns(self) -> tuple[str, ...]:
         """A name for each scalar of ``signals``: ``clock/y``, ``rne/tau[link2]``, ``fkine/T[0,3]``.

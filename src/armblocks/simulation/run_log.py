@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 
 VIEW_ROWS = 20_000
 """Approximate number of rows of the view: several for each pixel of a figure."""
+MOST_VIEW_ROWS = 4 * VIEW_ROWS
 WINDOW_NUMBERS = 2_000_000
 """Number of doubles of the window, 16 MB."""
 
@@ -66,6 +67,11 @@ class View:
         joined = np.concatenate(self._pending, axis=1)
         self._kept.append(self._extremes(joined) if len(self._pending) > 1 else joined)
         self._pending, self._seen = [], 0
+        if sum(part.shape[1] for part in self._kept) > MOST_VIEW_ROWS:
+            # More rows than expected, because of jumps: double the intervals.
+            self._length *= 2
+            pairs = [self._kept[k : k + 2] for k in range(0, len(self._kept), 2)]
+            self._kept = [self._extremes(np.concatenate(pair, axis=1)) for pair in pairs]
 
     def _extremes(self, columns: Array) -> Array:
         if columns.shape[1] <= 1 or self._length == 1:
@@ -85,7 +91,10 @@ class RunLog:
         cannot be written."""
         names = [signal_path(name, layout, aliases, "log") for name in request.signals] or list(layout.names)
         self.path = request.path
+        self.samples = 0
+        """Number of samples written."""
         self.rows = 0
+        """Number of rows: the samples and both sides of the jumps."""
         self._places = np.array([k for name in names for k in range(*_span(layout, name))], dtype=np.intp)
         self._all = len(self._places) == layout.size
         columns = [column for name in names for column in element_names(layout[name])]
@@ -95,14 +104,15 @@ class RunLog:
         self._thread = ThreadPoolExecutor(1)
         self._writing: Future[None] | None = None
 
-    def append(self, time: Array, states: Array, signals: Array) -> None:
-        """Add samples: ``time (N,)``, ``states (N, nx)``, ``signals (ny, N)``. The caller must not change
-        them later.
+    def append(self, time: Array, states: Array, signals: Array, *, samples: int) -> None:
+        """Add rows: ``time (N,)``, ``states (N, nx)``, ``signals (ny, N)``, of which ``samples`` are samples
+        and the others sides of jumps. The caller must not change them later.
 
         Raises ``FormatError`` if earlier samples could not be written.
         """
         self._wait()
         self.rows += time.size
+        self.samples += samples
         chosen = signals if self._all else signals[self._places]
         self._writing = self._thread.submit(self._file.append, time.copy(), chosen)
         self._view.append(np.concatenate([time[np.newaxis], states.T, signals]))

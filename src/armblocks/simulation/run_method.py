@@ -92,6 +92,7 @@ class RunMethod:
             stop=plan.instants.stop,
             # Independent of the stop time, so that a shorter run has bitwise the same samples.
             span=DEFAULT_INSTANTS * plan.instants.sample_time,
+            jumps=options.record_jumps,
         )
 
     def change(self, integration: Integration) -> Integration:

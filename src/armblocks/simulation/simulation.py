@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from armblocks.equations import Signature, SimulationOptions
 from armblocks.errors import InputError, SimulationError
-from armblocks.integration.run_point import RunPoint
+from armblocks.integration.native_integrator import Integration
+from armblocks.integration.run_point import NO_NUMBERS, RunPoint
 from armblocks.integration.system import CompiledSystem
 from armblocks.integration.workspace import Status
 from armblocks.simulation.calls import CalledFunction, Calls
@@ -28,7 +29,7 @@ from armblocks.simulation.result import SimulationResult
 from armblocks.simulation.run_data import ParameterChange, RunReport
 from armblocks.simulation.run_method import RunMethod
 from armblocks.simulation.run_state import RunState, check_state, slot_names
-from armblocks.simulation.stretch import Stretch, first_window
+from armblocks.simulation.stretch import Change, Stretch, first_window
 
 Array = NDArray[np.float64]
 
@@ -294,9 +295,27 @@ class Simulation:
         before = self._stretches[-1].integration if self._stretches else None
         integration = self._method.begin(self._p, first_window(instants, begin, window), before)
         self._hand_over()
-        self._stretches.append(Stretch(instants, begin, self._p, integration, window))
+        change = self._changed_from(self._stretches[-1]) if self._stretches else None
+        breakpoints = self.compiled.breakpoints(self._p) if integration is None else NO_NUMBERS
+        recorded = self.options.record_jumps
+        self._stretches.append(
+            Stretch(
+                instants,
+                begin,
+                self._p,
+                integration,
+                window,
+                change=change if recorded else None,
+                breakpoints=breakpoints if recorded else NO_NUMBERS,
+            )
+        )
         self._changed = False
         return self._stretches[-1]
+
+    def _changed_from(self, before: Stretch) -> Change:
+        """The end point and the parameters of the part before a change of parameters."""
+        run = before.integration
+        return RunPoint(time=before.time, x=NO_NUMBERS) if run is None else run.point, before.p
 
     def _hand_over(self) -> None:
         try:
@@ -316,6 +335,7 @@ class Simulation:
         good, compiled = self._recording.good(), self.compiled
         integrations = self._recording.integrations
         if integrations:
+            self._note(_jumps_left_out(integrations))
             self._note(stiffness_hint(compiled, integrations[-1], self._stretches[-1].p))
             for warning in warnings_of_blocks(compiled, integrations[-1]):
                 self._note(warning)
@@ -339,6 +359,7 @@ class Simulation:
             run=self._report(float(good.time[-1]) if good.time.size else 0.0),
             final_state=None if failure is not None else self.state(),
             log=self._recording.file,
+            given_jumps=good.jumps,
         )
         if self.finished:
             self._recording.finish(result)
@@ -370,3 +391,14 @@ class Simulation:
     def _note(self, hint: str) -> None:
         if hint and hint not in self._message:
             self._message = f"{self._message}. {hint}" if self._message else hint
+
+
+def _jumps_left_out(integrations: Sequence[Integration]) -> str:
+    """A remark for the user if a run had too many jumps to record all of them."""
+    for run in integrations:
+        if run.jumps.end is not None:
+            return (
+                f"jumps after {run.jumps.end:.4g} s are not recorded, because there are too many; "
+                "a log to a file has all of them"
+            )
+    return ""

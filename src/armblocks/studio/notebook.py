@@ -90,7 +90,8 @@ def _arm(path: str, robot: Robot, q: ArrayLike | None = None) -> dict[str, Any]:
 
 
 def _record(views: Sequence[tuple[str, View]], result: SimulationResult) -> tuple[str, dict[str, Any], bytes]:
-    """Key, description and samples of the signals in the views, in the format of the front end."""
+    """Key, description and rows of the signals in the views, with jumps, in the format of the front end."""
+    result = result.with_jumps()
     wanted = [f"{name}/{signal}" for name, view in views for signal in view.signals]
     aliases = {name: result.resolve(name) for name in wanted}
     names = list(dict.fromkeys(aliases.values()))

@@ -34,6 +34,12 @@ _RULES = (
         "Spacing of the recorded instants; no effect on the steps. Empty: the fixed step, else a thousandth "
         "of the run.",
     ),
+    (
+        "record_jumps",
+        "Record jumps",
+        "",
+        "Record both sides of every jump of a signal, also between the recorded instants.",
+    ),
 )
 
 

@@ -30,6 +30,7 @@ from armblocks.errors import ArmblocksError, SimulationError
 from armblocks.face.diagram_run import DiagramRun
 from armblocks.face.model import CompiledDiagram
 from armblocks.simulation import SimulationResult
+from armblocks.simulation.jumps import Jumps, merged
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.protocol.frames import sample_frame, thinned
 from armblocks.studio.protocol.messages import runs as run_messages
@@ -108,6 +109,9 @@ class _Run:
         self.stride = 1
         """Number of instants that are reduced to their extremes."""
         self.times: Array = np.empty(0)
+        """Times of the rows that were sent: samples and both sides of jumps, s."""
+        self.numbers: NDArray[np.intp] = np.empty(0, dtype=np.intp)
+        """For each row, the number of instants up to the one that it was sent with."""
         self.began = perf_counter()
 
     def run(self) -> None:
@@ -183,7 +187,7 @@ class _Run:
                     self._go_back(history, self.count - 1)
                 case "rewind", _:
                     sent = int(np.searchsorted(self.times, float(command["time"]), "right"))
-                    self._go_back(history, sent if self.stride == 1 else sent * self.stride // 2)
+                    self._go_back(history, int(self.numbers[sent - 1]) if sent else 0)
                 case "speed", _:
                     self.pace.speed = command["speed"]
                     self.pace.count_from(self.time)
@@ -212,8 +216,8 @@ class _Run:
         """Return to at most ``recorded`` recorded instants; tuned values apply from there on."""
         history.back_to(max(recorded, 1))
         self.count, self.time = history.recorded, history.run.time
-        sent = self.count if self.stride == 1 else int(np.searchsorted(self.times, self.time, "right"))
-        self.times = self.times[:sent]
+        sent = int(np.searchsorted(self.numbers, self.count, "right"))
+        self.times, self.numbers = self.times[:sent], self.numbers[:sent]
         self._notify(run_messages.RunRewound(run=self.key, time=self.time, count=sent))
         self._become("paused")
 
@@ -266,11 +270,14 @@ class _Run:
         if not last:
             ready -= ready % self.stride
         if ready:
-            self._send(fresh.time[:ready], fresh.signals[:, :ready], last=last)
+            self._send(fresh.time[:ready], fresh.signals[:, :ready], fresh.jumps, last=last)
         self.time = min(due, history.run.time)
 
-    def _send(self, time: Array, signals: Array, *, last: bool) -> None:
-        self.count += time.size
+    def _send(self, time: Array, signals: Array, jumps: Jumps, *, last: bool) -> None:
+        """Send samples, with both sides of the jumps between the last sample sent and the last of these."""
+        begin = float(self.times[-1]) if self.times.size else -math.inf
+        instants = time
+        time, signals = merged(time, signals, jumps.table.only(slice(None), begin, float(time[-1])))
         if self.stride > 1:
             ends = time[-1:], signals[:, -1:]
             time, signals = thinned(time, signals, self.stride)
@@ -278,11 +285,16 @@ class _Run:
                 time, signals = np.append(time, ends[0]), np.append(signals, ends[1], axis=1)
         self.pipe.send_bytes(b"S" + sample_frame(self.key, self.times.size, time, signals))
         self.times = np.concatenate([self.times, time])
+        # A side of a jump belongs to the next instant: on a return before that, it is sent again.
+        numbers = self.count + 1 + np.searchsorted(instants, time)
+        self.numbers = np.concatenate([self.numbers, numbers])
+        self.count += instants.size
 
     def _send_rest(self, partial: object) -> None:
         """Send the valid samples of a failed run."""
         if isinstance(partial, SimulationResult) and partial.time.size > self.count:
-            self._send(partial.time[self.count :], partial.signals[:, self.count :], last=True)
+            rest = slice(self.count, None)
+            self._send(partial.time[rest], partial.signals[:, rest], partial.jumps, last=True)
             self.time = float(partial.time[-1])
 
     def _progress(

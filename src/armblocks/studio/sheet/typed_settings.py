@@ -12,7 +12,7 @@ from armblocks.simulation.plan import check_options
 from armblocks.simulation.tableaux import find_tableau
 from armblocks.studio.sheet.parameter_values import number_value
 
-SettingValue = float | str | None
+SettingValue = bool | float | str | None
 
 
 def with_settings(options: SimulationOptions, values: Mapping[str, SettingValue]) -> SimulationOptions:

@@ -217,7 +217,7 @@ class SetSettings(ModelEdit):
     """Change run settings, by the names of ``SimulationOptions``; ``None`` restores the default."""
 
     kind: Literal["settings"] = "settings"
-    values: dict[str, float | str | None]
+    values: dict[str, bool | float | str | None]
 
 
 class Describe(DiagramEdit):

@@ -171,7 +171,7 @@ class DiagramContent(Content):
     kind: Literal["diagram"] = "diagram"
     inside: list[str]
     sheet: Sheet
-    settings: dict[str, float | str | None]
+    settings: dict[str, bool | float | str | None]
     run: str | None
 
 
@@ -180,7 +180,7 @@ class DiagramChange(ContentChange):
 
     kind: Literal["diagram"] = "diagram"
     sheet: SheetChange
-    settings: dict[str, float | str | None]
+    settings: dict[str, bool | float | str | None]
 
 
 class Look(Request[None]):
@@ -265,7 +265,7 @@ class TypedSettings(Request[dict[str, str]]):
 
     kind: Literal["typed_settings"] = "typed_settings"
     document: str
-    values: dict[str, float | str | None]
+    values: dict[str, bool | float | str | None]
 
 
 class Checked(Event):

@@ -16,7 +16,7 @@ class SettingRule(Message):
     title: str
     unit: str
     doc: str
-    default: float | str | None
+    default: bool | float | str | None
 
 
 class SolverChoice(Message):

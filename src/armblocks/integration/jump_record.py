@@ -1,0 +1,77 @@
+"""The memory of a run for both sides of its instants, which the native loop fills."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.integration.records import ROOM_OF_A_STEP, row_width
+from armblocks.integration.workspace import Count, LoopSizes
+
+Vector = NDArray[np.float64]
+
+FIRST_NUMBERS = 1_000_000
+"""Initial number of doubles, 8 MB. The operating system provides the memory that is used."""
+MOST_NUMBERS = 20_000_000
+"""Maximum number of doubles, 160 MB."""
+ALL = np.iinfo(np.int64).max
+
+
+class JumpRecord:
+    """Two rows for each instant; the native loop counts them in ``counts``. Empty and disabled at first.
+
+    After :meth:`begin`, :meth:`share` and :meth:`enlarge` the memory has another address.
+    """
+
+    def __init__(self, counts: NDArray[np.int64], sizes: LoopSizes) -> None:
+        self._counts = counts
+        self.memory: Vector = np.empty((0, row_width(sizes)))
+        self.end: float | None = None
+        """The time from which instants are not recorded, because the record has its maximum size."""
+        self.begin(wanted=False)
+
+    def begin(self, *, wanted: bool) -> None:
+        """Begin an empty record, or none."""
+        width = self.memory.shape[1]
+        rows = max(64, min(FIRST_NUMBERS, MOST_NUMBERS) // width)
+        self.memory = np.empty((rows if wanted else 0, width))
+        self._counts[Count.JUMPS] = 0
+        self.enable()
+
+    def share(self, record: JumpRecord) -> None:
+        """Continue another record of the same system."""
+        self.memory, self.end = record.memory, record.end
+        self.enable()
+
+    def enable(self) -> None:
+        """Set the counters of the native loop for the present memory."""
+        wanted = bool(self.memory.size) and self.end is None
+        self._counts[Count.JUMPS_RECORDED] = int(wanted)
+        self._counts[Count.JUMPS_ROOM] = len(self.memory) - ROOM_OF_A_STEP if wanted else ALL
+
+    def enlarge(self, time: float) -> None:
+        """Double the memory; at its maximum size, end the record at the present ``time`` (s)."""
+        if 2 * self.memory.size > MOST_NUMBERS:
+            self.end = time
+        else:
+            self.memory = np.concatenate([self.memory, np.empty_like(self.memory)])
+        self.enable()
+
+    @property
+    def rows(self) -> Vector:
+        """Both sides of the recorded instants, ``(M, 2, 2 + nx + nz + nw)``, as a view.
+
+        A row has the time of the evaluation in s, the number of samples recorded before it, the states, the
+        discrete variables and the unknowns of the implicit equations.
+        """
+        # A run that failed within an instant has only its first side.
+        complete = self._counts[Count.JUMPS] // 2
+        return self.memory[: 2 * complete].reshape(complete, 2, self.memory.shape[1])
+
+    def drop(self, samples: int) -> None:
+        """Drop the instants that belong to the first ``samples`` samples, which are removed from memory."""
+        rows = self.rows
+        later = rows[rows[:, 0, 1] >= samples]
+        later[:, :, 1] -= samples
+        rows[: len(later)] = later
+        self._counts[Count.JUMPS] = 2 * len(later)
