@@ -1,13 +1,16 @@
-import { useComputedColorScheme } from '@mantine/core'
+import { useComputedColorScheme, useMantineColorScheme } from '@mantine/core'
 import { DockviewReact, type IDockviewPanelHeaderProps } from 'dockview-react'
-import { lazy, Suspense } from 'react'
+import { lazy, Suspense, useEffect } from 'react'
+import { setDock } from './dock'
 import { later, useSettled, useSettling, useWanted } from './later'
 import { Notices } from './notices'
 import { panelsOf, type Panel } from './panel'
+import { followRobot } from './robot_panel'
 import { TopBar } from './run/top_bar'
 import { Timeline } from './run/timeline'
 import { DropZone } from './robot/drop'
 import { useDesk } from './robot/editor/desk'
+import { onTheme } from './theme'
 
 const RobotEditor = lazy(() => import('./robot/editor/robot_editor'))
 const Dialogs = later(async () => (await import('./all_dialogs')).AllDialogs)
@@ -29,6 +32,8 @@ function DialogsWhenWanted() {
 
 export function App() {
   const scheme = useComputedColorScheme('light')
+  const { setColorScheme } = useMantineColorScheme()
+  useEffect(() => onTheme(setColorScheme), [setColorScheme])
   const editing = useDesk((s) => s.current !== null)
   useSettling()
   return (
@@ -40,7 +45,11 @@ export function App() {
             className={scheme === 'dark' ? 'dockview-theme-dark' : 'dockview-theme-light'}
             components={PANELS.components}
             defaultTabComponent={Tab}
-            onReady={PANELS.arrange}
+            onReady={(event) => {
+              PANELS.arrange(event)
+              setDock(event.api)
+              followRobot(event.api, (id) => PANELS.addTo(event.api, id))
+            }}
           />
         </main>
         <Timeline wires />

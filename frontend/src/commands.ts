@@ -1,10 +1,11 @@
 import { align, distribute, flip, group, rotate, chosenBlocks } from './canvas/arranging'
 import { copy, cut, duplicate, paste } from './canvas/clipboard'
-import { addNote, sheetView } from './canvas/sheet_actions'
+import { addNote, sheetView, ZOOM_STEP } from './canvas/sheet_actions'
 import { openConfiguration, openMask, openTour, save, show } from './dialogs'
 import { exportDrawing, openReport } from './documents/export'
-import { startOrResume } from './run/start'
+import { control, startOrResume } from './run/start'
 import { alter, ask, change, look, useStudio } from './store'
+import { setTheme } from './theme'
 
 /** A command: shown in the command palette and in the list of keys, and executed by its key. */
 export interface Command {
@@ -33,6 +34,16 @@ export function commands(): Command[] {
 
 const LIST: Command[] = [
   { title: 'Run or continue', keys: 'Ctrl+Enter', run: startOrResume },
+  { title: 'Pause the run', keys: 'Ctrl+.', possible: ran, run: () => control('pause') },
+  { title: 'Stop the run', keys: 'Ctrl+Shift+Enter', possible: ran, run: () => control('stop') },
+  {
+    title: 'Step forward',
+    keys: 'Ctrl+→',
+    fieldsOwn: true,
+    possible: ran,
+    run: () => control('step'),
+  },
+  { title: 'Step back', keys: 'Ctrl+←', fieldsOwn: true, possible: ran, run: () => control('back') },
   { title: 'Find blocks, types and values', keys: 'Ctrl+F', run: () => show('find') },
   { title: 'Add a block', run: () => show('insert') },
   { title: 'Draw a wire by the names of its ends', keys: '>', run: () => show('connect') },
@@ -76,6 +87,12 @@ const LIST: Command[] = [
   { title: 'Equal gaps from top to bottom', possible: several, run: () => distribute('y') },
   { title: 'Arrange the sheet', run: () => void change({ kind: 'arrange' }) },
   { title: 'Fit the sheet into the window', keys: 'Space', run: () => sheetView.fit?.() },
+  { title: 'Zoom in', keys: '+', run: () => sheetView.zoom?.(ZOOM_STEP) },
+  { title: 'Zoom out', keys: '-', run: () => sheetView.zoom?.(1 / ZOOM_STEP) },
+  { title: 'Show the sheet at 100 %', keys: '1', run: () => sheetView.zoom?.(null) },
+  { title: 'Light theme', run: () => setTheme('light') },
+  { title: 'Dark theme', run: () => setTheme('dark') },
+  { title: 'Theme of the system', run: () => setTheme('auto') },
   {
     title: 'Leave the subsystem',
     keys: 'Esc',
@@ -92,6 +109,8 @@ const LIST: Command[] = [
   { title: 'All keys', keys: '?', run: () => show('keys') },
 ]
 
+const ARROWS: Record<string, string> = { '→': 'arrowright', '←': 'arrowleft' }
+
 /** Whether exactly these keys are pressed, all of them with Ctrl. */
 function pressed(keys: string, event: KeyboardEvent): boolean {
   return keys.split(', ').some((way) => {
@@ -101,7 +120,7 @@ function pressed(keys: string, event: KeyboardEvent): boolean {
       parts.includes('Ctrl') &&
       (event.ctrlKey || event.metaKey) &&
       event.shiftKey === parts.includes('Shift') &&
-      event.key.toLowerCase() === key
+      event.key.toLowerCase() === (ARROWS[key] ?? key)
     )
   })
 }

@@ -29,6 +29,8 @@ interface Dialogs {
   ofSheet: boolean
   /** Position of a new block, screen px; `null` selects a free position. */
   at: { x: number; y: number } | null
+  /** The port to which a new block is connected. */
+  end: { port: string; isOutput: boolean } | null
 }
 
 /**
@@ -41,12 +43,18 @@ export const useDialogs = create<Dialogs>(() => ({
   of: '',
   ofSheet: false,
   at: null,
+  end: null,
 }))
 
 /** Open a dialog, or close the open one. */
-export function show(open: Dialog | null, typed = '', at: Dialogs['at'] = null): void {
+export function show(
+  open: Dialog | null,
+  typed = '',
+  at: Dialogs['at'] = null,
+  end: Dialogs['end'] = null,
+): void {
   // A closing dialog still shows its content for a moment.
-  useDialogs.setState((s) => (open ? { open, times: s.times + 1, typed, at } : { open }))
+  useDialogs.setState((s) => (open ? { open, times: s.times + 1, typed, at, end } : { open }))
 }
 
 /** The visible stop of the tour; `null` while the tour is not shown. */

@@ -4,6 +4,7 @@ import type { Checked, DocumentState, Wire } from './protocol'
 import { attachAgain, leaveEditor, robotChanged, robotOpened, toFront } from './robot/editor/desk'
 import { isFree } from './run/pace'
 import * as runs from './run/runs'
+import { recoverable } from './model/recoverable'
 import { ask, bringToFront, line, refuse, showState, useStudio, type OpenDocument } from './store'
 
 const wireKey = (wire: Wire) => `${wire.source} -> ${wire.target}`
@@ -45,7 +46,8 @@ function checked(document: OpenDocument, event: Checked): OpenDocument {
 /** The changes of the state for each event of the server. */
 const HEARD: { [Kind in ServerEvent['kind']]: (event: EventOf<Kind>) => void } = {
   welcome,
-  documents: ({ documents, recoveries }) => useStudio.setState({ documents, recoveries }),
+  documents: ({ documents, recoveries }) =>
+    useStudio.setState({ documents, recoveries: recoverable(recoveries, documents) }),
   opened: (event) => opened(event, event.content),
   changed: documentChanged,
   checked: documentChecked,
@@ -79,7 +81,10 @@ function welcome(event: EventOf<'welcome'>): void {
     library: new Map(event.library.map((kind) => [kind.type, kind])),
     documents: event.documents,
   })
-  void showAgain(event).then(() => useStudio.setState({ recoveries: event.recoveries }))
+  // Not earlier: a page that shows its document again offers no recovery of it.
+  void showAgain(event).then(() =>
+    useStudio.setState((s) => ({ recoveries: recoverable(event.recoveries, s.documents) })),
+  )
 }
 
 function opened<Kind extends DocumentKind>(
@@ -107,7 +112,9 @@ function diagramOpened({ state, in_front }: EventOf<'opened'>, content: ContentO
       findings: same ? document.findings : [],
       wireKinds: same ? document.wireKinds : {},
     }),
-    ...(same ? {} : { run: null, selection: new Set<string>(), editing: null }),
+    ...(same ? {} : { run: null, selection: new Set<string>(), editing: null, strict: false }),
+    // Notices about another document are outdated.
+    ...(same || !document ? {} : { notices: [] }),
   })
   if (!same) {
     runs.forget()
@@ -152,6 +159,8 @@ function runStarted(event: EventOf<'run_started'>): void {
   if (useStudio.getState().run?.run === event.run) return
   runs.began(event)
   useStudio.setState({
+    strict: false,
+    notices: [],
     run: {
       run: event.run,
       state: 'running',
@@ -190,7 +199,9 @@ function runProgressed(event: EventOf<'run_progress'>): void {
         reason: event.reason ?? '',
       },
     })
-  if (event.fault) refuse(event.fault)
+  if (!event.fault) return
+  useStudio.setState({ strict: true })
+  refuse(event.fault)
 }
 
 /** Reopen the last document of this page, or the one in its address; then send the pending requests. */
@@ -225,7 +236,9 @@ async function openFromAddress(welcome: EventOf<'welcome'>): Promise<void> {
         ? { kind: 'open_shipped', document_kind: 'diagram', name: wanted }
         : { kind: 'open', path: wanted },
     )
-    if (found !== undefined) return
+    // After a refusal, no other model is opened: an empty diagram offers the examples.
+    if (found === undefined) await ask({ kind: 'new', document_kind: 'diagram' })
+    return
   }
   const open = welcome.documents.find(({ kind }) => kind === 'diagram')
   if (open) await bringToFront(open)

@@ -12,12 +12,12 @@ import { createRoot } from 'react-dom/client'
 import { App } from './app'
 import { receive } from './events'
 import { line } from './store'
-import { theme } from './theme'
+import { theme, themeManager } from './theme'
 
 line.open(receive)
 createRoot(document.getElementById('root')!).render(
   <StrictMode>
-    <MantineProvider theme={theme} defaultColorScheme="auto">
+    <MantineProvider theme={theme} defaultColorScheme="auto" colorSchemeManager={themeManager}>
       <App />
     </MantineProvider>
   </StrictMode>,

@@ -25,7 +25,14 @@ export function panelsOf(files: Record<string, { panel: Panel }>) {
   const arrange = ({ api }: { api: Pick<DockviewApi, 'addPanel'> }): void => {
     for (const { id, title, place } of panels) api.addPanel({ id, component: id, title, ...spot(place) })
   }
-  return { components, arrange }
+  /** Add a panel again that was removed: at the right edge of the dock. */
+  const addTo = (api: Pick<DockviewApi, 'addPanel'>, id: string): void => {
+    const one = panels.find((panel) => panel.id === id)
+    if (!one) return
+    const size = one.place && 'size' in one.place ? { initialWidth: one.place.size } : {}
+    api.addPanel({ id, component: id, title: one.title, position: { direction: 'right' }, ...size })
+  }
+  return { components, arrange, addTo }
 }
 
 function spot(place: Panel['place']) {

@@ -328,7 +328,7 @@ export interface SetParameters {
  * Paste blocks: ``text`` is a diagram in the file format.
  *
  * ``names``: new names of its blocks and notes, where they differ. ``shift``: displacement to the right and
- * down, px.
+ * down, px; one number if both are equal.
  */
 export interface PasteBlocks {
   kind: "paste";
@@ -336,7 +336,7 @@ export interface PasteBlocks {
   names?: {
     [k: string]: string;
   };
-  shift?: number;
+  shift?: number | [number, number];
 }
 /**
  * Remove blocks, wires and notes; the wires of the removed blocks are removed with them.

@@ -84,6 +84,8 @@ interface Studio {
   /** A block that is to be centred in the window. */
   sought: string | null
   notices: Notice[]
+  /** Whether the last run failed: unconnected inputs are then errors, before they are only marked. */
+  strict: boolean
   select: (names: Iterable<string>) => void
   edit: (block: string | null) => void
   dismiss: (id: number) => void
@@ -103,6 +105,7 @@ export const useStudio = create<Studio>((set) => ({
   editing: null,
   sought: null,
   notices: [],
+  strict: false,
   select: (names) => set({ selection: new Set(names) }),
   edit: (editing) => set({ editing }),
   dismiss: (id) => set((s) => ({ notices: s.notices.filter((notice) => notice.id !== id) })),
@@ -124,7 +127,10 @@ let notices = 0
 /** Show a notice for a refused request or a failed run. */
 export function refuse({ what, where, fix }: Pick<Fault, 'what' | 'where' | 'fix'>): void {
   const notice = { id: ++notices, what: where ? `${where}: ${what}` : what, fix }
-  useStudio.setState((s) => ({ notices: [...s.notices.slice(-4), notice] }))
+  useStudio.setState((s) => {
+    const others = s.notices.filter((one) => one.what !== notice.what || one.fix !== fix)
+    return { notices: [...others.slice(-4), notice] }
+  })
 }
 
 /** Send a request; a refusal is shown as a notice, and the promise then resolves to undefined. */

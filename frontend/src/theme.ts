@@ -1,4 +1,22 @@
-import { createTheme, type AlertProps, type MantineTheme } from '@mantine/core'
+import {
+  createTheme,
+  localStorageColorSchemeManager,
+  type AlertProps,
+  type MantineColorScheme,
+  type MantineTheme,
+} from '@mantine/core'
+import { create } from 'zustand'
+
+/** The chosen theme, which the browser keeps. */
+export const themeManager = localStorageColorSchemeManager({ key: 'armblocks-theme' })
+
+const useTheme = create<{ set: (scheme: MantineColorScheme) => void }>(() => ({ set: () => {} }))
+
+/** Show a theme, or that of the system. */
+export const setTheme = (scheme: MantineColorScheme): void => useTheme.getState().set(scheme)
+
+/** Called by the page with the function of the component library. */
+export const onTheme = (set: (scheme: MantineColorScheme) => void): void => useTheme.setState({ set })
 
 /** Colours, fonts and corners of the component library, as in all figures of armblocks. */
 export const theme = createTheme({

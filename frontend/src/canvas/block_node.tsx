@@ -4,6 +4,7 @@ import { Handle, type Node, type NodeProps } from '@xyflow/react'
 import { memo, useState } from 'react'
 import type { Finding, PortSpot, SheetBlock } from '../protocol'
 import { change } from '../store'
+import { ResizeHandles } from './resize_handles'
 import { nameSide, nameWidth, PORT, side, WIDEST_NAME } from './sheet_layout'
 
 export type BlockNodeType = Node<{ block: SheetBlock; findings: Finding[] }, 'block'>
@@ -13,6 +14,7 @@ export const BlockNode = memo(function BlockNode({
   data: { block, findings },
   selected,
 }: NodeProps<BlockNodeType>) {
+  const errors = findings.filter(({ severity }) => severity === 'error')
   return (
     <div
       className={selected ? 'block selected' : 'block'}
@@ -31,19 +33,20 @@ export const BlockNode = memo(function BlockNode({
           key={`i${spot.name}`}
           spot={spot}
           output={false}
-          faulty={findings.some(({ port }) => port === spot.name)}
+          finding={findings.find(({ port }) => port === spot.name)}
         />
       ))}
       {block.outputs.map((spot) => (
-        <Port key={`o${spot.name}`} spot={spot} output faulty={false} />
+        <Port key={`o${spot.name}`} spot={spot} output finding={undefined} />
       ))}
       {block.link && <IconLink className="link" size={13} aria-label={`linked to ${block.link}`} />}
       <Name block={block} />
-      {findings.length > 0 && (
+      {selected && <ResizeHandles block={block} />}
+      {errors.length > 0 && (
         <Tooltip
           multiline
           w={280}
-          label={findings.map(({ what, fix }) => (
+          label={errors.map(({ what, fix }) => (
             <span key={what}>
               {what}
               {fix && ` — ${fix}`}
@@ -54,7 +57,7 @@ export const BlockNode = memo(function BlockNode({
           <IconAlertCircleFilled
             className="fault"
             size={16}
-            aria-label={findings.map(({ what }) => what).join('; ')}
+            aria-label={errors.map(({ what }) => what).join('; ')}
           />
         </Tooltip>
       )}
@@ -62,13 +65,22 @@ export const BlockNode = memo(function BlockNode({
   )
 })
 
-function Port({ spot, output, faulty }: { spot: PortSpot; output: boolean; faulty: boolean }) {
+interface PortProps {
+  spot: PortSpot
+  output: boolean
+  /** The error or warning about this port. */
+  finding: Finding | undefined
+}
+
+function Port({ spot, output, finding }: PortProps) {
+  const marked = finding && (finding.severity === 'error' ? 'faulty' : 'unconnected')
+  const about = `${spot.name}: ${spot.doc}${spot.unit && `, ${spot.unit}`}`
   return (
     <Handle
       id={spot.name}
       type={output ? 'source' : 'target'}
       position={side(spot, output)}
-      className={faulty ? 'port faulty' : 'port'}
+      className={marked ? `port ${marked}` : 'port'}
       style={{
         left: spot.x - PORT / 2,
         top: spot.y - PORT / 2,
@@ -76,7 +88,7 @@ function Port({ spot, output, faulty }: { spot: PortSpot; output: boolean; fault
         bottom: 'auto',
         transform: 'none',
       }}
-      title={`${spot.name}: ${spot.doc}${spot.unit && `, ${spot.unit}`}`}
+      title={marked === 'unconnected' ? `${about} (${finding!.what})` : about}
     />
   )
 }

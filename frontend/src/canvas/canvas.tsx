@@ -19,6 +19,7 @@ import { WireValues } from '../run/wire_values'
 import { ask, change, look, useStudio } from '../store'
 import { ArrangeBar } from './arrange_bar'
 import { BlockNode } from './block_node'
+import { connectedTo } from './connecting'
 import { GRID } from './insert'
 import { NoteNode } from './note_node'
 import { Overview } from './overview'
@@ -28,7 +29,7 @@ import { useSheetDrawing } from './sheet_drawing'
 import type { SheetGraph, SheetNode } from './sheet_graph'
 import { useSheetKeys } from './sheet_keys'
 import { FIT } from './sheet_layout'
-import { useFitted, useSheetView, useSought } from './sheet_view'
+import { useFitted, useNameScale, useSheetView, useSought } from './sheet_view'
 import { useSteady } from './steady'
 import { Welcome } from './welcome'
 import { WireEdge, type WireEdgeType } from './wire_edge'
@@ -110,17 +111,19 @@ function Sheet() {
   useSought(sheet, flow, blocks)
   useSheetKeys(sheet, chosenWires, setChosenWires)
   useSheetView(sheet, flow)
+  useNameScale(sheet)
   useFitted(sheet, flow)
   const handlers = useSteady({
     onNodesChange: (changes: NodeChange<SheetNode>[]) => nodesChanged(changes, graph, mouse),
     onEdgesChange: (changes: EdgeChange<WireEdgeType>[]) => setChosenWires(chosenAfter(changes, chosenWires)),
-    ...dragHandlers(mouse, blocks, wires, edges),
+    ...dragHandlers(mouse, blocks, notes, wires, edges),
     onNodeClick: (event: React.MouseEvent, node: SheetNode) => {
       if (!chooseAlone(event, node.id)) return
       setChosenWires(new Set())
     },
     onNodeDoubleClick: (_: unknown, node: SheetNode) => node.type === 'block' && openBlock(node.data.block),
     onConnect: connect,
+    onConnectEnd: connectedTo,
   })
   const chosenEdge = chosenWires.size === 1 ? edges.find(({ selected }) => selected) : undefined
   const empty = Object.keys(blocks).length === 0 && Object.keys(notes).length === 0

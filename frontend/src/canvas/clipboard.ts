@@ -2,11 +2,13 @@ import { ask, change, freeName, useStudio } from '../store'
 
 const SHIFT = 30
 
-/** The selection of the sheet as the text of a diagram file; undefined if it is empty. */
-async function copied(): Promise<string | undefined> {
-  const { document, selection } = useStudio.getState()
-  const blocks = [...selection].filter((name) => document?.blocks[name])
-  const notes = [...selection].filter((name) => document?.notes[name])
+/** Blocks and notes of the sheet as the text of a diagram file; undefined if there are none. */
+async function copied(
+  chosen: Iterable<string> = useStudio.getState().selection,
+): Promise<string | undefined> {
+  const { document } = useStudio.getState()
+  const blocks = [...chosen].filter((name) => document?.blocks[name])
+  const notes = [...chosen].filter((name) => document?.notes[name])
   if (!document || !(blocks.length || notes.length)) return undefined
   return ask({
     kind: 'copy',
@@ -18,7 +20,7 @@ async function copied(): Promise<string | undefined> {
 }
 
 /** Paste the blocks of such a text under unused names, and select them. */
-async function add(text: string): Promise<void> {
+async function add(text: string, shift: number | [number, number] = SHIFT): Promise<void> {
   const { document, select } = useStudio.getState()
   if (!document) return
   const { blocks = {}, layout = {} } = JSON.parse(text) as { blocks?: object; layout?: object }
@@ -27,12 +29,18 @@ async function add(text: string): Promise<void> {
   for (const name of Object.keys(blocks)) taken.add((names[name] = freeName(name, taken)))
   let note = Math.max(0, ...Object.keys(document.notes).map((id) => Number(id.slice(1)) || 0))
   for (const id of Object.keys(layout)) if (id.startsWith('/')) names[id] = `/${++note}`
-  if ((await change({ kind: 'paste', text, names, shift: SHIFT })) !== undefined) select(Object.values(names))
+  if ((await change({ kind: 'paste', text, names, shift })) !== undefined) select(Object.values(names))
 }
 
 export async function duplicate(): Promise<void> {
   const text = await copied()
   if (text) await add(text)
+}
+
+/** Duplicate blocks and notes at a distance from them. */
+export async function duplicateAt(chosen: readonly string[], shift: [number, number]): Promise<void> {
+  const text = await copied(chosen)
+  if (text) await add(text, shift)
 }
 
 /** Blocks are copied as the text of a diagram file, which can be pasted into another window or a mail. */

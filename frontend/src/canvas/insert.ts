@@ -9,22 +9,31 @@ export const BLOCK_TYPE = 'application/x-armblocks-block'
 /** Grid of block positions, px. */
 export const GRID = 5
 
-/**
- * Add a new block of a type with its centre at a point, and select it. With a wire the block is inserted into
- * it. `level`: the height of the wire that enters its first input, which is then exactly straight.
- */
+interface Insertion {
+  /** The wire into which the block is inserted. */
+  wire?: Wire
+  /** Height of the wire that enters the first input, which is then exactly straight. */
+  level?: number
+  /** A port to which the block is connected; the point is then at the edge of the block. */
+  end?: { port: string; isOutput: boolean }
+  /** Whether the view is moved so that the block is visible. */
+  reveal?: boolean
+}
+
+/** Add a new block of a type with its centre at a point, and select it. */
 export function insertBlock(
   type: string,
   at: { x: number; y: number },
-  { wire, level }: { wire?: Wire; level?: number } = {},
+  { wire, level, end, reveal = false }: Insertion = {},
 ): void {
   const { document, library, select } = useStudio.getState()
   const kind = library.get(type)
   if (!document || !kind) return
   const name = freeName(kind.title.replace(/[/.]/g, ' '), Object.keys(document.blocks))
   const entry = level === undefined ? undefined : sideEntry(kind)
+  const part = !end ? 0.5 : end.isOutput ? 0 : 1
   const place: Place = {
-    x: GRID * Math.round((at.x - kind.width / 2) / GRID),
+    x: GRID * Math.round((at.x - part * kind.width) / GRID),
     y: entry === undefined ? GRID * Math.round((at.y - kind.height / 2) / GRID) : level! - entry,
   }
   const [input, output] = [kind.inputs[0], kind.outputs[0]]
@@ -32,17 +41,23 @@ export function insertBlock(
   void change({
     kind: 'add',
     blocks: [{ name, type, place }],
-    wires: between
+    wires: end
       ? [
-          { source: wire.source, target: `${name}/${input}` },
-          { source: `${name}/${output}`, target: wire.target },
+          end.isOutput
+            ? { source: end.port, target: `${name}/${input}` }
+            : { source: `${name}/${output}`, target: end.port },
         ]
-      : [],
+      : between
+        ? [
+            { source: wire.source, target: `${name}/${input}` },
+            { source: `${name}/${output}`, target: wire.target },
+          ]
+        : [],
     instead: between ? [wire] : [],
   }).then((version) => {
     if (version === undefined) return
     select([name])
-    sheetView.reveal?.({ ...place, width: kind.width, height: kind.height })
+    if (reveal) sheetView.reveal?.({ ...place, width: kind.width, height: kind.height })
   })
 }
 
@@ -64,7 +79,7 @@ export function addBlock(kind: BlockType): void {
   const { width, height } = kind
   if (!last) {
     const view = sheetView.visible?.() ?? { x: 0, y: 0, width: 600, height: 400 }
-    insertBlock(kind.type, middleOf(freeInView({ width, height }, view, boxes)))
+    insertBlock(kind.type, middleOf(freeInView({ width, height }, view, boxes)), { reveal: true })
     return
   }
   const output = last.outputs.find(({ dx }) => dx > 0)
@@ -72,7 +87,8 @@ export function addBlock(kind: BlockType): void {
   const y = level - (sideEntry(kind) ?? height / 2)
   const wanted = { x: last.place.x + last.width + GAP, y, width, height }
   const found = freeBelow(wanted, boxes)
-  insertBlock(kind.type, middleOf(found), output ? { level: level + found.y - y } : {})
+  const straight = output ? { level: level + found.y - y } : {}
+  insertBlock(kind.type, middleOf(found), { ...straight, reveal: true })
 }
 
 const middleOf = ({ x, y, width, height }: Rectangle) => ({ x: x + width / 2, y: y + height / 2 })

@@ -1,3 +1,4 @@
+import { showScope } from '../dock'
 import type { Rectangle } from '../model/free_place'
 import type { Place, SheetBlock, SheetNote, Wire } from '../protocol'
 import { change, look, useStudio } from '../store'
@@ -9,13 +10,19 @@ export const sheetView: {
   fit: (() => void) | null
   /** The visible part of the sheet. */
   visible: (() => Rectangle) | null
+  /** Zoom by a factor about the middle, or to 100 %. */
+  zoom: ((factor: number | null) => void) | null
   /** Move the view so that a block is visible. */
   reveal: ((block: Rectangle) => void) | null
 } = {
   fit: null,
+  zoom: null,
   visible: null,
   reveal: null,
 }
+
+/** Factor of one zoom by key. */
+export const ZOOM_STEP = 1.25
 
 /** Start a note in the centre of the visible part. */
 export function addNote(): void {
@@ -23,10 +30,18 @@ export function addNote(): void {
   if (view) writeNote(view.x + view.width / 2, view.y + view.height / 2)
 }
 
-/** Handle a double click: open a subsystem without a mask, otherwise the parameters of the block. */
+/** The kinds of views with a chart in the panel of the scopes. */
+const CHARTS = new Set(['traces', 'path'])
+
+/**
+ * Handle a double click: show the chart of a scope after a run, open a subsystem without a mask, otherwise
+ * the parameters of the block.
+ */
 export function openBlock(block: SheetBlock): void {
-  const { document, edit } = useStudio.getState()
-  if (block.opens && !block.mask.length && document) look([...document.inside, block.name])
+  const { document, run, edit } = useStudio.getState()
+  const path = [...(document?.inside ?? []), block.name].join('/')
+  if (run?.views.some((view) => view.block === path && CHARTS.has(view.kind))) showScope(path)
+  else if (block.opens && !block.mask.length && document) look([...document.inside, block.name])
   else edit(block.name)
 }
 

@@ -4,6 +4,7 @@ import { isLoose, levelled, putInto, rewired, takenOut, wireAt } from '../model/
 import { wireKey, type Places } from '../model/wires'
 import type { SheetBlock, SheetNote, Wire } from '../protocol'
 import { useStudio } from '../store'
+import { duplicateAt } from './clipboard'
 import { BLOCK_TYPE, insertBlock } from './insert'
 import { move } from './sheet_actions'
 import type { SheetNode } from './sheet_graph'
@@ -11,9 +12,13 @@ import type { WireEdgeType } from './wire_edge'
 
 /**
  * The dragged blocks that change wires: blocks that are disconnected, and an unconnected block that is
- * inserted into the wire on which it is dropped.
+ * inserted into the wire on which it is dropped. `copies`: the drag duplicates the blocks.
  */
-const NOTHING_HELD: { freed: readonly string[]; loose: string | null } = { freed: [], loose: null }
+const NOTHING_HELD: { freed: readonly string[]; loose: string | null; copies: boolean } = {
+  freed: [],
+  loose: null,
+  copies: false,
+}
 
 /**
  * The state of a drag on a sheet: displaced blocks, blocks that change wires, and the wire into which a block
@@ -38,8 +43,9 @@ export type SheetDrag = ReturnType<typeof useSheetDrag>
 
 /** The handlers of a drag of blocks on the sheet. */
 export function dragHandlers(
-  { held, setHeld, setInto }: SheetDrag,
+  { held, setHeld, setInto, setDrag }: SheetDrag,
   blocks: Record<string, SheetBlock>,
+  notes: Record<string, SheetNote>,
   wires: Wire[],
   edges: WireEdgeType[],
 ) {
@@ -48,10 +54,15 @@ export function dragHandlers(
       blocks,
       nodes.map(({ id }) => id),
     )
+    if (event.ctrlKey || event.metaKey) {
+      setHeld((held.current = { ...NOTHING_HELD, copies: true }))
+      return
+    }
     const freed = event.shiftKey || event.altKey ? taken.map(({ name }) => name) : []
     const [one] = taken
     const alone = taken.length === 1 && one && isLoose(one, freed.length ? takenOut(taken, wires) : wires)
-    if (freed.length || alone) setHeld((held.current = { freed, loose: alone ? one.name : null }))
+    if (freed.length || alone)
+      setHeld((held.current = { freed, loose: alone ? one.name : null, copies: false }))
   }
   const carry = (_: unknown, node: SheetNode) => {
     const block = node.id === held.current.loose ? blocks[node.id] : undefined
@@ -59,8 +70,17 @@ export function dragHandlers(
   }
   const letGo = (_: unknown, node: SheetNode, moved: SheetNode[]) => {
     const to: Places = Object.fromEntries(moved.map(({ id, position }) => [id, position]))
-    const { freed, loose } = held.current
+    const { freed, loose, copies } = held.current
     held.current = NOTHING_HELD
+    if (copies) {
+      setHeld(NOTHING_HELD)
+      setDrag({})
+      const from = blocks[node.id]?.place ?? notes[node.id]
+      const shift = from && ([node.position.x - from.x, node.position.y - from.y] as [number, number])
+      const chosen = moved.map(({ id }) => id)
+      if (shift && (shift[0] || shift[1])) void duplicateAt(chosen, shift)
+      return
+    }
     const left = freed.length ? takenOut(present(blocks, freed), wires) : wires
     const block = loose === null ? undefined : blocks[loose]
     const found = block && wireAt(middleOf(block, node.position), edges, wires)

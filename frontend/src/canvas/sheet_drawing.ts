@@ -1,6 +1,7 @@
 import { useMemo, useState } from 'react'
 import { takenOut } from '../model/rewiring'
 import { wireKey, type Places } from '../model/wires'
+import type { Finding } from '../protocol'
 import { useStudio } from '../store'
 import { present, type SheetDrag } from './sheet_drag'
 import { SheetGraph } from './sheet_graph'
@@ -12,7 +13,12 @@ export function useSheetDrawing({ drag, freed, loose, into }: SheetDrag, chosenW
   const blocks = useStudio((s) => s.document!.blocks)
   const wires = useStudio((s) => s.document!.wires)
   const notes = useStudio((s) => s.document!.notes)
-  const findings = useStudio((s) => s.document!.findings)
+  const found = useStudio((s) => s.document!.findings)
+  const strict = useStudio((s) => s.strict)
+  const findings = useMemo(
+    () => (strict ? found.map((one): Finding => ({ ...one, severity: 'error' })) : found),
+    [found, strict],
+  )
   const kinds = useStudio((s) => s.document!.wireKinds)
   const level = useStudio((s) => s.document!.inside.map((name) => `${name}/`).join(''))
   const selection = useStudio((s) => s.selection)

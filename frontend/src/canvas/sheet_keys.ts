@@ -4,7 +4,7 @@ import { show, useDialogs } from '../dialogs'
 import { change, look, useStudio } from '../store'
 import { chosenBlocks } from './arranging'
 import { editNote } from './note_node'
-import { addNote, move, openBlock, sheetView } from './sheet_actions'
+import { addNote, move, openBlock, sheetView, ZOOM_STEP } from './sheet_actions'
 import { wireKey, type Places } from '../model/wires'
 
 const NUDGE = 5
@@ -70,6 +70,9 @@ export function useSheetKeys(
     else if (event.key === '?') show('keys')
     else if (event.key === '"') addNote()
     else if (event.key === ' ') sheetView.fit?.()
+    else if (event.key === '+' || event.key === '=') sheetView.zoom?.(ZOOM_STEP)
+    else if (event.key === '-') sheetView.zoom?.(1 / ZOOM_STEP)
+    else if (event.key === '1') sheetView.zoom?.(null)
     else if (event.key === 'Escape' && document.inside.length && !selection.size)
       look(document.inside.slice(0, -1))
     else if (event.key === 'Escape') select([])

@@ -1,4 +1,4 @@
-import type { ReactFlowInstance } from '@xyflow/react'
+import { useStore, type ReactFlowInstance } from '@xyflow/react'
 import { useEffect, type RefObject } from 'react'
 import type { Rectangle } from '../model/free_place'
 import type { SheetBlock } from '../protocol'
@@ -77,9 +77,23 @@ export function useFitted(sheet: Sheet, flow: Flow): void {
   }, [sheet, flow])
 }
 
+/** Names are larger on a sheet that is zoomed out, as on a small screen: below the blocks they have room. */
+export function nameScale(zoom: number): number {
+  const wanted = Math.min(Math.max(0.9 / zoom, 1), 1.25)
+  return Math.round(20 * wanted) / 20
+}
+
+/** Set the size of the names for the present zoom. */
+export function useNameScale(sheet: Sheet): void {
+  const scale = useStore((s) => nameScale(s.transform[2]))
+  useEffect(() => sheet.current?.style.setProperty('--name-scale', String(scale)), [sheet, scale])
+}
+
 /** The commands of the visible sheet act on this view. */
 export function useSheetView(sheet: Sheet, flow: Flow): void {
   useEffect(() => {
+    sheetView.zoom = (factor) =>
+      void flow.zoomTo(factor === null ? 1 : factor * flow.getZoom(), { duration: 120 })
     sheetView.fit = () => void flow.fitView({ ...FIT, duration: 150 })
     sheetView.visible = () => {
       const { clientWidth: width, clientHeight: height } = sheet.current!
@@ -92,6 +106,7 @@ export function useSheetView(sheet: Sheet, flow: Flow): void {
     }
     return () => {
       sheetView.fit = null
+      sheetView.zoom = null
       sheetView.visible = null
       sheetView.reveal = null
     }

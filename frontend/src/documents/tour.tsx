@@ -19,8 +19,8 @@ const STOPS: Stop[] = [
     at: '.sheet',
     title: 'The sheet',
     text:
-      'Blocks and wires of the model. Drag from port to port to wire; drag a segment of a wire to move ' +
-      'it elsewhere; double-click a block to open it.',
+      'Blocks and wires of the model. Drag from port to port to wire, or to the empty sheet to add a ' +
+      'connected block; double-click a block to open it; drag with Ctrl to duplicate it.',
   },
   {
     at: '.palette',
@@ -33,15 +33,15 @@ const STOPS: Stop[] = [
     at: '.run-controls',
     title: 'Run',
     text:
-      'Run (Ctrl+Enter), pause, step forward and back, stop. To the right: stop time and speed relative ' +
-      'to real time.',
+      'Run (Ctrl+Enter), pause (Ctrl+.), step (Ctrl+→, Ctrl+←), stop. To the right: stop time and speed ' +
+      'relative to real time.',
   },
   {
     at: '.scopes-panel, .chart',
     title: 'Scopes',
     text:
-      'Recorded signals: zoom with the mouse, measure between cursors, export. Click a wire on the sheet ' +
-      'to log its signal as well.',
+      'Recorded signals, also by a double click on a Scope: zoom with the mouse, measure between ' +
+      'cursors, export. Click a wire on the sheet to log its signal as well.',
   },
   {
     at: '.timeline',

@@ -14,7 +14,13 @@ export function QuickInsert() {
   const typed = useDialogs((s) => s.typed)
   const at = useDialogs((s) => s.at)
   const library = useStudio((s) => s.welcome?.library)
-  const found = useMemo(() => matching(library ?? [], typed).slice(0, MOST_SHOWN), [library, typed])
+  const end = useDialogs((s) => s.end)
+  const found = useMemo(() => {
+    const fitting = (library ?? []).filter(
+      ({ inputs, outputs }) => !end || (end.isOutput ? inputs : outputs).length > 0,
+    )
+    return matching(fitting, typed).slice(0, MOST_SHOWN)
+  }, [library, typed, end])
   return (
     <PickList
       opened={opened}
@@ -33,7 +39,7 @@ export function QuickInsert() {
       }))}
       onPick={(index) => {
         const kind = found[index]
-        if (kind && at) insertBlock(kind.type, place(at))
+        if (kind && at) insertBlock(kind.type, place(at), end ? { end } : {})
         else if (kind) addBlock(kind)
       }}
     />

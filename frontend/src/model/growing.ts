@@ -29,8 +29,13 @@ export class Growing {
 
   constructor(
     private readonly plot: Surface,
-    private readonly strokes: Stroke[],
+    private strokes: readonly Stroke[],
   ) {}
+
+  /** Change the dashes of the traces, before a complete redraw. */
+  dashed(dashes: readonly number[][]): void {
+    this.strokes = this.strokes.map((stroke, k) => ({ ...stroke, dash: dashes[k] ?? stroke.dash }))
+  }
 
   /** Set the state after a complete redraw. */
   shows([, ...columns]: Drawn, ends: number[]): void {

@@ -1,5 +1,6 @@
 import { later, useSettled } from '../later'
 import type { Panel } from '../panel'
+import { robotWidth } from '../robot_panel'
 
 const RobotView = later(async () => (await import('../robot/robot_view')).default, 'Loading the robot view …')
 
@@ -13,5 +14,5 @@ export const panel: Panel = {
   title: 'Robot',
   component: RobotPanel,
   order: 4,
-  place: { beside: 'canvas', side: 'right', size: Math.min(640, 0.28 * innerWidth) },
+  place: { beside: 'canvas', side: 'right', size: robotWidth() },
 }

@@ -1,5 +1,5 @@
 import { ask, useStudio } from '../store'
-import { useCursor } from './cursor'
+import { stepCursor, useCursor } from './cursor'
 import { useRuns } from './runs'
 
 async function run(): Promise<void> {
@@ -8,6 +8,18 @@ async function run(): Promise<void> {
   useCursor.setState({ time: null, playing: false })
   const { tried, speed } = useRuns.getState()
   await ask({ kind: 'run', document: document.state.document, speed, tuned: tried })
+}
+
+/** Pause, step or stop the run; without an active run, a step moves the time cursor by one sample. */
+export function control(action: 'pause' | 'step' | 'back' | 'stop'): void {
+  const { run: shown } = useStudio.getState()
+  if (!shown) return
+  const busy = shown.state === 'running' || shown.state === 'paused'
+  if (!busy && action === 'step') stepCursor(1)
+  else if (!busy && action === 'back') stepCursor(-1)
+  if (!busy) return
+  if (action === 'back') useCursor.setState({ time: null, playing: false })
+  void ask({ kind: 'control', run: shown.run, action })
 }
 
 /** Start the model, or resume a paused run. */

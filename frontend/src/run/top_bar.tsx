@@ -18,9 +18,8 @@ import { openConfiguration, save, show } from '../dialogs'
 import { FileMenu } from '../documents/file_menu'
 import { DocumentTitle } from '../documents/title'
 import { alter, ask, change, useStudio } from '../store'
-import { stepCursor, useCursor } from './cursor'
 import { useRuns } from './runs'
-import { startOrResume } from './start'
+import { control, startOrResume } from './start'
 
 const SPEEDS = [
   { value: '', label: 'as fast as possible' },
@@ -80,12 +79,6 @@ function RunControls({ known }: { known: boolean }) {
   const runKey = useStudio((s) => s.run?.run)
   const speed = useRuns((s) => s.speed)
   const busy = state === 'running' || state === 'paused'
-  const control = (action: 'pause' | 'resume' | 'step' | 'back' | 'stop') =>
-    runKey && void ask({ kind: 'control', run: runKey, action })
-  const goBack = () => {
-    useCursor.setState({ time: null, playing: false })
-    control('back')
-  }
   return (
     <Group gap={4} role="group" aria-label="Run" className="run-controls">
       <Button
@@ -100,7 +93,7 @@ function RunControls({ known }: { known: boolean }) {
         label={busy ? 'Step back' : 'One sample back'}
         icon={IconPlayerSkipBackFilled}
         disabled={!runKey || state === 'running'}
-        onClick={() => (busy ? goBack() : stepCursor(-1))}
+        onClick={() => control('back')}
       />
       <Tool
         label="Pause"
@@ -112,7 +105,7 @@ function RunControls({ known }: { known: boolean }) {
         label={busy ? 'Step' : 'One sample forward'}
         icon={IconPlayerSkipForwardFilled}
         disabled={!runKey || state === 'running'}
-        onClick={() => (busy ? control('step') : stepCursor(1))}
+        onClick={() => control('step')}
       />
       <Tool label="Stop" icon={IconPlayerStopFilled} disabled={!busy} onClick={() => control('stop')} />
       <StopTime />

@@ -6,7 +6,10 @@ import { createPortal } from 'react-dom'
 import { create } from 'zustand'
 import type { Point } from '../model/wire_lines'
 import type { WireEdgeType } from '../canvas/wire_edge'
+import { nameSide, nameWidth } from '../canvas/sheet_layout'
 import { changed, watch } from '../frames'
+import type { Rectangle } from '../model/free_place'
+import { labelPlace, OFF_WIRE } from '../model/value_labels'
 import type { PortSpot, SheetBlock } from '../protocol'
 import { samples } from '../samples'
 import { digits, reading, useUnits } from '../scopes/quantity'
@@ -68,23 +71,17 @@ export function WireValues({ chosen }: { chosen: WireEdgeType | undefined }) {
   const displays = (views ?? []).filter(
     ({ kind, block }) => kind === 'value' && block.startsWith(level) && blocks[block.slice(level.length)],
   )
+  const obstacles = useMemo(() => (ran ? drawnBoxes(blocks) : []), [ran, blocks])
+  const scale = Math.min(Math.max(1 / zoom, 1), 2.5)
   if (!portal) return null
   return createPortal(
-    <div
-      ref={layer}
-      className="wire-values"
-      style={{ '--legible': Math.min(Math.max(1 / zoom, 1), 2.5) } as React.CSSProperties}
-    >
-      {shown.map(({ ref, block, spot }) => (
+    <div ref={layer} className="wire-values" style={{ '--legible': scale } as React.CSSProperties}>
+      {shown.map((output) => (
         <span
-          key={ref}
+          key={output.ref}
           className="wire-value numbers"
-          data-path={level + ref}
-          style={{
-            transform:
-              legible(block.place.x + spot.x + (spot.dx < 0 ? -6 : 6), block.place.y + spot.y - 4) +
-              ` translate(${spot.dx < 0 ? '-100%' : '0'}, -100%)`,
-          }}
+          data-path={level + output.ref}
+          style={labelStyle(output, output.ref === hovered ? [] : obstacles, scale)}
         />
       ))}
       {displays.flatMap(({ block: path, signals }) => {
@@ -124,6 +121,49 @@ export function WireValues({ chosen }: { chosen: WireEdgeType | undefined }) {
     </div>,
     portal,
   )
+}
+
+/** Height of a label, px. */
+const LABEL = 14
+const LEAST_LABEL = 24
+
+/** Position and greatest width of the value at an output. */
+function labelStyle(
+  { block, spot }: ReturnType<typeof outputs>[number],
+  obstacles: readonly Rectangle[],
+  scale: number,
+): React.CSSProperties {
+  const direction = spot.dx < 0 ? -1 : 1
+  const [x, y] = [block.place.x + spot.x + 6 * direction, block.place.y + spot.y]
+  const { below, width } = labelPlace(
+    { x, y },
+    direction,
+    { height: LABEL * scale, legible: scale },
+    obstacles,
+  )
+  const shift = `translate(${direction < 0 ? '-100%' : '0'}, ${below ? '0' : '-100%'})`
+  return {
+    maxWidth: Math.max(width / scale, LEAST_LABEL),
+    transform: `${legible(x, below ? y + OFF_WIRE : y - OFF_WIRE)} ${shift}`,
+  }
+}
+
+/** The rectangles of blocks and of their names. */
+function drawnBoxes(blocks: Record<string, SheetBlock>): Rectangle[] {
+  return Object.values(blocks).flatMap((block) => {
+    const { x, y } = block.place
+    const { width, height, name } = block
+    const wide = nameWidth(name)
+    const at = {
+      below: { x: x + (width - wide) / 2, y: y + height + 2 },
+      above: { x: x + 0.78 * width, y: y - 15 },
+      beside: { x: x + width + 5, y: y + height / 2 - 7 },
+    }[nameSide(block)]
+    return [
+      { x, y, width, height },
+      { ...at, width: wide, height: 14 },
+    ]
+  })
 }
 
 /** Write the displayed values into their elements, in the frame after a change and without React. */

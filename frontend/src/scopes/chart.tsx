@@ -18,11 +18,14 @@ export function Chart({
   title,
   traces,
   path = false,
+  view,
   band,
 }: {
   title: string
   traces: Trace[]
   path?: boolean
+  /** The block whose signals are shown. */
+  view?: string
   band?: number
 }) {
   const [hidden, setHidden] = useState<ReadonlySet<string>>(new Set())
@@ -37,7 +40,7 @@ export function Chart({
       return next
     })
   return (
-    <figure className={measured ? 'chart measured' : 'chart'}>
+    <figure className={measured ? 'chart measured' : 'chart'} data-view={view}>
       <figcaption>
         <b>{title}</b>
         <span className="legend">

@@ -1,6 +1,7 @@
 import uPlot from 'uplot'
 import { changed, watch } from '../frames'
 import { Growing } from '../model/growing'
+import { sharedDashes } from '../model/identical'
 import { extremes, joined, within, type Drawn, type Extremes, type Trace } from '../model/trace'
 import { useCursor } from '../run/cursor'
 import { mayFollow } from '../run/pace'
@@ -37,6 +38,7 @@ export class LivePlot {
   private factor = 1
   private drawn: Drawn = [new Float64Array(0)]
   private known: Extremes | undefined
+  private dashes: number[][] = []
   private range: [number, number] = [0, 1]
   /** The last examined version of the samples, and the version of the last complete drawing. */
   private seen = 0
@@ -95,7 +97,13 @@ export class LivePlot {
       height: 360,
       x: { min: from, max: to, label: 'time, s' },
       y: { min, max, label: this.unit },
-      lines: shown.map(({ tone, dash, label }, k) => ({ tone, dash, label, x, y: columns[k] ?? [] })),
+      lines: shown.map(({ tone, dash, label }, k) => ({
+        tone,
+        dash: this.dashes[k] ?? dash,
+        label,
+        x,
+        y: columns[k] ?? [],
+      })),
     }
   }
 
@@ -165,6 +173,12 @@ export class LivePlot {
     this.range = fits ? range : follows && alike ? withRoom(needed, range) : needed
     this.factor = found.factor
     this.unit = shown.length === 1 ? [shown[0]!.label, found.unit].filter(Boolean).join(', ') : found.unit
+    const dashes = sharedDashes(drawn, (this.range[1] - this.range[0]) / this.factor)
+    this.dashes = shown.map(({ dash }, k) => dashes[k] ?? dash)
+    this.dashes.forEach((dash, k) => {
+      plot.series[k + 1]!.dash = dash
+    })
+    this.growing.dashed(this.dashes)
     plot.batch(() => {
       plot.setData(scaled(drawn, this.factor), false)
       plot.setScale('x', { min: from, max: to })

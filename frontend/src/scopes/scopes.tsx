@@ -7,7 +7,10 @@ import {
   IconZoomIn,
   IconZoomOut,
 } from '@tabler/icons-react'
+import { useElementSize } from '@mantine/hooks'
 import { useMemo } from 'react'
+import { inNaturalOrder } from '../model/natural_order'
+import { scopeGrid } from '../model/scope_grid'
 import type { ViewOf } from '../protocol'
 import { shownTime } from '../run/cursor'
 import { samples } from '../samples'
@@ -22,7 +25,10 @@ export function Scopes() {
   // Selected fields only: the progress of the run changes sixty times a second.
   const run = useStudio((s) => s.run?.run)
   const all = useStudio((s) => s.run?.views)
-  const views = all?.filter(({ kind }) => kind === 'traces' || kind === 'path') ?? []
+  const views = useMemo(() => {
+    const shown = all?.filter(({ kind }) => kind === 'traces' || kind === 'path') ?? []
+    return inNaturalOrder(shown, ({ title, block }) => title || block)
+  }, [all])
   if (!run) return null
   if (!views.length)
     return (
@@ -34,11 +40,27 @@ export function Scopes() {
   return (
     <div className="scopes-panel">
       <PlotTools />
-      <div className="scopes">
+      <Grid count={views.length}>
         {views.map((view) => (
           <ScopeChart key={`${run}${view.block}${view.signals.join()}`} run={run} view={view} />
         ))}
-      </div>
+      </Grid>
+    </div>
+  )
+}
+
+/** Width of a chart with a table of measures, px. */
+const MEASURED = 560
+
+/** The charts in rows that fill the panel; the charts of an incomplete last row are wider. */
+function Grid({ count, children }: { count: number; children: React.ReactNode }) {
+  const { ref, width, height } = useElementSize()
+  const measured = useWindow((s) => s.measuring || s.cursors !== null)
+  const { columns, rowHeight } = scopeGrid(count, width, height, measured ? MEASURED : undefined)
+  const style = { '--columns': columns, '--row': `${Math.floor(rowHeight)}px` } as React.CSSProperties
+  return (
+    <div className="scopes" ref={ref} style={style}>
+      {children}
     </div>
   )
 }
@@ -54,7 +76,9 @@ function ScopeChart({ run, view }: { run: string; view: ViewOf }) {
     // eslint-disable-next-line react-hooks/exhaustive-deps
     [run, view],
   )
-  return <Chart title={view.title || view.block} traces={traces} path={view.kind === 'path'} />
+  return (
+    <Chart title={view.title || view.block} traces={traces} path={view.kind === 'path'} view={view.block} />
+  )
 }
 
 /** The tools for all time plots. */

@@ -15,6 +15,10 @@ interface Window {
 /** Zoom and measuring cursors, shared by all time plots. */
 export const useWindow = create<Window>(() => ({ range: null, cursors: null, measuring: false }))
 useWindow.subscribe(changed)
+useStudio.subscribe(({ document }, before) => {
+  if (document?.state.document !== before.document?.state.document)
+    useWindow.setState({ range: null, cursors: null })
+})
 
 /** The range of the whole run: up to its stop time while it runs, otherwise up to its last sample. */
 export function wholeRun(): [number, number] {

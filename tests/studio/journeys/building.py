@@ -144,11 +144,11 @@ def expect_no_frames(page: Page) -> None:
 
 def expect_no_faults(page: Page) -> None:
     """Wait until the check of the drawing has no findings; on failure the error lists them."""
-    faults = page.locator(".block .fault")
+    faults = page.locator(".block .fault, .port.unconnected")
     try:
         expect(faults).to_have_count(0)
     except AssertionError as error:
-        found = faults.evaluate_all("(icons) => icons.map((icon) => icon.ariaLabel)")
+        found = faults.evaluate_all("(marks) => marks.map((mark) => mark.ariaLabel ?? mark.title)")
         raise AssertionError(f"faults are shown: {found}") from error
 
 

@@ -176,6 +176,34 @@ def test_a_block_is_disconnected_from_a_wire_and_inserted_into_another(sheet: Pa
     expect(wires).to_have_count(count)
 
 
+def test_blocks_are_duplicated_resized_and_connected_by_drags(sheet: Page) -> None:
+    x, y = middle(block(sheet, "PID").locator(".block"))
+    before = position(sheet, "PID")
+    drag(sheet, "PID", x, y - 90, key="Control")
+    copy = block(sheet, "PID 2")
+    expect(copy).to_have_class(re.compile("selected"))
+    assert position(sheet, "PID") == before
+    left, top = position(sheet, "PID 2")
+    assert abs(left - before[0]) <= 5  # one step of the grid
+    assert top < before[1] - 50
+    width = (copy.locator(".face").get_attribute("width")) or ""
+    corner_x, corner_y = middle(copy.locator(".resize").last)
+    sheet.mouse.move(corner_x, corner_y)
+    sheet.mouse.down()
+    sheet.mouse.move(corner_x + 40, corner_y, steps=3)
+    sheet.mouse.up()
+    expect(copy.locator(".face")).not_to_have_attribute("width", width)
+    assert position(sheet, "PID 2") == (left, top)
+    from_x, from_y = middle(copy.locator('[data-handleid="y"]'))
+    sheet.mouse.move(from_x, from_y)
+    sheet.mouse.down()
+    sheet.mouse.move(from_x + 60, from_y - 5, steps=3)
+    sheet.mouse.up()
+    sheet.get_by_role("textbox", name="Add a block").fill("gain")
+    sheet.keyboard.press("Enter")
+    expect(edge(sheet, "PID 2/y -> Gain/u")).to_have_count(1)
+
+
 def test_copies_keep_routes_and_the_contents_of_subsystems(sheet: Page) -> None:
     x, y = middle(edge(sheet, "PID/y -> u/u1").locator(".piece").first)
     sheet.mouse.move(x, y)
@@ -381,6 +409,13 @@ def picture(page: Page, title: str) -> str:
 def test_the_value_axis_of_a_scope_is_zoomed_panned_and_reset(sheet: Page) -> None:
     sheet.keyboard.press("Control+Enter")
     expect(sheet.locator(".run-state")).to_contain_text("done", ignore_case=True)
+    chart = sheet.locator('.chart[data-view="Scope"]')
+    block(sheet, "Scope").dblclick()
+    expect(chart).to_have_class(re.compile("marked"))
+    expect(sheet.get_by_role("dialog")).to_be_hidden()
+    for typed, shown in (("dark theme", "dark"), ("theme of the system", "light")):
+        command(sheet, typed)
+        expect(sheet.locator("html")).to_have_attribute("data-mantine-color-scheme", shown)
     axis = sheet.locator(".chart .values-axis").first
     title = sheet.locator(".chart figcaption b").first.inner_text()
     shown_whole = sheet.get_by_role("button", name=f"Show all values of {title}")

@@ -53,12 +53,13 @@ def test_duplicates_keep_library_links_and_bends() -> None:
     led = Wire(source=str(wire.source), target=str(wire.target), bends=(200.0, 50.0, 300.0))
     document.edit(BendWires(wires=[led]))
     names = {source: "a", target: "b"}
-    document.edit(PasteBlocks(text=copy(document.diagram, *names), names=names, shift=30.0))
+    document.edit(PasteBlocks(text=copy(document.diagram, *names), names=names, shift=(30.0, 10.0)))
     after = document.diagram
     assert after.blocks["b"] == after.blocks[target]
     assert after.layout["b"].x == after.layout[target].x + 30
+    assert after.layout["b"].y == after.layout[target].y + 10
     (copied,) = (wire for wire in after.bends if wire.source.block == "a")
-    assert after.bends[copied] == (230.0, 80.0, 330.0)
+    assert after.bends[copied] == (230.0, 60.0, 330.0)
 
 
 def test_a_pasted_formula_becomes_a_value_where_its_names_are_undeclared() -> None:

@@ -15,6 +15,8 @@ from armblocks.blocks import BLOCKS
 from armblocks.diagram import Block, Connection, Diagram, PortRef
 from armblocks.diagram.mask import formula_names
 from armblocks.diagram.names import folded
+from armblocks.drawing.diagram_layout import standing_box
+from armblocks.drawing.wires import moved_bends
 from armblocks.errors import DiagramError
 from armblocks.studio.sheet.nesting import check_free
 from armblocks.studio.sheet.parameter_values import ResolveRobot
@@ -60,14 +62,16 @@ def clipped(
     return formats.diagram_to_bytes(part, resolve_robot, folder=folder).decode()
 
 
-def pasted(diagram: Diagram, copied: Diagram, names: Mapping[str, str], shift: float) -> Diagram:
+def pasted(
+    diagram: Diagram, copied: Diagram, names: Mapping[str, str], shift: tuple[float, float]
+) -> Diagram:
     """Return the diagram with the copied blocks and notes, renamed according to ``names``.
 
     A formula remains if the sheet declares all its names; otherwise it is replaced by its value. Raises
     ``DiagramError`` if a name is in use.
     """
     where = f"diagram '{diagram.name}'"
-    copied = placed(copied)
+    copied, (dx, dy) = placed(copied), shift
     taken = {folded(name): name for name in diagram.blocks}
     for name in copied.blocks:
         check_free(names.get(name, name), taken, where)
@@ -86,13 +90,14 @@ def pasted(diagram: Diagram, copied: Diagram, names: Mapping[str, str], shift: f
 
     wires = {wire: Connection(moved(wire.source), moved(wire.target)) for wire in copied.connections}
     layout = {
-        names.get(name, name): dataclasses.replace(place, x=place.x + shift, y=place.y + shift)
+        names.get(name, name): dataclasses.replace(place, x=place.x + dx, y=place.y + dy)
         for name, place in copied.layout.items()
     }
-    bends = {wires[wire]: tuple(value + shift for value in led) for wire, led in copied.bends.items()}
-    shifted = {
-        name: dataclasses.replace(note, x=note.x + shift, y=note.y + shift) for name, note in notes.items()
+    bends = {
+        wires[wire]: moved_bends(led, leaves_sideways(wire, copied), shift)
+        for wire, led in copied.bends.items()
     }
+    shifted = {name: dataclasses.replace(note, x=note.x + dx, y=note.y + dy) for name, note in notes.items()}
     blocks = {
         names.get(name, name): _with_known_names(block, diagram) for name, block in copied.blocks.items()
     }
@@ -105,6 +110,13 @@ def pasted(diagram: Diagram, copied: Diagram, names: Mapping[str, str], shift: f
         notes={**diagram.notes, **shifted},
         logged=(*diagram.logged, *(moved(ref) for ref in copied.logged)),
     )
+
+
+def leaves_sideways(wire: Connection, diagram: Diagram) -> bool:
+    """Whether a wire leaves its block horizontally."""
+    block, place = diagram.blocks[wire.source.block], diagram.layout[wire.source.block]
+    spots = standing_box(wire.source.block, block, place).outputs
+    return any(spot.name == wire.source.port and spot.dx != 0 for spot in spots)
 
 
 def _with_known_names(block: Block, diagram: Diagram) -> Block:

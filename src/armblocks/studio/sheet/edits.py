@@ -29,7 +29,6 @@ from armblocks.diagram import (
 from armblocks.diagram.diagram import block_in_scope
 from armblocks.diagram.mask import Scope
 from armblocks.diagram.names import folded
-from armblocks.drawing.diagram_layout import standing_box
 from armblocks.drawing.wires import moved_bends
 from armblocks.errors import DiagramError, UnknownNameError
 from armblocks.studio.documents.edit_table import EditTable
@@ -57,7 +56,7 @@ from armblocks.studio.protocol.messages.sheet_edits import (
     SheetNote,
     Wire,
 )
-from armblocks.studio.sheet.clipping import ReadDiagram, pasted, reader
+from armblocks.studio.sheet.clipping import ReadDiagram, leaves_sideways, pasted, reader
 from armblocks.studio.sheet.mask_edits import with_mask
 from armblocks.studio.sheet.nesting import check_free, grouped, unlinked, with_block
 from armblocks.studio.sheet.parameter_values import ResolveRobot, parameter_value, tuned_value
@@ -120,7 +119,8 @@ def _add(edit: AddBlocks, diagram: Diagram, context: EditContext) -> Diagram:
 def _paste(edit: PasteBlocks, diagram: Diagram, context: EditContext) -> Diagram:
     copied = context.read_diagram(edit.text, "the copied blocks")
     _check_room(diagram, len(copied.blocks))
-    return pasted(diagram, copied, edit.names, edit.shift)
+    shift = edit.shift if isinstance(edit.shift, tuple) else (edit.shift, edit.shift)
+    return pasted(diagram, copied, edit.names, shift)
 
 
 def _check_room(diagram: Diagram, more: int) -> None:
@@ -270,15 +270,9 @@ def _move(edit: MoveBlocks, diagram: Diagram, _: EditContext) -> Diagram:
     for wire, values in diagram.bends.items():
         shift = shifts.get(wire.source.block)
         if shift is not None and shift == shifts.get(wire.target.block):
-            bends[wire] = moved_bends(values, _leaves_sideways(wire, diagram), shift)
+            bends[wire] = moved_bends(values, leaves_sideways(wire, diagram), shift)
     moved = _noted(edit.notes, dataclasses.replace(diagram, layout=layout, bends=bends), known=True)
     return _connected(edit.wires, _without(RemoveBlocks(wires=edit.instead), moved), replace=False)
-
-
-def _leaves_sideways(wire: Connection, diagram: Diagram) -> bool:
-    block, place = diagram.blocks[wire.source.block], diagram.layout[wire.source.block]
-    spots = standing_box(wire.source.block, block, place).outputs
-    return any(spot.name == wire.source.port and spot.dx != 0 for spot in spots)
 
 
 @EDITS.on(BendWires, lambda edit: f"bend {_counted(edit.wires, 'wire')}")

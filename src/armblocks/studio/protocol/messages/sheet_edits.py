@@ -73,13 +73,13 @@ class PasteBlocks(DiagramEdit):
     """Paste blocks: ``text`` is a diagram in the file format.
 
     ``names``: new names of its blocks and notes, where they differ. ``shift``: displacement to the right and
-    down, px.
+    down, px; one number if both are equal.
     """
 
     kind: Literal["paste"] = "paste"
     text: str
     names: dict[str, str] = Field(default_factory=dict[str, str])
-    shift: Px = 0.0
+    shift: Px | tuple[Px, Px] = 0.0
 
 
 class RemoveBlocks(DiagramEdit):

@@ -1,0 +1,22 @@
+import type { DockviewApi } from 'dockview-react'
+
+/** The dock of the page; `null` before it is shown. */
+let dock: DockviewApi | null = null
+
+export function setDock(api: DockviewApi): void {
+  dock = api
+}
+
+const MARKED_MS = 1200
+
+/** Show the chart of a block in the panel of the scopes, and mark it for a moment. */
+export function showScope(path: string): void {
+  dock?.getPanel('scopes')?.api.setActive()
+  requestAnimationFrame(() => {
+    const chart = document.querySelector(`.scopes [data-view="${CSS.escape(path)}"]`)
+    if (!chart) return
+    chart.scrollIntoView({ block: 'nearest', inline: 'nearest' })
+    chart.classList.add('marked')
+    setTimeout(() => chart.classList.remove('marked'), MARKED_MS)
+  })
+}

@@ -1,0 +1,26 @@
+import { expect, test } from 'vitest'
+import { sharedDashes } from '../../src/model/identical'
+
+const time = Float64Array.from({ length: 50 }, (_, k) => k)
+const wave = (phase: number) => time.map((t) => Math.sin(0.2 * t + phase))
+
+/** Whether a dash pattern draws at a distance along the line. */
+function draws(dash: number[], at: number): boolean {
+  let rest = at % dash.reduce((sum, part) => sum + part, 0)
+  return dash.findIndex((part) => (rest -= part) < 0) % 2 === 0
+}
+
+test('traces that lie on each other take turns: exactly one of them is seen at each place', () => {
+  const dashes = sharedDashes([time, wave(0), wave(1), wave(0), wave(0).map((v) => v + 1e-9)], 2)
+  expect(dashes[1]).toBeNull()
+  const shared = dashes.filter((dash) => dash !== null)
+  expect(shared).toHaveLength(3)
+  for (let at = 0.5; at < 100; at++) expect(shared.filter((dash) => draws(dash, at))).toHaveLength(1)
+})
+
+test('different traces, and traces without values, keep their own lines', () => {
+  expect(sharedDashes([time, wave(0), wave(0.01)], 2)).toEqual([null, null])
+  const empty = time.map(() => NaN)
+  const none = Array.from(time, () => null)
+  expect(sharedDashes([time, empty, empty.slice(), none, none.slice()], 2)).toEqual([null, null, null, null])
+})

@@ -1,0 +1,40 @@
+import { expect, test } from 'vitest'
+import type { Rectangle } from '../../src/model/free_place'
+import { labelPlace, OFF_WIRE } from '../../src/model/value_labels'
+
+let seed = 7
+const random = (most: number) => ((seed = (seed * 48271) % 2147483647) / 2147483647) * most
+
+test('a label never covers a block or a name, wherever they are', () => {
+  for (let round = 0; round < 300; round++) {
+    const obstacles: Rectangle[] = Array.from({ length: 12 }, () => ({
+      x: random(600),
+      y: random(300),
+      width: 10 + random(90),
+      height: 10 + random(60),
+    }))
+    const at = { x: random(600), y: random(300) }
+    const direction = round % 2 ? 1 : -1
+    const height = 14 + random(21)
+    const { below, width } = labelPlace(at, direction, { height }, obstacles)
+    const label = {
+      x: direction > 0 ? at.x : at.x - width,
+      y: below ? at.y + OFF_WIRE : at.y - OFF_WIRE - height,
+      width,
+      height,
+    }
+    for (const one of obstacles) {
+      const across = Math.min(label.x + width, one.x + one.width) - Math.max(label.x, one.x)
+      const down = Math.min(label.y + height, one.y + one.height) - Math.max(label.y, one.y)
+      expect(across > 1e-9 && down > 1e-9).toBe(false)
+    }
+  }
+})
+
+test('a label is above its wire unless there is more room below', () => {
+  const above: Rectangle = { x: 30, y: -20, width: 50, height: 18 }
+  expect(labelPlace({ x: 0, y: 0 }, 1, { height: 14 }, [])).toMatchObject({ below: false })
+  expect(labelPlace({ x: 0, y: 0 }, 1, { height: 14 }, [above])).toMatchObject({ below: true })
+  const both = [above, { ...above, x: 20, y: 2 }]
+  expect(labelPlace({ x: 0, y: 0 }, 1, { height: 14 }, both)).toEqual({ below: false, width: 30 })
+})
