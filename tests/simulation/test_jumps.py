@@ -28,7 +28,7 @@ from armblocks.blocks import (
     ZeroOrderHold,
 )
 from armblocks.errors import ArmblocksError
-from armblocks.integration import jump_record
+from armblocks.simulation import jumps as jumps_module
 
 Array = NDArray[np.float64]
 SEEDS = range(10)
@@ -263,7 +263,7 @@ def test_jumps_travel_with_a_pickled_result() -> None:
 def test_a_run_with_too_many_jumps_says_from_when_on_they_are_not_recorded(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(jump_record, "MOST_NUMBERS", 4000)
+    monkeypatch.setattr(jumps_module, "MOST_NUMBERS", 6000)
     b = DiagramBuilder("many")
     sine = b.add("sine", SineWave(frequency=1.0))
     b.add("hold", ZeroOrderHold(sample_time=1e-3), sine)

@@ -12,8 +12,6 @@ Vector = NDArray[np.float64]
 
 FIRST_NUMBERS = 1_000_000
 """Initial number of doubles, 8 MB. The operating system provides the memory that is used."""
-MOST_NUMBERS = 20_000_000
-"""Maximum number of doubles, 160 MB."""
 ALL = np.iinfo(np.int64).max
 
 
@@ -28,19 +26,20 @@ class JumpRecord:
         self.memory: Vector = np.empty((0, row_width(sizes)))
         self.end: float | None = None
         """The time from which instants are not recorded, because the record has its maximum size."""
-        self.begin(wanted=False)
+        self._most = 0
+        self.begin(0)
 
-    def begin(self, *, wanted: bool) -> None:
-        """Begin an empty record, or none."""
+    def begin(self, most: int) -> None:
+        """Begin an empty record of at most this number of rows; 0: no record."""
         width = self.memory.shape[1]
-        rows = max(64, min(FIRST_NUMBERS, MOST_NUMBERS) // width)
-        self.memory = np.empty((rows if wanted else 0, width))
+        self._most = most
+        self.memory = np.empty((min(most, max(64, FIRST_NUMBERS // width)), width))
         self._counts[Count.JUMPS] = 0
         self.enable()
 
     def share(self, record: JumpRecord) -> None:
         """Continue another record of the same system."""
-        self.memory, self.end = record.memory, record.end
+        self.memory, self.end, self._most = record.memory, record.end, record._most
         self.enable()
 
     def enable(self) -> None:
@@ -51,10 +50,13 @@ class JumpRecord:
 
     def enlarge(self, time: float) -> None:
         """Double the memory; at its maximum size, end the record at the present ``time`` (s)."""
-        if 2 * self.memory.size > MOST_NUMBERS:
+        rows = min(self._most, 2 * len(self.memory))
+        if rows == len(self.memory):
             self.end = time
         else:
-            self.memory = np.concatenate([self.memory, np.empty_like(self.memory)])
+            self.memory = np.concatenate(
+                [self.memory, np.empty((rows - len(self.memory), self.memory.shape[1]))]
+            )
         self.enable()
 
     @property

@@ -89,7 +89,7 @@ class NativeIntegrator:
         watch_stiffness: bool = False,
         stop: float | None = None,
         span: float | None = None,
-        jumps: bool = False,
+        jumps: int = 0,
     ) -> Integration:
         """A run from ``start`` to ``stop``, ready for its first step.
 
@@ -101,8 +101,8 @@ class NativeIntegrator:
         run continues from there, with the results of the run that wrote it. With ``watch_stiffness`` it
         pauses where a method for stiff systems, or an explicit method again, is faster
         (:attr:`Integration.wants_other`). ``span`` s: approximate length of the run, for the resolution of
-        events near time 0 (default: ``stop``). ``jumps``: record both sides of each instant at which signals
-        may jump. Arguments are not checked.
+        events near time 0 (default: ``stop``). ``jumps``: maximum number of rows for both sides of the
+        instants; 0: they are not recorded. Arguments are not checked.
         """
         if not isinstance(start, RunPoint):
             start = RunPoint(time=float(samples[0]), x=start)
@@ -127,7 +127,7 @@ class NativeIntegrator:
         run.reals[Scalar.SPAN] = stop if span is None else span
         run.reals[Scalar.PAUSE] = np.inf
         run.reals[Scalar.HALT] = np.inf
-        run.jumps.begin(wanted=jumps)
+        run.jumps.begin(jumps)
         run.take_addresses()
         run.watch(max(1, int(run.counts[Count.WATCHING])) if watch_stiffness else 0)
         if stop <= begins and not self.sizes.hybrid:

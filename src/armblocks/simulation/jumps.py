@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.equations import Signature
+from armblocks.integration.records import row_width
 from armblocks.integration.run_point import RunPoint
 from armblocks.integration.system import CompiledSystem
 
@@ -21,9 +22,16 @@ Array = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
 Places = NDArray[np.intp]
 
+MOST_NUMBERS = 20_000_000
+"""Maximum number of doubles for the states and signals on both sides of the recorded instants, 160 MB."""
 SMALLEST = 1e-9
 """A change is a jump if it exceeds this fraction of the largest absolute value of the signal so far. Rounding
 and the location of events cause smaller changes."""
+
+
+def most_sides(compiled: CompiledSystem) -> int:
+    """Maximum number of recorded sides of instants."""
+    return max(64, MOST_NUMBERS // (row_width(compiled.sizes) + compiled.signals_layout.size))
 
 
 @dataclass(frozen=True, kw_only=True)

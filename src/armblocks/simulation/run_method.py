@@ -15,6 +15,7 @@ from armblocks.integration.rosenbrock_tableau import Tableau
 from armblocks.integration.run_point import Checkpoint, RunPoint
 from armblocks.integration.system import CompiledSystem
 from armblocks.simulation.first_guess import first_guess
+from armblocks.simulation.jumps import most_sides
 from armblocks.simulation.plan import DEFAULT_INSTANTS, Plan
 from armblocks.simulation.run_state import RunState, settings_text
 
@@ -92,7 +93,7 @@ class RunMethod:
             stop=plan.instants.stop,
             # Independent of the stop time, so that a shorter run has bitwise the same samples.
             span=DEFAULT_INSTANTS * plan.instants.sample_time,
-            jumps=options.record_jumps,
+            jumps=most_sides(compiled) if options.record_jumps else 0,
         )
 
     def change(self, integration: Integration) -> Integration:
