@@ -7,8 +7,7 @@ from collections.abc import Callable
 from functools import partial
 
 import pytest
-from wire_reader import Block as Rectangle
-from wire_reader import Drawing, Port, read
+from drawn_connections import connections_in_the_drawing, drawn_lines
 
 import armblocks as ab
 from armblocks.blocks import (
@@ -36,20 +35,16 @@ from armblocks.blocks import (
     TransferFunction,
     Trigonometry,
 )
-from armblocks.diagram import Block, Diagram, DiagramBuilder, Note, Placement, PortRef, formula
+from armblocks.diagram import Block, Diagram, DiagramBuilder, Note, Placement, formula
+from armblocks.drawing.block_boxes import sized_box, standing_box
 from armblocks.drawing.block_faces import face_size
 from armblocks.drawing.diagram_drawing import (
     block_marks,
     block_picture,
     diagram_picture,
     diagram_svg,
-    drawn_bends,
-    obstacle,
-    wire_nets,
 )
-from armblocks.drawing.diagram_layout import boxes, sized_box, standing_box
-from armblocks.drawing.wire_routing import route
-from armblocks.drawing.wires import Net, Obstacle, RoutedNet
+from armblocks.drawing.diagram_layout import boxes
 from armblocks.face.block_examples import example_block
 from armblocks.pictures.picture import Curve, Picture, text_marks
 from armblocks.pictures.text_width import text_width
@@ -105,15 +100,6 @@ def diagram(request: pytest.FixtureRequest) -> Diagram:
     return request.param()
 
 
-def routed(
-    diagram: Diagram,
-) -> tuple[dict[PortRef, list[PortRef]], list[Net], list[RoutedNet], list[Obstacle]]:
-    placed = boxes(diagram)
-    nets, wires = wire_nets(diagram.connections, drawn_bends(diagram), placed)
-    obstacles = [obstacle(box) for box in placed.values()]
-    return wires, nets, route(obstacles, nets), obstacles
-
-
 def test_blocks_do_not_overlap(diagram: Diagram) -> None:
     for a, b in itertools.combinations(boxes(diagram).values(), 2):
         apart = a.x + a.width <= b.x or b.x + b.width <= a.x or a.y + a.height <= b.y or b.y + b.height <= a.y
@@ -122,22 +108,9 @@ def test_blocks_do_not_overlap(diagram: Diagram) -> None:
 
 def test_the_connections_can_be_read_from_the_drawing(diagram: Diagram) -> None:
     """Every connection is drawn as a line, because these sheets have enough room."""
-    wires, _, found, _ = routed(diagram)
-    placed = boxes(diagram)
-    ports = {
-        f"{name}/{spot.name}": Port(name, spot.x, spot.y, (way * spot.dx, way * spot.dy), way == 1)
-        for name, box in placed.items()
-        for spots, way in ((box.inputs, -1), (box.outputs, 1))
-        for spot in spots
-    }
-    drawn = Drawing(
-        blocks={name: Rectangle(box.x, box.y, box.width, box.height) for name, box in placed.items()},
-        ports=ports,
-        lines=[path for net in found for path in net.paths],
-        dots=[dot for net in found for dot in net.dots],
-        labels={},
-    )
-    assert read(drawn) == {str(t): str(source) for source, targets in wires.items() for t in targets}
+    seen, wanted = connections_in_the_drawing(diagram)
+    assert seen == wanted
+    assert all(drawn_lines(diagram).values())
 
 
 def test_a_drawing_is_valid_and_repeatable(diagram: Diagram) -> None:

@@ -21,16 +21,16 @@ from armblocks.diagram import (
 )
 from armblocks.diagram.signs import Outline
 from armblocks.drawing import block_faces
-from armblocks.drawing.diagram_layout import (
+from armblocks.drawing.block_boxes import (
     NAME_ROOM,
     NAME_SIZE,
     PORT_TEXT,
     PORT_TEXT_ROOM,
     Box,
     PortSpot,
-    boxes,
     sized_box,
 )
+from armblocks.drawing.diagram_layout import boxes
 from armblocks.drawing.face_marks import Room
 from armblocks.drawing.rates import Rates
 from armblocks.drawing.sink_faces import Trend

@@ -15,7 +15,7 @@ from armblocks.blocks import BLOCKS
 from armblocks.diagram import Block, Connection, Diagram, PortRef
 from armblocks.diagram.mask import formula_names
 from armblocks.diagram.names import folded
-from armblocks.drawing.diagram_layout import standing_box
+from armblocks.drawing.block_boxes import standing_box
 from armblocks.drawing.wires import moved_bends
 from armblocks.errors import DiagramError
 from armblocks.studio.sheet.nesting import check_free

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 
-from armblocks.diagram import Diagram, DiagramBlock, Placement
-from armblocks.drawing.diagram_layout import boxes
+from armblocks.diagram import Diagram, DiagramBlock
+from armblocks.drawing.diagram_layout import arranged_layout
 
 
 def placed(diagram: Diagram) -> Diagram:
@@ -18,7 +18,5 @@ def placed(diagram: Diagram) -> Diagram:
 
 
 def arranged(diagram: Diagram) -> Diagram:
-    """Return the diagram with a new automatic layout, from left to right."""
-    found = boxes(dataclasses.replace(diagram, layout={}))
-    layout = {name: Placement(x=round(box.x), y=round(box.y)) for name, box in found.items()}
-    return dataclasses.replace(diagram, layout=layout, bends={})
+    """Return the diagram with a new automatic layout: the forward path from left to right, feedback below."""
+    return dataclasses.replace(diagram, layout=arranged_layout(diagram), bends={})

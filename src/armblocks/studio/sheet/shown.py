@@ -11,16 +11,10 @@ from typing import Any
 from armblocks.blocks import BLOCKS
 from armblocks.diagram import Block, Connection, Diagram, DiagramBlock, Parameter, ParameterKind, Placement
 from armblocks.diagram.signs import Outline
+from armblocks.drawing.block_boxes import Box, standing_box
 from armblocks.drawing.block_faces import face_size, port_labels
 from armblocks.drawing.diagram_drawing import block_marks
-from armblocks.drawing.diagram_layout import (
-    Box,
-    SumSides,
-    drawn_blocks,
-    standing_box,
-    sum_sides,
-    turned_sum,
-)
+from armblocks.drawing.diagram_layout import SumSides, drawn_blocks, sum_sides, turned_sum
 from armblocks.errors import ArmblocksError
 from armblocks.formats import load_robot
 from armblocks.pictures.picture import Picture

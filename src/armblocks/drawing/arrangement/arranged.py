@@ -1,0 +1,104 @@
+"""Boxes of an arranged sheet."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from armblocks.diagram import Diagram
+from armblocks.drawing.arrangement.columns import Columns, in_columns
+from armblocks.drawing.arrangement.feedback import Flow, signal_flow
+from armblocks.drawing.arrangement.links import Network
+from armblocks.drawing.arrangement.order import ordered
+from armblocks.drawing.arrangement.rows import heights
+from armblocks.drawing.block_boxes import NAME_ROOM, Box, flipped_box
+
+_GAP = 42.0
+_LANE = 11.0
+"""Width (px) of the gap between two columns without upright lines, and of one such line."""
+_PART_GAP = 44.0
+_MANY_NODES = 120
+"""Nodes of a part from which on its order is sought once."""
+_MOST_WIDTH = 900.0
+"""px that a row of single blocks may be wide."""
+
+
+def arranged_boxes(diagram: Diagram, sized: Mapping[str, Box]) -> dict[str, Box]:
+    """The boxes of a sheet at their automatic places; ``sized``: at any place, with sizes."""
+    network = Network.of(diagram, sized)
+    placed: dict[str, Box] = {}
+    y, single = 0.0, list[int]()
+    for members in network.components():
+        if len(members) == 1 and not network.part(members).links:
+            single += members
+            continue
+        part = _part(network.part(members))
+        for box in part:
+            placed[box.name] = box.at(box.x, box.y + y)
+        y += max(box.y + box.height for box in part) + NAME_ROOM + _PART_GAP
+    x = below = 0.0
+    for box in (network.boxes[k] for k in single):
+        width = max(box.width, box.name_width)
+        if x and x + width > _MOST_WIDTH:
+            x, y, below = 0.0, y + below, 0.0
+        placed[box.name] = box.at(round(x + (width - box.width) / 2), y)
+        x, below = x + width + _GAP, max(below, box.height + NAME_ROOM + _GAP / 2)
+    return {name: placed[name] for name in diagram.blocks}
+
+
+def _part(network: Network) -> list[Box]:
+    """The boxes of a connected part, from (0, 0)."""
+    flow = signal_flow(network)
+    boxes = [flipped_box(box) if k in flow.mirrored else box for k, box in enumerate(network.boxes)]
+    network = Network(network.names, tuple(boxes), network.links)
+    columns, order = _best_order(network, flow)
+    tops = heights(columns, order, [box.height for box in boxes], NAME_ROOM)
+    top = min(tops[: len(boxes)])
+    tops = [y - top for y in tops]
+    placed: list[Box] = list(boxes)
+    x = 0.0
+    for column, members in enumerate(order):
+        width = max(
+            (max(boxes[k].width, boxes[k].name_width) for k in members if k < len(boxes)), default=0.0
+        )
+        for k in members:
+            if k < len(boxes):
+                placed[k] = boxes[k].at(round(x + (width - boxes[k].width) / 2), round(tops[k]))
+        x += width + _GAP + _LANE * _lanes(columns, tops, column)
+    return placed
+
+
+def _best_order(network: Network, flow: Flow) -> tuple[Columns, list[list[int]]]:
+    """Columns and their order; of round sums with three inputs with the better of two orders of the lines."""
+    columns = in_columns(network, flow)
+    cost, order = ordered(columns)
+    if len(columns.column) > _MANY_NODES:
+        return columns, order
+    exchanged: frozenset[int] = frozenset()
+    sums = [k for k, box in enumerate(network.boxes) if network.is_round(k) and len(box.inputs) == 3]
+    for node in [k for k in sums if sum(link.target == k for link in network.links) == 3]:
+        other = in_columns(network, flow, exchanged | {node})
+        found, other_order = ordered(other)
+        if found < cost - 1e-9:
+            exchanged |= {node}
+            columns, cost, order = other, found, other_order
+    return columns, order
+
+
+def _lanes(columns: Columns, tops: Sequence[float], gap: int) -> int:
+    """How many upright lines stand side by side in the gap to the right of a column."""
+    spans: dict[int, tuple[float, float]] = {}
+    for piece in columns.pieces:
+        if piece.gap != gap or not (piece.a.level and piece.b.level):
+            continue
+        ends = tops[piece.a.node] + piece.a.port, tops[piece.b.node] + piece.b.port
+        if abs(ends[0] - ends[1]) > 1.5:
+            low, high = spans.get(piece.net, (ends[0], ends[0]))
+            spans[piece.net] = min(low, *ends), max(high, *ends)
+    events = sorted(
+        [(low, 1) for low, _ in spans.values()] + [(high + 1.0, -1) for _, high in spans.values()]
+    )
+    most = depth = 0
+    for _, change in events:
+        depth += change
+        most = max(most, depth)
+    return most

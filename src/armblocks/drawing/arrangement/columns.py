@@ -1,0 +1,365 @@
+"""The columns of the blocks, and the lines between neighbouring columns.
+
+A line over several columns gets a knot in each that it passes, so that rows keep room for it. A line that
+runs backwards turns round at a knot in the column of its source, and at one in the column of its target.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+from armblocks.drawing.arrangement.feedback import Flow, forward_order
+from armblocks.drawing.arrangement.links import Link, Network
+
+_PASSES = 4
+_MOST_PATHS = 40
+_AT_SINK = 1000.0
+_FURTHER_TERM = 1.4
+"""By how many blocks a path is longer that enters a sum by its first port."""
+_ABOVE, _BELOW = -0.3, 0.3
+"""Heights of the ports of a round sum relative to its middle, as a share of its height."""
+
+
+@dataclass(frozen=True)
+class End:
+    """An end of a line: the node, whether it is on the node's right side, and the height of the port.
+
+    ``share``: height relative to the node's middle as a share of its height, less than 1/2 up or down.
+    """
+
+    node: int
+    right: bool
+    share: float
+    port: float
+    """Height of the port below the upper edge, px."""
+    level: bool = True
+    """Whether the line may run straight into the port."""
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A line between two neighbouring columns, or between two nodes of one column.
+
+    ``gap``: number of the column to the left of the gap in which it runs.
+    """
+
+    net: int
+    gap: int
+    a: End
+    b: End
+
+    @property
+    def turns(self) -> bool:
+        """Whether the line turns round, because both ends are in one column."""
+        return self.a.right == self.b.right
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Nodes in columns: first the blocks, then the knots of long lines."""
+
+    column: list[int]
+    pieces: list[Piece]
+    blocks: int
+    paths: tuple[tuple[int, ...], ...]
+    """The blocks of the main path, from its source to its sink, and then of further paths."""
+    path: dict[int, int] = field(default_factory=dict[int, int])
+    """The number of the path of each node on one."""
+    nets: list[int] = field(default_factory=list[int])
+    """The net of each knot."""
+    turned: frozenset[int] = frozenset()
+    """Round sums with two inputs."""
+    back: frozenset[int] = frozenset()
+    """Mirrored blocks."""
+
+
+def in_columns(network: Network, flow: Flow, exchanged: frozenset[int] = frozenset()) -> Columns:
+    """The columns of a connected network.
+
+    ``exchanged``: round sums whose upper and lower lines are exchanged.
+    """
+    column = _column_numbers(network, flow)
+    return _Threading(network, flow, column, _paths(network, flow), exchanged).columns()
+
+
+def _constraints(network: Network, flow: Flow) -> list[tuple[int, int, int]]:
+    """Pairs of blocks, and by how many columns the second stands at least to the right of the first."""
+    found: dict[tuple[int, int], int] = {}
+    around = _around_one(network, flow)
+    for k, link in enumerate(network.links):
+        source, target = link.source, link.target
+        if source in around or target in around:
+            continue
+        if target in flow.mirrored:
+            pair, least = (target, source), int(source in flow.mirrored)
+        elif source in flow.mirrored:
+            pair, least = (target, source), 1
+        elif k in flow.cut:
+            continue
+        else:
+            pair, least = (source, target), 1
+        found[pair] = max(found.get(pair, 0), least)
+    return [(a, b, least) for (a, b), least in found.items()]
+
+
+def _around_one(network: Network, flow: Flow) -> dict[int, int]:
+    """Mirrored blocks that feed back the output of a single block, and that block."""
+    sources: dict[int, set[int]] = {}
+    targets: dict[int, set[int]] = {}
+    for link in network.links:
+        sources.setdefault(link.target, set()).add(link.source)
+        targets.setdefault(link.source, set()).add(link.target)
+    return {
+        k: min(sources[k])
+        for k in flow.mirrored
+        if len(sources.get(k, ())) == 1 and sources[k] == targets.get(k, set())
+    }
+
+
+def _column_numbers(network: Network, flow: Flow) -> list[int]:
+    """The longest path from a source; then every block as near to its neighbours as its links allow."""
+    count = len(network.names)
+    rules = _constraints(network, flow)
+    left: list[list[tuple[int, int]]] = [[] for _ in range(count)]
+    right: list[list[tuple[int, int]]] = [[] for _ in range(count)]
+    for a, b, least in rules:
+        right[a].append((b, least))
+        left[b].append((a, least))
+    order = forward_order(count, [Link(a, 0, b, 0, 0.0) for a, b, _ in rules])
+    column = [0] * count
+    for node in order:
+        column[node] = max((column[a] + least for a, least in left[node]), default=0)
+    for _ in range(_PASSES):
+        for node in reversed(order):
+            if right[node] and len(right[node]) >= len(left[node]):
+                column[node] = min(column[b] - least for b, least in right[node])
+        for node in order:
+            if len(left[node]) > len(right[node]):
+                column[node] = max(column[a] + least for a, least in left[node])
+    for node, partner in _around_one(network, flow).items():
+        column[node] = column[partner]
+    first = min(column, default=0)
+    return [k - first for k in column]
+
+
+def _paths(network: Network, flow: Flow) -> tuple[tuple[int, ...], ...]:
+    """The main path, then the best path through the blocks that are left, and so on."""
+    links = [
+        link
+        for k, link in enumerate(network.links)
+        if k not in flow.cut and not {link.source, link.target} & flow.mirrored
+    ]
+    left = set(range(len(network.names))) - flow.mirrored
+    found: list[tuple[int, ...]] = []
+    while len(found) < _MOST_PATHS:
+        links = [link for link in links if link.source in left and link.target in left]
+        path = _best_path(network, links, left, at_end=0.0 if found else _AT_SINK)
+        if len(path) < 2 and found:
+            break
+        found.append(path)
+        left -= set(path)
+    return tuple(found)
+
+
+def _best_path(network: Network, links: Sequence[Link], left: set[int], *, at_end: float) -> tuple[int, ...]:
+    """The longest path along the flow, through the first ports where it can choose.
+
+    ``at_end``: by how many blocks a path is longer that leads to a sink.
+    """
+    count = len(network.names)
+    leaving: list[list[Link]] = [[] for _ in range(count)]
+    for link in links:
+        leaving[link.source].append(link)
+    outward = {link.source for link in network.links}
+    best: list[tuple[float, Link | None]] = [(0.0, None)] * count
+    for node in reversed(forward_order(count, links)):
+        if node not in outward:
+            best[node] = (at_end, None)
+        for link in leaving[node]:
+            bonus = 0.4 * (link.input == 0) + 0.2 * (link.output == 0)
+            if link.input and network.is_sum(link.target):
+                bonus -= _FURTHER_TERM
+            value = best[link.target][0] + 1.0 + bonus
+            if best[node][1] is None or value > best[node][0] + 1e-9:
+                best[node] = (value, link)
+    path: list[int] = []
+    entered = {link.target for link in links}
+    starts = [k for k in sorted(left) if k not in entered]
+    node = max(starts, key=lambda k: (best[k][0], -k), default=None)
+    while node is not None:
+        path.append(node)
+        link = best[node][1]
+        node = link.target if link is not None else None
+    return tuple(path)
+
+
+class _Threading:
+    """Lays the lines through the columns."""
+
+    def __init__(
+        self,
+        network: Network,
+        flow: Flow,
+        column: list[int],
+        paths: tuple[tuple[int, ...], ...],
+        exchanged: frozenset[int],
+    ) -> None:
+        self._network, self._flow, self._paths = network, flow, paths
+        self._column = list(column)
+        self._path = {node: k for k, path in enumerate(paths) for node in path}
+        self._steps = {step: k for k, path in enumerate(paths) for step in pairwise(path)}
+        self._pieces: list[Piece] = []
+        self._nets: list[int] = []
+        self._sides = _sum_ports(network, flow, paths, column)
+        for node in exchanged:
+            self._sides[node] = {port: -share for port, share in self._sides[node].items()}
+
+    def columns(self) -> Columns:
+        """All nodes and pieces."""
+        nets: dict[tuple[int, int], list[Link]] = {}
+        for link in self._network.links:
+            nets.setdefault((link.source, link.output), []).append(link)
+        for number, ((source, output), links) in enumerate(sorted(nets.items())):
+            self._thread(number, source, output, sorted(links, key=lambda a: (a.target, a.input)))
+        turned = [
+            k
+            for k, box in enumerate(self._network.boxes)
+            if self._network.is_round(k) and len(box.inputs) == 2
+        ]
+        return Columns(
+            self._column,
+            self._pieces,
+            len(self._network.names),
+            self._paths,
+            self._path,
+            self._nets,
+            frozenset(turned),
+            self._flow.mirrored,
+        )
+
+    def _thread(self, net: int, source: int, output: int, links: Sequence[Link]) -> None:
+        column, mirrored = self._column, self._flow.mirrored
+        here = column[source]
+        start = self._end(source, source not in mirrored, output, inputs=False)
+        backward: dict[int, End] = {}
+        """The line to the left, by column: its knots."""
+
+        def knot(at: int) -> End:
+            column.append(at)
+            self._nets.append(net)
+            return End(len(column) - 1, True, 0.0, 0.0)
+
+        def ahead(gap: int, target: int) -> End:
+            """Where a line enters a gap from its left. Lines to several targets have separate knots."""
+            end = start
+            for at in range(here + 1, gap + 1):
+                before, end = end, knot(at)
+                if (source, target) in self._steps:
+                    self._path[end.node] = self._steps[source, target]
+                self._join(net, at - 1, before, _on(end, right=False))
+            return end
+
+        def back(at: int) -> End:
+            """The knot of the line to the left in a column."""
+            if at not in backward:
+                if source in mirrored and at == here:
+                    backward[at] = start
+                    return start
+                if at == here:
+                    backward[at] = knot(at)
+                    self._join(net, at, start, backward[at])
+                else:
+                    after = back(at + 1)
+                    backward[at] = knot(at)
+                    self._join(net, at, backward[at], _on(after, right=False))
+            return backward[at]
+
+        for link in links:
+            target, there = link.target, column[link.target]
+            if target in mirrored:
+                end = self._end(target, True, link.input)
+                if there == here and source not in mirrored:
+                    self._join(net, here, start, end)
+                else:
+                    self._join(net, there, end, _on(back(there + 1), right=False))
+            elif source not in mirrored and there > here:
+                self._join(net, there - 1, ahead(there - 1, target), self._end(target, False, link.input))
+            else:
+                self._join(
+                    net, there - 1, _on(back(there), right=False), self._end(target, False, link.input)
+                )
+
+    def _join(self, net: int, gap: int, a: End, b: End) -> None:
+        """Add a line; one that does not turn round begins at its left end."""
+        self._pieces.append(Piece(net, gap, a, b))
+
+    def _end(self, block: int, right: bool, port: int, *, inputs: bool = True) -> End:
+        box = self._network.boxes[block]
+        spot = (box.inputs if inputs else box.outputs)[port]
+        if inputs and block in self._sides:
+            share = self._sides[block][port]
+            return End(block, right, share, box.height / 2, level=share == 0.0)
+        if spot.dy:
+            return End(block, right, -0.48, 0.0, level=False)
+        height = spot.y - box.y
+        return End(block, right, 0.9 * (height / box.height - 0.5), height)
+
+
+def _on(end: End, *, right: bool) -> End:
+    return End(end.node, right, end.share, end.port, end.level)
+
+
+def _sum_ports(
+    network: Network, flow: Flow, paths: Sequence[Sequence[int]], column: Sequence[int]
+) -> dict[int, dict[int, float]]:
+    """The heights at which lines meet round sums: one from behind, feedback from below, others from above.
+
+    Of two lines that come back to one sum, that over more columns comes from above.
+    """
+    entering: dict[int, list[tuple[int, Link]]] = {}
+    for k, link in enumerate(network.links):
+        if network.is_round(link.target):
+            entering.setdefault(link.target, []).append((k, link))
+    before = {after: node for path in paths for node, after in pairwise(path)}
+    main = set(paths[0])
+    found: dict[int, dict[int, float]] = {}
+    for node, links in entering.items():
+        back = node in flow.mirrored
+
+        def comes_back(k: int, link: Link, back: bool = back) -> bool:
+            return not back and (k in flow.cut or link.source in flow.mirrored)
+
+        links.sort(
+            key=lambda entry: (
+                comes_back(*entry),
+                before.get(entry[1].target) != entry[1].source,
+                back and entry[1].source not in flow.mirrored,
+                abs(column[entry[1].source] - column[node]) if not back else -column[entry[1].source],
+                entry[1].source in main,
+                network.is_minus(entry[1].target, entry[1].input),
+                entry[1].input,
+            )
+        )
+        shares = {links[0][1].input: 0.0}
+        rest = sorted(links[1:], key=lambda entry: _length(network, entry[1], column))
+        taken: set[float] = set()
+        for k, link in rest:
+            below = comes_back(k, link)
+            share = _BELOW if below else _ABOVE
+            if share in taken:
+                share = -share
+            taken.add(share)
+            shares[link.input] = share
+        found[node] = shares
+    return found
+
+
+def _length(network: Network, link: Link, column: Sequence[int]) -> tuple[int, int]:
+    """Over how many columns a line comes back, also through a mirrored block; ties by port."""
+    far = column[link.source]
+    for other in network.links:
+        if other.target == link.source:
+            far = max(far, column[other.source])
+    return abs(far - column[link.target]), link.input

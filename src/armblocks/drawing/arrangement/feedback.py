@@ -1,0 +1,140 @@
+"""The signal flow of a diagram: the links that run backwards, and the blocks that are mirrored.
+
+A block is in the feedback path if all its paths lead to links that run backwards, and if its inputs come
+from the loop that is closed there. It is mirrored: its inputs are on the right.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from armblocks.drawing.arrangement.links import Link, Network
+from armblocks.drawing.arrangement.loops import cut_links
+
+
+@dataclass(frozen=True)
+class Flow:
+    """The links that run against the flow, and the blocks in feedback paths, by number."""
+
+    cut: frozenset[int]
+    mirrored: frozenset[int]
+
+
+def signal_flow(network: Network) -> Flow:
+    """Where the loops of a network are cut, and which blocks are mirrored."""
+    cut = cut_links(network)
+    return Flow(cut, _Feedback(network, cut).blocks())
+
+
+def forward_order(count: int, links: Sequence[Link]) -> list[int]:
+    """The blocks in an order in which every link runs forward; the links have no loops."""
+    after: list[list[int]] = [[] for _ in range(count)]
+    waiting = [0] * count
+    for link in links:
+        after[link.source].append(link.target)
+        waiting[link.target] += 1
+    ready = [k for k in range(count) if not waiting[k]]
+    order: list[int] = []
+    for node in ready:
+        order.append(node)
+        for target in after[node]:
+            waiting[target] -= 1
+            if not waiting[target]:
+                ready.append(target)
+    return order
+
+
+class _Feedback:
+    def __init__(self, network: Network, cut: frozenset[int]) -> None:
+        self._network, self._links, self._cut = network, network.links, cut
+        count = len(network.names)
+        self._order = forward_order(count, [link for k, link in enumerate(network.links) if k not in cut])
+        self._leaving: list[list[int]] = [[] for _ in range(count)]
+        self._entering: list[list[int]] = [[] for _ in range(count)]
+        for k, link in enumerate(network.links):
+            self._leaving[link.source].append(k)
+            self._entering[link.target].append(k)
+        self._ahead = [0] * count
+        """Sets of the blocks that forward links lead to, as bits."""
+        for node in reversed(self._order):
+            for k in self._leaving[node]:
+                if k not in cut:
+                    target = network.links[k].target
+                    self._ahead[node] |= self._ahead[target] | 1 << target
+
+    def blocks(self) -> frozenset[int]:
+        """The blocks in feedback paths."""
+        ends = sum(1 << end for end in self._ends())
+        chosen = {
+            node
+            for node in self._order
+            if not (self._ahead[node] | 1 << node) & ends
+            and (self._entering[node] or self._network.may_be_mirrored(node))
+        }
+        while True:
+            goals = self._goals(chosen)
+            kept = {node for node in chosen if self._belongs(node, goals)}
+            if kept == chosen:
+                kept = chosen - self._beside_the_path(chosen)
+            if kept == chosen:
+                return frozenset(chosen)
+            chosen = kept
+
+    def _ends(self) -> list[int]:
+        """The blocks to which the forward path leads: sinks, else integrators at the end of the path."""
+        sinks = [node for node, found in enumerate(self._leaving) if not found]
+        if sinks:
+            return sinks
+        last = [node for node, found in enumerate(self._leaving) if all(k in self._cut for k in found)]
+        memory = self._network.memory()
+        return [node for node in last if memory[node]] or last
+
+    def _goals(self, chosen: set[int]) -> dict[int, frozenset[int]]:
+        """For every chosen block the targets of the backward links that its paths lead to.
+
+        -1: a block that is not chosen.
+        """
+        goals: dict[int, frozenset[int]] = {}
+        for node in reversed(self._order):
+            if node in chosen:
+                found: set[int] = set()
+                for k in self._leaving[node]:
+                    target = self._links[k].target
+                    found |= {target} if k in self._cut else goals.get(target, {-1})
+                goals[node] = frozenset(found)
+        return goals
+
+    def _belongs(self, node: int, goals: dict[int, frozenset[int]]) -> bool:
+        """Whether the inputs of a block come from the loops that its outputs close."""
+        if -1 in goals[node] or node in goals[node]:
+            return False
+        for k in self._entering[node]:
+            source = self._links[k].source
+            if k in self._cut:
+                return False
+            if source in goals:
+                continue
+            around_one = len(self._entering[node]) == 1 and goals[node] == frozenset([source])
+            if around_one and all(link in self._cut for link in self._leaving[node]):
+                continue
+            if not all(self._ahead[goal] >> source & 1 for goal in goals[node]):
+                return False
+        return True
+
+    def _beside_the_path(self, chosen: set[int]) -> set[int]:
+        """Models parallel to the forward path, and the blocks that compare them with it."""
+        memory = self._network.memory()
+        found: set[int] = set()
+        for node in sorted(chosen):
+            sources = [self._links[k].source for k in self._entering[node]]
+            outside = [source for source in sources if source not in chosen]
+            for source in sources:
+                chain: list[int] = []
+                while source in chosen and len(self._entering[source]) == 1:
+                    chain.append(source)
+                    source = self._links[self._entering[source][0]].source
+                modelled = any(memory[k] for k in chain)
+                if modelled and any(self._ahead[source] >> other & 1 for other in outside):
+                    found |= {node, *chain}
+        return found

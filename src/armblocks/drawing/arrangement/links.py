@@ -1,0 +1,170 @@
+"""The connections of a diagram as links between numbered blocks, and which of them a person would cut."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from armblocks import blocks as kinds
+from armblocks.diagram import Block, Diagram, DiagramBlock, Inport
+from armblocks.diagram.signs import Outline
+from armblocks.drawing.block_boxes import Box
+
+_INTO_MEMORY = 30.0
+"""Price of a cut in front of an integrator, a filter or a plant."""
+_INTO_FUNCTION = 5.0
+_INTO_FURTHER_PORT = 2.0
+_INTO_SUM = 3.0
+_INTO_FURTHER_TERM = 1.5
+_FED_BACK = 1.0
+"""Price of a cut in front of a further input of a sum: with a plus, and with a minus."""
+_OUT_OF_MEMORY = 0.5
+"""Factor where the link leaves a block with memory: states are what is fed back."""
+
+
+@dataclass(frozen=True)
+class Link:
+    """A connection: numbers of the blocks and of their ports."""
+
+    source: int
+    output: int
+    target: int
+    input: int
+    price: float
+    """What it costs to cut this link, relative to other links of the same loop."""
+
+
+@dataclass(frozen=True, eq=False)
+class Network:
+    """The blocks of a sheet in the order of their names, with their boxes, and the links between them."""
+
+    names: tuple[str, ...]
+    boxes: tuple[Box, ...]
+    links: tuple[Link, ...]
+
+    @classmethod
+    def of(cls, diagram: Diagram, sized: Mapping[str, Box]) -> Network:
+        """The network of a sheet; ``sized``: its blocks with sizes and ports, at any place."""
+        names = tuple(sorted(diagram.blocks))
+        number = {name: k for k, name in enumerate(names)}
+        inputs = {name: {p.name: k for k, p in enumerate(sized[name].inputs)} for name in names}
+        outputs = {name: {p.name: k for k, p in enumerate(sized[name].outputs)} for name in names}
+        memory = {name: has_memory(diagram.blocks[name]) for name in names}
+        state = {name: memory[name] and not _is_filter(diagram.blocks[name]) for name in names}
+        links: list[Link] = []
+        for wire in diagram.connections:
+            source, target = wire.source, wire.target
+            if source.port not in outputs.get(source.block, {}) or target.port not in inputs.get(
+                target.block, {}
+            ):
+                continue  # an incomplete diagram
+            into = inputs[target.block][target.port]
+            price = _price(sized[target.block], into, memory[target.block])
+            price *= _OUT_OF_MEMORY if state[source.block] else 1.0
+            links.append(
+                Link(
+                    number[source.block],
+                    outputs[source.block][source.port],
+                    number[target.block],
+                    into,
+                    price,
+                )
+            )
+        return cls(names, tuple(sized[name] for name in names), tuple(links))
+
+    def part(self, members: Sequence[int]) -> Network:
+        """Some of the blocks, and the links between them."""
+        number = {member: k for k, member in enumerate(members)}
+        return Network(
+            tuple(self.names[k] for k in members),
+            tuple(self.boxes[k] for k in members),
+            tuple(
+                Link(number[a.source], a.output, number[a.target], a.input, a.price)
+                for a in self.links
+                if a.source in number
+            ),
+        )
+
+    def components(self) -> list[list[int]]:
+        """The connected parts, the largest first."""
+        leader = list(range(len(self.names)))
+
+        def find(k: int) -> int:
+            while leader[k] != k:
+                leader[k] = k = leader[leader[k]]
+            return k
+
+        for link in self.links:
+            a, b = sorted((find(link.source), find(link.target)))
+            leader[b] = a
+        found: dict[int, list[int]] = {}
+        for k in range(len(leader)):
+            found.setdefault(find(k), []).append(k)
+        return sorted(found.values(), key=lambda members: (-len(members), members))
+
+    def is_round(self, k: int) -> bool:
+        """Whether a block is a round sum, whose inputs are on the sides from which their lines come."""
+        box = self.boxes[k]
+        return len(box.inputs) in (2, 3) and is_circle(box)
+
+    def may_be_mirrored(self, k: int) -> bool:
+        """Whether a source may stand to the right of the block that it feeds."""
+        return not isinstance(self.boxes[k].block, Inport)
+
+    def is_state(self, k: int) -> bool:
+        """Whether a block has memory and is no filter or controller."""
+        block = self.boxes[k].block
+        return has_memory(block) and not _is_filter(block)
+
+    def is_constant(self, k: int) -> bool:
+        """Whether a block is a constant, which is no beginning of a signal path."""
+        return isinstance(self.boxes[k].block, kinds.Constant)
+
+    def is_sum(self, k: int) -> bool:
+        """Whether a block adds its inputs."""
+        return isinstance(self.boxes[k].block, kinds.Sum)
+
+    def is_minus(self, k: int, port: int) -> bool:
+        """Whether an input of a sum is subtracted."""
+        block = self.boxes[k].block
+        return isinstance(block, kinds.Sum) and block.signs[port] == "-"
+
+    def memory(self) -> list[bool]:
+        """Which blocks have states or delays."""
+        return [has_memory(box.block) for box in self.boxes]
+
+
+def is_circle(box: Box) -> bool:
+    """Whether a block is drawn as a circle."""
+    return box.block.face_outline() is Outline.CIRCLE
+
+
+def has_memory(block: Block) -> bool:
+    """Whether a block has states, delays or such blocks inside."""
+    if isinstance(block, DiagramBlock):
+        return any(has_memory(inner) for inner in block.diagram.blocks.values())
+    kind = type(block)
+    return any(
+        getattr(kind, name) is not getattr(Block, name)
+        for name in ("states", "discrete_states", "delay_lines")
+    )
+
+
+def _is_filter(block: Block) -> bool:
+    """Whether a block with states may be a controller as well as a plant."""
+    return isinstance(
+        block,
+        kinds.TransferFunction | kinds.ZeroPole | kinds.FirstOrderLag | kinds.SecondOrderLag | kinds.LeadLag
+        | kinds.AnalogFilter | kinds.PID | kinds.PID2DOF | kinds.DiscretePID | kinds.DiscretePID2DOF
+        | kinds.DiscreteTransferFunction | kinds.DiscreteFilter | kinds.DiscreteZeroPole,
+    )  # fmt: skip
+
+
+def _price(target: Box, port: int, memory: bool) -> float:
+    if isinstance(target.block, kinds.Sum):
+        if port == 0:
+            return _INTO_SUM
+        return _FED_BACK if target.block.signs[port] == "-" else _INTO_FURTHER_TERM
+    if memory:
+        return _INTO_MEMORY if port == 0 else _INTO_MEMORY / 3
+    return _INTO_FUNCTION if port == 0 else _INTO_FURTHER_PORT

@@ -1,0 +1,216 @@
+"""The links of a diagram that run against the signal flow.
+
+Every loop is cut at the links that a person would draw backwards: in front of the minus of a sum, behind an
+integrator.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from armblocks.drawing.arrangement.links import Link, Network
+
+_BEGINNING = 2.0
+_MIRRORED_STATE = 1.5
+"""Price of a block that only links that run backwards feed, and of a plant that feeds only such links."""
+_ENTRY = 0.2
+"""Price of a block before the one at which signals enter a loop from outside."""
+_PASSES = 8
+_FEW = 40
+_MANY = 150
+"""Blocks of a loop from which on fewer passes are made."""
+
+
+def cut_links(network: Network) -> frozenset[int]:
+    """The numbers of the links that run backwards; the others have no loops."""
+    links, count = network.links, len(network.names)
+    place = [0] * count
+    for members in _strong_components(count, links):
+        if len(members) > 1:
+            for k, member in enumerate(_cheapest_order(members, network)):
+                place[member] = k
+    loops = {member: k for k, members in enumerate(_strong_components(count, links)) for member in members}
+    cut = {
+        k
+        for k, link in enumerate(links)
+        if loops[link.source] == loops[link.target] and place[link.source] >= place[link.target]
+    }
+    # A link is cut only if it closes a loop of links that are not cut.
+    for k in sorted(cut, key=lambda k: (-links[k].price, k)):
+        link = links[k]
+        if link.source == link.target:
+            continue
+        if not _reaches(link.target, link.source, count, [a for j, a in enumerate(links) if j not in cut]):
+            cut.discard(k)
+    return frozenset(cut)
+
+
+def _strong_components(count: int, links: Sequence[Link]) -> list[list[int]]:
+    """The strongly connected components (Tarjan 1972)."""
+    after: list[list[int]] = [[] for _ in range(count)]
+    for link in links:
+        after[link.source].append(link.target)
+    found: list[list[int]] = []
+    index, low, open_, path = [-1] * count, [0] * count, [False] * count, list[int]()
+    number = 0
+    for root in range(count):
+        if index[root] >= 0:
+            continue
+        stack = [(root, 0)]
+        while stack:
+            node, k = stack.pop()
+            if k == 0:
+                index[node] = low[node] = number
+                number += 1
+                path.append(node)
+                open_[node] = True
+            elif open_[after[node][k - 1]]:
+                low[node] = min(low[node], low[after[node][k - 1]])
+            if k < len(after[node]):
+                stack.append((node, k + 1))
+                if index[after[node][k]] < 0:
+                    stack.append((after[node][k], 0))
+                continue
+            if low[node] == index[node]:
+                members: list[int] = []
+                while not members or members[-1] != node:
+                    members.append(path.pop())
+                    open_[members[-1]] = False
+                found.append(sorted(members))
+    return found
+
+
+def _cheapest_order(members: Sequence[int], network: Network) -> list[int]:
+    """The blocks of a loop in the order in which the links that run backwards are cheap to cut.
+
+    The order of a depth-first search, improved by moving single blocks to their best places; of a small loop
+    the best of the searches from every block.
+    """
+    links = network.links
+    inside = set(members)
+    price: dict[int, dict[int, float]] = {member: {} for member in members}
+    entries: list[int] = []
+    for link in links:
+        if link.target not in inside or link.source == link.target:
+            continue
+        if link.source in inside:
+            prices = price[link.source]
+            prices[link.target] = prices.get(link.target, 0.0) + link.price
+        elif link.target not in entries and not network.is_constant(link.source):
+            entries.append(link.target)
+    _protect_inputs(price, network)
+    after = {member: list(prices) for member, prices in price.items()}
+    if len(members) <= _MANY:
+        for entry in entries:
+            for member in members:
+                if member != entry:
+                    price[entry][member] = price[entry].get(member, 0.0) + _ENTRY
+    before: dict[int, dict[int, float]] = {member: {} for member in members}
+    for source, prices in price.items():
+        for target, value in prices.items():
+            before[target][source] = value
+    inward = frozenset(link.target for link in links if link.target in inside and link.source not in inside)
+    best: list[int] = []
+    least = float("inf")
+    for start in ([], *([member] for member in members if len(members) <= _FEW)):
+        order = _depth_first([*start, *sorted(entries), *members], after)
+        for _ in range(_PASSES if len(members) <= _MANY else 2):
+            moved = False
+            for member in list(order):
+                moved |= _moved(order, member, price[member], before[member])
+            if not moved:
+                break
+        cost = _cost(order, price, network, inward)
+        if cost < least - 1e-6:
+            best, least = order, cost
+    return best
+
+
+def _protect_inputs(price: Mapping[int, dict[int, float]], network: Network) -> None:
+    """Make it dearer to cut in front of a function than behind it."""
+    sources: dict[int, list[int]] = {member: [] for member in price}
+    for source, prices in price.items():
+        for target in prices:
+            sources[target].append(source)
+    for member, found in sources.items():
+        if len(found) == 1 == len(network.boxes[member].inputs) and not network.is_state(member):
+            behind = sum(price[member].values()) + _ENTRY
+            price[found[0]][member] = max(price[found[0]][member], behind)
+
+
+def _cost(
+    order: Sequence[int], price: Mapping[int, Mapping[int, float]], network: Network, inward: frozenset[int]
+) -> float:
+    """The price of the links that run backwards, and of blocks of which nothing but these begins or ends.
+
+    ``inward``: the blocks that signals from outside enter.
+    """
+    place = {member: k for k, member in enumerate(order)}
+    fed: set[int] = set(inward)
+    feeding: set[int] = set()
+    cost = 0.0
+    for source, prices in price.items():
+        for target, value in prices.items():
+            if place[target] < place[source]:
+                cost += value
+            elif value > _ENTRY:
+                fed.add(target)
+                feeding.add(source)
+    outside = {link.source for link in network.links if link.target not in place}
+    cost += _BEGINNING * sum(member not in fed for member in order)
+    states = {member for member in order if network.is_state(member)}
+    return cost + _MIRRORED_STATE * len(states - feeding - outside)
+
+
+def _depth_first(roots: Sequence[int], after: Mapping[int, Sequence[int]]) -> list[int]:
+    """Reverse postorder."""
+    seen: set[int] = set()
+    order: list[int] = []
+    for root in roots:
+        if root in seen:
+            continue
+        seen.add(root)
+        stack = [(root, iter(after[root]))]
+        while stack:
+            node, targets = stack[-1]
+            target = next((t for t in targets if t not in seen), None)
+            if target is None:
+                stack.pop()
+                order.append(node)
+            else:
+                seen.add(target)
+                stack.append((target, iter(after[target])))
+        # Blocks of later roots stand before those of earlier ones, unless links decide.
+    return order[::-1]
+
+
+def _moved(order: list[int], member: int, after: dict[int, float], before: dict[int, float]) -> bool:
+    """Move one block to the place where its backward links are cheapest; says whether it is another."""
+    here = order.index(member)
+    others = [other for other in order if other != member]
+    cost = sum(before.values())  # at the beginning, all links into the block run backwards
+    costs = [cost]
+    for other in others:
+        cost += after.get(other, 0.0) - before.get(other, 0.0)
+        costs.append(cost)
+    best = min(range(len(costs)), key=lambda k: (round(costs[k], 6), abs(k - here)))
+    if costs[best] > costs[here] - 1e-6:
+        return False
+    order[:] = [*others[:best], member, *others[best:]]
+    return True
+
+
+def _reaches(start: int, goal: int, count: int, links: Sequence[Link]) -> bool:
+    after: list[list[int]] = [[] for _ in range(count)]
+    for link in links:
+        after[link.source].append(link.target)
+    seen, stack = {start}, [start]
+    while stack:
+        node = stack.pop()
+        if node == goal:
+            return True
+        for target in after[node]:
+            if target not in seen:
+                seen.add(target)
+                stack.append(target)
+    return False

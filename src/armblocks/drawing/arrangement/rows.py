@@ -1,0 +1,214 @@
+"""Heights of the nodes: the main path in one row, lines straight, everything else as near as it can be.
+
+Nodes that are joined by straight lines move together, as in Brandes and Köpf, *Fast and simple horizontal
+coordinate assignment*, 2002. The rows are placed one by one, the main path first, each where its lines are
+shortest between the rows that are placed already.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Sequence
+from itertools import pairwise
+
+from armblocks.drawing.arrangement.columns import Columns, End, Piece
+
+BLOCK_GAP = 24.0
+"""px between a block and what stands below its name."""
+_LINE_GAP = 14.0
+_SUM_GAP = 48.0
+"""px between the middle of a round sum and the line that comes from above or below."""
+_ROUNDS = 12
+
+
+def heights(
+    columns: Columns, order: Sequence[Sequence[int]], size: Sequence[float], name: float
+) -> list[float]:
+    """The upper edges of all nodes; ``size``: heights of the blocks, ``name``: height of a name below."""
+    rows = _Rows(columns, order, size, name)
+    rows.place()
+    return rows.tops()
+
+
+class _Rows:
+    def __init__(
+        self, columns: Columns, order: Sequence[Sequence[int]], size: Sequence[float], name: float
+    ) -> None:
+        self._blocks, self._pieces = columns.blocks, columns.pieces
+        self._path = columns.path
+        self._nets = columns.nets
+        self._order = order
+        self._position = {node: k for column in order for k, node in enumerate(column)}
+        count = len(columns.column)
+        self._leader = list(range(count))
+        self._offset = [0.0] * count
+        self._members: list[list[int]] = [[node] for node in range(count)]
+        self._weight = [0.0] * count
+        self._size, self._name = size, name
+        self._turned = columns.turned
+        self._straight: dict[tuple[int, bool], int] = {}
+        """The node at the other end of a straight line, by node and side."""
+        self._align()
+        rows = sorted({self._leader[node] for node in range(count)})
+        self._above: dict[int, dict[int, float]] = {row: {} for row in rows}
+        self._below: dict[int, dict[int, float]] = {row: {} for row in rows}
+        for column in order:
+            for upper, lower in pairwise(column):
+                least = self._least(upper, lower) + self._offset[upper] - self._offset[lower]
+                a, b = self._leader[upper], self._leader[lower]
+                self._above[b][a] = max(self._above[b].get(a, least), least)
+                self._below[a][b] = self._above[b][a]
+        self._lines: dict[int, list[tuple[int, float, float]]] = {row: [] for row in rows}
+        """For every row: another row, how much lower than it this row wants to be, and how much."""
+        for piece in self._pieces:
+            self._want(piece)
+        self._y: dict[int, float] = {}
+
+    # -- rows of straight lines ------------------------------------------------------------------------------
+
+    def _align(self) -> None:
+        taken: set[tuple[int, bool]] = set()
+        kept: dict[int, list[tuple[int, int]]] = {}
+        for piece in sorted((p for p in self._pieces if not p.turns), key=self._rank):
+            left, right = (piece.a, piece.b) if piece.a.right else (piece.b, piece.a)
+            if not (left.level and right.level):
+                continue
+            if (left.node, True) in taken or (right.node, False) in taken:
+                continue
+            pair = self._position[left.node], self._position[right.node]
+            straight = kept.setdefault(piece.gap, [])
+            if any((pair[0] - a) * (pair[1] - b) < 0 for a, b in straight):
+                continue
+            straight.append(pair)
+            taken |= {(left.node, True), (right.node, False)}
+            self._straight[right.node, False], self._straight[left.node, True] = left.node, right.node
+            self._unite(left.node, right.node, left.port - right.port, self._strength(piece))
+
+    def _unite(self, left: int, right: int, shift: float, strength: float) -> None:
+        """Make the right node, and its row, ``shift`` lower than the left one."""
+        a, b = self._leader[left], self._leader[right]
+        move = self._offset[left] + shift - self._offset[right]
+        for node in self._members[b]:
+            self._leader[node] = a
+            self._offset[node] += move
+        self._members[a] += self._members[b]
+        self._weight[a] = max(self._weight[a], self._weight[b], strength)
+
+    def _strength(self, piece: Piece) -> float:
+        ends = piece.a.node, piece.b.node
+        knots = sum(node >= self._blocks for node in ends)
+        paths = {self._path.get(node) for node in ends}
+        if len(paths) == 1 and (path := paths.pop()) is not None:
+            return max(100.0 - path, 10.0)
+        return (3.0, 2.0, 8.0)[knots]
+
+    def _rank(self, piece: Piece) -> tuple[float, ...]:
+        left, right = (piece.a, piece.b) if piece.a.right else (piece.b, piece.a)
+        steps = abs(self._position[left.node] - self._position[right.node])
+        return -self._strength(piece), steps, piece.gap, left.node, right.node, left.port, right.port
+
+    def _least(self, upper: int, lower: int) -> float:
+        """The distance of the upper edges of two neighbours in a column."""
+        if upper < self._blocks:
+            gap = BLOCK_GAP if lower < self._blocks else _LINE_GAP
+            return self._size[upper] + self._name + gap
+        one_net = min(upper, lower) >= self._blocks and (
+            self._nets[upper - self._blocks] == self._nets[lower - self._blocks]
+        )
+        return 0.0 if one_net else _LINE_GAP
+
+    # -- placing ---------------------------------------------------------------------------------------------
+
+    def _want(self, piece: Piece) -> None:
+        shift = piece.a.port - piece.b.port + self._offset[piece.a.node] - self._offset[piece.b.node]
+        for end, other, way in ((piece.a, piece.b, -1.0), (piece.b, piece.a, 1.0)):
+            if not end.level:  # from above or below
+                shift -= way * (_SUM_GAP if self._from_below(end, other) else -_SUM_GAP)
+        a, b = self._leader[piece.a.node], self._leader[piece.b.node]
+        if a == b:
+            return
+        weight = 0.5 if piece.turns else 1.0
+        self._lines[b].append((a, shift, weight))
+        self._lines[a].append((b, -shift, weight))
+
+    def _from_below(self, end: End, other: End) -> bool:
+        """Whether a line meets a round sum from below; a sum with two inputs is turned to its line."""
+        straight = self._straight.get((end.node, end.right))
+        if end.node in self._turned and end.right != other.right and straight is not None:
+            return self._position[other.node] > self._position[straight]
+        return end.share > 0
+
+    def place(self) -> None:
+        """Place all rows, then move each between its neighbours to where its lines are shortest."""
+        rank = {row: (-self._weight[row], -len(self._members[row]), row) for row in self._lines}
+        waiting = set(self._lines)
+        queue: list[tuple[tuple[float, int, int], int]] = []
+        while waiting:
+            while queue and queue[0][1] not in waiting:
+                heapq.heappop(queue)
+            row = heapq.heappop(queue)[1] if queue else min(waiting, key=lambda row: rank[row])
+            waiting.discard(row)
+            low, high = self._bound(row, self._above, 1.0), self._bound(row, self._below, -1.0)
+            self._y[row] = min(max(self._wish(row), low), high)
+            for other, _, _ in self._lines[row]:
+                if other in waiting:
+                    heapq.heappush(queue, (rank[other], other))
+        order = sorted(self._lines, key=lambda row: (self._y[row], row))
+        for k in range(_ROUNDS):
+            moved = False
+            for row in order if k % 2 else order[::-1]:
+                low = max((self._y[a] + d for a, d in self._above[row].items()), default=float("-inf"))
+                high = min((self._y[b] - d for b, d in self._below[row].items()), default=float("inf"))
+                y = min(max(self._wish(row), low), high)
+                if abs(y - self._y[row]) > 0.5:
+                    self._y[row] = y
+                    moved = True
+            if not moved:
+                break
+
+    def _wish(self, row: int) -> float:
+        """The weighted median of the heights at which single lines of a row are straight."""
+        wishes = sorted(
+            (self._y[other] + shift, weight) for other, shift, weight in self._lines[row] if other in self._y
+        )
+        if not wishes:
+            return self._y.get(row, 0.0)
+        half, total = sum(weight for _, weight in wishes) / 2, 0.0
+        for k, (y, weight) in enumerate(wishes):
+            total += weight
+            if total > half + 1e-9:
+                return y
+            if total > half - 1e-9:
+                following = wishes[min(k + 1, len(wishes) - 1)][0]
+                return min(max(self._y.get(row, (y + following) / 2), y), following)
+        return wishes[-1][0]
+
+    def _bound(self, row: int, beside: dict[int, dict[int, float]], way: float) -> float:
+        """The nearest height that the placed rows on one side allow, over rows that are not placed yet."""
+        # Longest paths through rows without a place, in the order of a depth-first search.
+        order: list[int] = []
+        seen = {row}
+        stack = [(row, iter(beside[row]))]
+        while stack:
+            node, others = stack[-1]
+            other = next((o for o in others if o not in seen and o not in self._y), None)
+            if other is None:
+                stack.pop()
+                order.append(node)
+            else:
+                seen.add(other)
+                stack.append((other, iter(beside[other])))
+        distance = {row: 0.0}
+        bound = -way * float("inf")
+        for node in reversed(order):
+            for other, least in beside[node].items():
+                far = distance[node] + least
+                if other in self._y:
+                    bound = max(bound, self._y[other] + far) if way > 0 else min(bound, self._y[other] - far)
+                else:
+                    distance[other] = max(distance.get(other, far), far)
+        return bound
+
+    def tops(self) -> list[float]:
+        """The upper edges of the nodes, the first at 0."""
+        return [self._y[self._leader[node]] + self._offset[node] for node in range(len(self._leader))]

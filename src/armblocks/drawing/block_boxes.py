@@ -1,0 +1,188 @@
+"""Boxes of blocks: size, and ports along the edges."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+from armblocks.diagram import Block, Placement
+from armblocks.diagram.signs import Outline
+from armblocks.drawing.block_faces import bus_width, face_size, face_width, port_labels
+from armblocks.drawing.structure_faces import CONTROL_ROOM, control_ports
+from armblocks.pictures.text_width import text_width
+
+NAME_SIZE = 11.0
+"""Font size of the names under the blocks, px."""
+NAME_ROOM = 20.0
+"""Height of the name below a block, px."""
+PORT_TEXT = 9.0
+PORT_TEXT_ROOM = 13.0
+"""Height of the port names at the upper or lower edge, px."""
+
+
+@dataclass(frozen=True)
+class PortSpot:
+    """A port on the edge of its block, and the direction in which its wire leaves or enters (dx, dy)."""
+
+    name: str
+    x: float
+    y: float
+    dx: int
+    dy: int
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Box:
+    """A block on the sheet: top left corner, size, ports in order."""
+
+    name: str
+    block: Block
+    x: float
+    y: float
+    width: float
+    height: float
+    flipped: bool = False
+    rotation: int = 0
+    """Degrees clockwise."""
+    inputs: tuple[PortSpot, ...] = ()
+    outputs: tuple[PortSpot, ...] = ()
+
+    @property
+    def upright(self) -> bool:
+        """Whether its signals run horizontally."""
+        return self.rotation % 180 == 0
+
+    @property
+    def name_width(self) -> float:
+        """Maximum width of the block's name, px."""
+        return min(text_width(self.name, NAME_SIZE), 168.0)
+
+    def at(self, x: float, y: float) -> Box:
+        """The box at another position."""
+        dx, dy = x - self.x, y - self.y
+        return replace(
+            self,
+            x=x,
+            y=y,
+            inputs=tuple(replace(p, x=p.x + dx, y=p.y + dy) for p in self.inputs),
+            outputs=tuple(replace(p, x=p.x + dx, y=p.y + dy) for p in self.outputs),
+        )
+
+
+def standing_box(name: str, block: Block, place: Placement) -> Box:
+    """The box of a block at ``place``, independent of its connections."""
+    return replace(_at_origin(block, replace(place, x=0.0, y=0.0)), name=name).at(place.x, place.y)
+
+
+@lru_cache(maxsize=4096)
+def _at_origin(block: Block, place: Placement) -> Box:
+    sized = sized_box("", block)
+    width, height = sized.width, sized.height
+    if place.rotation % 180:
+        width, height = _standing(sized)
+    return _with_ports(
+        replace(
+            sized,
+            width=place.width or width,
+            height=place.height or height,
+            flipped=place.flipped,
+            rotation=place.rotation,
+        )
+    )
+
+
+def _standing(box: Box) -> tuple[float, float]:
+    """Width and height of a block rotated by 90 degrees: its ports rotate, its drawing stays upright."""
+    shape = face_size(box.block)[0]
+    if shape is Outline.TAG:  # as wide as its text
+        return box.width, box.height + 10
+    if shape not in (Outline.CARD, Outline.BUS):
+        return box.height, box.width
+    labels = port_labels(box.block)
+    pitches = [max((text_width(text, PORT_TEXT) + 6 for text in side), default=0.0) for side in labels]
+    ports = (len(box.block.input_ports()), len(box.block.output_ports()))
+    wide = max(count * max(20.0, pitch) + 8 for count, pitch in zip(ports, pitches))
+    if shape is Outline.BUS:
+        return float(round(max(box.height, wide))), 30.0
+    _, width, height = face_size(box.block)
+    named = sum(any(side) for side in labels)
+    room = CONTROL_ROOM * bool(control_ports(box.block))
+    return float(round(max(width, wide))), height + named * PORT_TEXT_ROOM + room
+
+
+def sized_box(name: str, block: Block) -> Box:
+    """A box at the origin with the size of the block's face and with its ports along the edges."""
+    shape, width, height = face_size(block)
+    inputs, outputs = len(block.input_ports()) - len(control_ports(block)), len(block.output_ports())
+    if shape is Outline.CARD:
+        labels = port_labels(block)
+        if any(label for side in labels for label in side):
+            widest = [max((text_width(t, PORT_TEXT) + 5 for t in side if t), default=0.0) for side in labels]
+            width = max(width, face_width(block) + sum(widest) + 4)
+        height = max(height, 20.0 * max(inputs, outputs) + 8 + CONTROL_ROOM * bool(control_ports(block)))
+    elif shape is Outline.BAR:
+        height = max(height, 20.0 * max(inputs, outputs) + 4)
+    elif shape is Outline.BUS:
+        width, height = bus_width(block, PORT_TEXT), max(height, 20.0 * max(inputs, outputs) + 4)
+    return _with_ports(Box(name=name, block=block, x=0.0, y=0.0, width=float(round(width)), height=height))
+
+
+def flipped_box(box: Box) -> Box:
+    """The box with its inputs on the right."""
+    return _with_ports(replace(box, flipped=True))
+
+
+def _with_ports(box: Box) -> Box:
+    """The box with its ports, which are rotated with the block."""
+    width, height = (box.width, box.height) if box.upright else (box.height, box.width)
+    upright = _with_upright_ports(replace(box, x=0.0, y=0.0, width=width, height=height))
+    inputs, outputs = upright.inputs, upright.outputs
+    for _ in range(box.rotation // 90):
+        inputs = tuple(_gone_round(spot, height) for spot in inputs)
+        outputs = tuple(_gone_round(spot, height) for spot in outputs)
+        width, height = height, width
+    return replace(box, x=0.0, y=0.0, inputs=inputs, outputs=outputs).at(box.x, box.y)
+
+
+def _gone_round(spot: PortSpot, height: float) -> PortSpot:
+    return PortSpot(spot.name, height - spot.y, spot.x, -spot.dy, spot.dx)
+
+
+def _with_upright_ports(box: Box) -> Box:
+    shape, _, _ = face_size(box.block)
+    into, out = [p.name for p in box.block.input_ports()], [p.name for p in box.block.output_ports()]
+    left, right = box.x, box.x + box.width
+    entry, leave = (right, left) if box.flipped else (left, right)
+    forwards = -1 if box.flipped else 1
+    if shape is Outline.CIRCLE and len(into) in (2, 3):
+        # Inputs of a round sum: the first from the left, the second from below, the third from above.
+        cx, cy = box.x + box.width / 2, box.y + box.height / 2
+        spots = [
+            PortSpot(into[0], entry, cy, forwards, 0),
+            PortSpot(into[1], cx, box.y + box.height, 0, -1),
+            *(PortSpot(name, cx, box.y, 0, 1) for name in into[2:]),
+        ]
+        return replace(
+            box, inputs=tuple(spots), outputs=tuple(PortSpot(n, leave, cy, forwards, 0) for n in out)
+        )
+    above = control_ports(box.block)
+    side = [name for name in into if name not in above]
+    top = CONTROL_ROOM if above else 0.0
+    spots = {
+        **_spread(side, entry, box.y + top, box.height - top, forwards),
+        **{
+            name: PortSpot(name, box.x + box.width * (k + 1) / (len(above) + 1), box.y, 0, 1)
+            for k, name in enumerate(above)
+        },
+    }
+    leaving = _spread(out, leave, box.y + top, box.height - top, forwards)
+    return replace(box, inputs=tuple(spots[name] for name in into), outputs=tuple(leaving.values()))
+
+
+def _spread(names: Sequence[str], x: float, y: float, height: float, forwards: int) -> dict[str, PortSpot]:
+    """Ports at equal distances along an edge that begins at y."""
+    return {
+        name: PortSpot(name, x, y + height * (k + 0.5) / len(names), forwards, 0)
+        for k, name in enumerate(names)
+    }
