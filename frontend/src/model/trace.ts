@@ -166,7 +166,7 @@ export function joined(traces: { time: Float64Array; values: Float64Array }[]): 
     for (let row = 0; row < most; row++) {
       times.push(at)
       traces.forEach(({ values }, k) =>
-        columns[k]!.push(rows[k] ? values[next[k]! + Math.min(row, rows[k]! - 1)] : undefined),
+        columns[k]!.push(rows[k] ? values[next[k]! + Math.min(row, rows[k] - 1)] : undefined),
       )
     }
     rows.forEach((count, k) => (next[k]! += count))

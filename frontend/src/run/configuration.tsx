@@ -2,7 +2,7 @@ import { Alert, Button, Checkbox, Group, Modal, NativeSelect, Stack, TextInput }
 import { useEffect, useState } from 'react'
 import { show, useDialogs } from '../dialogs'
 import { valueText } from '../inspector/value_text'
-import type { SolverChoice } from '../protocol'
+import type { SettingRule, SolverChoice } from '../protocol'
 import { ask, change, useStudio } from '../store'
 
 const CHECK_DELAY_MS = 200
@@ -18,10 +18,11 @@ export function Configuration() {
   )
 }
 
-/** Format small numbers as typed: 1e-6. */
+/** The text of a setting in the form. */
 const settingText = (value: boolean | number | string | null) =>
   typeof value === 'boolean' ? String(value) : numberText(value)
 
+/** Format small numbers as typed: 1e-6. */
 const numberText = (value: number | string | null) =>
   typeof value === 'number' && value !== 0 && Math.abs(value) < 1e-3
     ? value.toExponential()
@@ -75,6 +76,56 @@ function solverChoices(solvers: SolverChoice[]) {
   ]
 }
 
+interface SettingProps {
+  rule: SettingRule
+  /** The text of the setting; of a switch `true` or `false`. */
+  value: string | undefined
+  fault: string | undefined
+  put: (value: string) => void
+  solvers: SolverChoice[]
+  focused: boolean
+}
+
+/** One setting: a list for the solver, a box for a switch, else a field for a number. */
+function Setting({ rule, value, fault, put, solvers, focused }: SettingProps) {
+  const label = (
+    <>
+      {rule.title}
+      {rule.unit && <span className="unit"> {rule.unit}</span>}
+    </>
+  )
+  const common = { label, description: rule.doc, size: 'sm' as const, error: fault || undefined }
+  if (rule.name === 'solver')
+    return (
+      <NativeSelect
+        className="wide"
+        {...common}
+        data={solverChoices(solvers)}
+        value={value ?? 'auto'}
+        onChange={(event) => put(event.currentTarget.value)}
+      />
+    )
+  if (typeof rule.default === 'boolean')
+    return (
+      <Checkbox
+        className="wide"
+        {...common}
+        checked={value === 'true'}
+        onChange={(event) => put(String(event.currentTarget.checked))}
+      />
+    )
+  return (
+    <TextInput
+      {...common}
+      data-autofocus={focused || undefined}
+      classNames={{ input: 'typed' }}
+      value={value ?? ''}
+      onChange={(event) => put(event.currentTarget.value)}
+      placeholder="automatic"
+    />
+  )
+}
+
 function Form({ onClose }: { onClose: () => void }) {
   const document = useStudio((s) => s.document?.state.document ?? '')
   const settings = useStudio((s) => s.document?.settings)
@@ -96,11 +147,6 @@ function Form({ onClose }: { onClose: () => void }) {
   )
   const faults = useFaults(document, values)
   const wrong = changed.length > 0 && Object.keys(faults).length > 0
-  const put = (name: string) => (event: React.ChangeEvent<HTMLInputElement | HTMLSelectElement>) => {
-    const { value } = event.currentTarget
-    setTyped((now) => ({ ...now, [name]: value }))
-  }
-  const choices = solverChoices(welcome?.solvers ?? [])
   return (
     <form
       onSubmit={(event) => {
@@ -112,51 +158,17 @@ function Form({ onClose }: { onClose: () => void }) {
     >
       <Stack gap="sm">
         <div className="settings">
-          {welcome?.settings.map(({ name, title, unit, doc }, index) => {
-            const label = (
-              <>
-                {title}
-                {unit && <span className="unit"> {unit}</span>}
-              </>
-            )
-            const fault = faults[name]
-            const common = { label, description: doc, size: 'sm' as const, error: fault || undefined }
-            if (name === 'solver')
-              return (
-                <NativeSelect
-                  key={name}
-                  className="wide"
-                  {...common}
-                  data={choices}
-                  value={typed[name] ?? 'auto'}
-                  onChange={put(name)}
-                />
-              )
-            if (switches.has(name))
-              return (
-                <Checkbox
-                  key={name}
-                  className="wide"
-                  {...common}
-                  checked={typed[name] === 'true'}
-                  onChange={(event) => {
-                    const { checked } = event.currentTarget
-                    setTyped((now) => ({ ...now, [name]: String(checked) }))
-                  }}
-                />
-              )
-            return (
-              <TextInput
-                key={name}
-                {...common}
-                data-autofocus={index === 0 || undefined}
-                classNames={{ input: 'typed' }}
-                value={typed[name] ?? ''}
-                onChange={put(name)}
-                placeholder="automatic"
-              />
-            )
-          })}
+          {welcome?.settings.map((rule, index) => (
+            <Setting
+              key={rule.name}
+              rule={rule}
+              fault={faults[rule.name]}
+              value={typed[rule.name]}
+              put={(value) => setTyped((now) => ({ ...now, [rule.name]: value }))}
+              solvers={welcome.solvers}
+              focused={index === 0}
+            />
+          ))}
         </div>
         {run?.reason && (
           <Alert color="gray" title={`The last run used ${run.solver}`}>

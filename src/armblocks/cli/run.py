@@ -29,6 +29,14 @@ class DataFormat(StrEnum):
     MAT = "mat"
 
 
+RecordJumps = Annotated[
+    bool | None,
+    typer.Option(
+        "--jumps/--no-jumps", help="Record both sides of every jump of a signal.", show_default="the model's"
+    ),
+]
+
+
 def run(
     model: ModelName,
     stop_time: Annotated[
@@ -44,14 +52,7 @@ def run(
     sample_time: Annotated[float | None, typer.Option(help="Interval of the recorded samples, s.")] = None,
     rtol: Annotated[float | None, typer.Option(help="Relative tolerance of an adaptive solver.")] = None,
     atol: Annotated[float | None, typer.Option(help="Absolute tolerance of an adaptive solver.")] = None,
-    jumps: Annotated[
-        bool | None,
-        typer.Option(
-            "--jumps/--no-jumps",
-            help="Record both sides of every jump of a signal.",
-            show_default="the model's",
-        ),
-    ] = None,
+    jumps: RecordJumps = None,
     from_state: Annotated[
         Path | None, typer.Option(help="Continue from the saved state of an earlier run.")
     ] = None,
@@ -89,15 +90,8 @@ def run(
 
     parameters = parse_assignments(assignments or [])
     diagram = ab.load_diagram(model, trust=trust)
-    settings = _stated(
-        stop_time=stop_time,
-        solver=solver,
-        step=step,
-        sample_time=sample_time,
-        rtol=rtol,
-        atol=atol,
-        record_jumps=jumps,
-    )
+    settings = _stated(stop_time=stop_time, solver=solver, step=step, sample_time=sample_time)
+    settings |= _stated(rtol=rtol, atol=atol, record_jumps=jumps)
     _check_files(diagram, formats or [])
     folder = out or Path(f"{diagram.name}-report")
     made = [place for place in (folder, *folder.parents) if not place.exists()]

@@ -15,7 +15,7 @@ from armblocks.integration.native_integrator import Integration
 from armblocks.integration.system import CompiledSystem
 from armblocks.integration.workspace import Status
 from armblocks.simulation.methods.rosenbrock import ROS5
-from armblocks.simulation.run_data import element_names
+from armblocks.simulation.signal_names import element_names
 from armblocks.simulation.tableaux import STIFF
 
 Array = NDArray[np.float64]

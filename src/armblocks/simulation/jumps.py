@@ -17,6 +17,7 @@ from armblocks.equations import Signature
 from armblocks.integration.records import row_width
 from armblocks.integration.run_point import RunPoint
 from armblocks.integration.system import CompiledSystem
+from armblocks.simulation.signal_names import signal_path
 
 Array = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
@@ -105,9 +106,6 @@ class Jumps:
         return self.time.size
 
     def __getitem__(self, name: str) -> tuple[Array, Array, Array]:
-        # Imported here because the data of a run contain their jumps.
-        from armblocks.simulation.run_data import signal_path
-
         path = signal_path(name, self.layout, self._aliases, "jumps")
         rows, table = self.layout.ranges[path], self.table
         own = table.jumping[rows].any(axis=0)

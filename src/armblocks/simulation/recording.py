@@ -17,7 +17,8 @@ from armblocks.simulation.diagnosis import first_bad_signal
 from armblocks.simulation.jumps import Jumps, JumpSearch, JumpTable, merged, merged_states
 from armblocks.simulation.plan import Instants, LogRequest
 from armblocks.simulation.result import SimulationResult
-from armblocks.simulation.run_data import LoggedFile, signal_path
+from armblocks.simulation.run_data import LoggedFile
+from armblocks.simulation.signal_names import signal_path
 from armblocks.simulation.stretch import Consumer, Rows, Stretch
 
 if TYPE_CHECKING:

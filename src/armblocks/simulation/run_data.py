@@ -12,27 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.equations import Signature, Slot
-from armblocks.errors import UnknownNameError
 from armblocks.simulation.jumps import Jumps, JumpTable, merged, merged_states
+from armblocks.simulation.signal_names import element_names, signal_path
 
 if TYPE_CHECKING:
     from armblocks.simulation.run_state import RunState
 
 Array = NDArray[np.float64]
-
-
-def element_names(slot: Slot) -> tuple[str, ...]:
-    """A name for each scalar of a quantity."""
-    return slot.elements
-
-
-def signal_path(name: str, layout: Signature, aliases: Mapping[str, str], where: str) -> str:
-    """The path of a signal, which ``name`` may denote by an alias. Raises ``UnknownNameError``."""
-    if name in layout.ranges:
-        return name
-    if name in aliases:
-        return aliases[name]
-    raise UnknownNameError("signal", name, [*layout.names, *aliases], where=where)
 
 
 @dataclass(frozen=True, kw_only=True)

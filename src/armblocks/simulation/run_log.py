@@ -19,7 +19,7 @@ from armblocks.errors import FormatError
 from armblocks.simulation.export import description_of, open_log
 from armblocks.simulation.plan import LogRequest
 from armblocks.simulation.result import SimulationResult
-from armblocks.simulation.run_data import element_names, signal_path
+from armblocks.simulation.signal_names import element_names, signal_path
 
 Array = NDArray[np.float64]
 

@@ -1,0 +1,22 @@
+"""Names of recorded signals and of their elements."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from armblocks.equations import Signature, Slot
+from armblocks.errors import UnknownNameError
+
+
+def element_names(slot: Slot) -> tuple[str, ...]:
+    """A name for each scalar of a quantity."""
+    return slot.elements
+
+
+def signal_path(name: str, layout: Signature, aliases: Mapping[str, str], where: str) -> str:
+    """The path of a signal, which ``name`` may denote by an alias. Raises ``UnknownNameError``."""
+    if name in layout.ranges:
+        return name
+    if name in aliases:
+        return aliases[name]
+    raise UnknownNameError("signal", name, [*layout.names, *aliases], where=where)
