@@ -1,5 +1,6 @@
 import './mantine_later.css'
 import { ConnectDialog } from './canvas/connect_dialog'
+import { DroppedTableDialog } from './canvas/dropped_table_dialog'
 import { CommandPalette } from './command_palette'
 import { OpenDialog } from './documents/open_dialog'
 import { RecoveryDialog } from './documents/recovery_dialog'
@@ -28,6 +29,7 @@ export function AllDialogs() {
       <SaveDialog />
       <OpenDialog />
       <RecoveryDialog />
+      <DroppedTableDialog />
     </>
   )
 }

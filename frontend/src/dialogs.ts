@@ -15,6 +15,7 @@ type Dialog =
   | 'save_as'
   | 'open'
   | 'recovery'
+  | 'dropped_table'
 
 interface Dialogs {
   open: Dialog | null

@@ -17,9 +17,11 @@ export interface Envelope {
     | Close
     | Control
     | Copy
+    | DataFileList
     | Drop
     | Files
     | Find
+    | KeepFile
     | KeepMine
     | Look
     | New
@@ -29,6 +31,8 @@ export interface Envelope {
     | AskPicture
     | Ping
     | AskPose
+    | PreviewTable
+    | ReadSource
     | AskReadings
     | Recover
     | Redo
@@ -41,6 +45,7 @@ export interface Envelope {
     | Save
     | AskScene
     | SetSpeed
+    | TrustSource
     | Tune
     | TypedValue
     | TypedSettings
@@ -406,6 +411,13 @@ export interface Copy {
   notes?: string[];
 }
 /**
+ * Return the files that a parameter of this kind may name.
+ */
+export interface DataFileList {
+  kind: "data_files";
+  holds: "table" | "function";
+}
+/**
  * Open a file that was dropped on the studio: a diagram, a robot or a script (it is not executed).
  */
 export interface Drop {
@@ -426,6 +438,15 @@ export interface Find {
   kind: "find";
   document: string;
   text: string;
+}
+/**
+ * Store a dropped file with a table in the project folder; ``replace``: also over another file.
+ */
+export interface KeepFile {
+  kind: "keep_file";
+  name: string;
+  content: string;
+  replace?: boolean;
 }
 /**
  * Keep the document although its file has changed on disk; the next save overwrites the file.
@@ -505,6 +526,25 @@ export interface AskPose {
    * @maxItems 1000
    */
   q: number[];
+}
+/**
+ * Read a file; ``time`` and ``columns`` are empty where the file determines them.
+ */
+export interface PreviewTable {
+  kind: "preview_table";
+  file: string;
+  time?: string;
+  /**
+   * @maxItems 10000
+   */
+  columns?: string[];
+}
+/**
+ * Return the content of a Python file.
+ */
+export interface ReadSource {
+  kind: "read_source";
+  file: string;
 }
 /**
  * Compute the read-outs of the robot of a document at ``q, qd, qdd``.
@@ -642,6 +682,17 @@ export interface SetSpeed {
   run: string;
   kind: "speed";
   speed?: number | null;
+}
+/**
+ * Trust the content of a Python file that the page has shown, or no content of it.
+ *
+ * Refused if the file has another content than ``digest`` by now.
+ */
+export interface TrustSource {
+  kind: "trust_source";
+  file: string;
+  digest: string;
+  trusted: boolean;
 }
 /**
  * Change a tunable parameter during a run.
@@ -1125,9 +1176,11 @@ export interface Replies {
   close: null;
   control: null;
   copy: string;
+  data_files: DataFile[];
   drop: string[];
   files: FileList;
   find: Found[];
+  keep_file: KeptFile;
   keep_mine: null;
   look: null;
   new: string;
@@ -1137,6 +1190,8 @@ export interface Replies {
   picture: string;
   ping: null;
   pose: number[][][];
+  preview_table: TablePreview;
+  read_source: FunctionSource;
   readings: Readings;
   recover: string | null;
   redo: number;
@@ -1151,12 +1206,20 @@ export interface Replies {
   save: string;
   scene: RobotScene;
   speed: null;
+  trust_source: null;
   tune: null;
   typed: unknown;
   typed_settings: {
     [k: string]: string;
   };
   undo: number;
+}
+/**
+ * A file of the project; ``size`` in bytes.
+ */
+export interface DataFile {
+  path: string;
+  size: number;
 }
 /**
  * Files of the project folder; ``recent`` are the recently used ones, the latest first.
@@ -1175,12 +1238,75 @@ export interface Found {
   match: string;
 }
 /**
+ * The path of a dropped file; ``stored`` is false if another file has this name.
+ */
+export interface KeptFile {
+  path: string;
+  stored: boolean;
+}
+/**
  * The sheets of a model as a tree.
  */
 export interface Outline {
   name: string;
   blocks: number;
   subsystems: Outline[];
+}
+/**
+ * The columns of a file, and the table of the chosen ones, or its ``fault``.
+ *
+ * ``time`` is the column with the times, ``chosen`` are those of the values. ``rows`` are the first rows of
+ * these columns as text. ``times`` (s) and ``curves`` are points for a plot: the least and the greatest
+ * values of groups of rows. ``spacing`` is the least and the greatest distance of two times, s.
+ */
+export interface TablePreview {
+  columns: TableColumn[];
+  time: string;
+  chosen: string[];
+  rows: string[][];
+  count: number;
+  /**
+   * @minItems 2
+   * @maxItems 2
+   */
+  spacing: [number, number];
+  times: number[];
+  curves: number[][];
+  notes: string[];
+  fault: Fault | null;
+}
+/**
+ * A column of a file. ``fault`` says why it has no numbers; ``rows`` is then 0.
+ */
+export interface TableColumn {
+  name: string;
+  unit: string;
+  kind: string;
+  rows: number;
+  fault: string;
+}
+/**
+ * The content of a Python file, which has not been run; ``fault`` says why it is not valid.
+ *
+ * ``digest`` identifies the content; ``trusted`` says whether its code may run. Invisible characters are
+ * written as ``\\u202e``; ``hidden`` is their number.
+ */
+export interface FunctionSource {
+  text: string;
+  digest: string;
+  trusted: boolean;
+  hidden: number;
+  functions: SourceFunction[];
+  fault: Fault | null;
+}
+/**
+ * A function of a Python file; ``line`` is that of its definition.
+ */
+export interface SourceFunction {
+  name: string;
+  arguments: string[];
+  line: number;
+  doc: string;
 }
 /**
  * Read-outs of an arm in one configuration, in m, rad and N m along world axes.

@@ -106,7 +106,7 @@ def test_a_file_names_the_function_and_needs_trust(tmp_path: Path) -> None:
         ("control.py:missing", r"control\.py has no function named 'missing'"),
         ("control.py:number", r"control\.py has no function named 'number'"),
         ("other.py:law", "is not a function of a file"),
-        ("broken.py:law", r"the code of broken\.py fails: ZeroDivisionError"),
+        ("broken.py:law", r"the code of broken\.py, line 1, fails: ZeroDivisionError"),
     ],
 )
 def test_invalid_references_to_functions_are_refused(reference: str, says: str, tmp_path: Path) -> None:

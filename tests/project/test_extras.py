@@ -104,7 +104,7 @@ def test_the_core_runs_without_the_extras_and_names_missing_libraries(tmp_path: 
         "data frame": ("pandas", "data", "data frames"),
         "save parquet": ("pyarrow", "data", "Parquet files"),
         "save mat": ("scipy", "data", "MAT files"),
-        "load parquet": ("pandas", "data", "Parquet files"),
+        "load parquet": ("pyarrow", "data", "Parquet files"),
         "load mat": ("scipy", "data", "MAT files"),
         "log": ("pyarrow", "data", "Parquet files"),
         "report data": ("scipy", "data", "MAT files"),

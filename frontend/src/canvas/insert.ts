@@ -18,18 +18,22 @@ interface Insertion {
   end?: { port: string; isOutput: boolean }
   /** Whether the view is moved so that the block is visible. */
   reveal?: boolean
+  /** The values of its parameters that differ from the defaults. */
+  parameters?: Record<string, unknown>
+  /** The wish for its name. */
+  name?: string
 }
 
-/** Add a new block of a type with its centre at a point, and select it. */
-export function insertBlock(
+/** Add a new block of a type with its centre at a point, and select it; the result is its name. */
+export async function insertBlock(
   type: string,
   at: { x: number; y: number },
-  { wire, level, end, reveal = false }: Insertion = {},
-): void {
+  { wire, level, end, reveal = false, parameters = {}, name: wish }: Insertion = {},
+): Promise<string | undefined> {
   const { document, library, select } = useStudio.getState()
   const kind = library.get(type)
-  if (!document || !kind) return
-  const name = freeName(kind.title.replace(/[/.]/g, ' '), Object.keys(document.blocks))
+  if (!document || !kind) return undefined
+  const name = freeName((wish ?? kind.title).replace(/[/.]/g, ' '), Object.keys(document.blocks))
   const entry = level === undefined ? undefined : sideEntry(kind)
   const part = !end ? 0.5 : end.isOutput ? 0 : 1
   const place: Place = {
@@ -38,9 +42,9 @@ export function insertBlock(
   }
   const [input, output] = [kind.inputs[0], kind.outputs[0]]
   const between = wire && input && output
-  void change({
+  const version = await change({
     kind: 'add',
-    blocks: [{ name, type, place }],
+    blocks: [{ name, type, place, parameters }],
     wires: end
       ? [
           end.isOutput
@@ -54,11 +58,22 @@ export function insertBlock(
           ]
         : [],
     instead: between ? [wire] : [],
-  }).then((version) => {
-    if (version === undefined) return
-    select([name])
-    if (reveal) sheetView.reveal?.({ ...place, width: kind.width, height: kind.height })
   })
+  if (version === undefined) return undefined
+  select([name])
+  if (reveal) sheetView.reveal?.({ ...place, width: kind.width, height: kind.height })
+  return name
+}
+
+/** The point of the sheet at a point of the window. */
+export function placeAt(at: { x: number; y: number }): { x: number; y: number } {
+  const pane = document.querySelector('.react-flow__viewport')
+  const matrix = new DOMMatrix(pane ? getComputedStyle(pane).transform : undefined)
+  const corner = document.querySelector('.react-flow')?.getBoundingClientRect()
+  return {
+    x: (at.x - (corner?.x ?? 0) - matrix.e) / matrix.a,
+    y: (at.y - (corner?.y ?? 0) - matrix.f) / matrix.a,
+  }
 }
 
 /** Height of the first input, if it is at the left edge. */
@@ -79,7 +94,7 @@ export function addBlock(kind: BlockType): void {
   const { width, height } = kind
   if (!last) {
     const view = sheetView.visible?.() ?? { x: 0, y: 0, width: 600, height: 400 }
-    insertBlock(kind.type, middleOf(freeInView({ width, height }, view, boxes)), { reveal: true })
+    void insertBlock(kind.type, middleOf(freeInView({ width, height }, view, boxes)), { reveal: true })
     return
   }
   const output = last.outputs.find(({ dx }) => dx > 0)
@@ -88,7 +103,7 @@ export function addBlock(kind: BlockType): void {
   const wanted = { x: last.place.x + last.width + GAP, y, width, height }
   const found = freeBelow(wanted, boxes)
   const straight = output ? { level: level + found.y - y } : {}
-  insertBlock(kind.type, middleOf(found), { ...straight, reveal: true })
+  void insertBlock(kind.type, middleOf(found), { ...straight, reveal: true })
 }
 
 const middleOf = ({ x, y, width, height }: Rectangle) => ({ x: x + width / 2, y: y + height / 2 })

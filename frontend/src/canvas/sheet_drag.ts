@@ -109,8 +109,8 @@ export function dropHandlers(
     const at = flow.screenToFlowPosition({ x: event.clientX, y: event.clientY }, { snapToGrid: false })
     const found = wireAt(at, edges, wires)
     setInto(null)
-    if (found) insertBlock(type, { x: at.x, y: found.y }, { wire: found.wire, level: found.y })
-    else insertBlock(type, at)
+    if (found) void insertBlock(type, { x: at.x, y: found.y }, { wire: found.wire, level: found.y })
+    else void insertBlock(type, at)
   }
   const hover = (event: React.DragEvent) => {
     event.preventDefault()

@@ -4,6 +4,8 @@ import { Refusal } from '../connection'
 import type { ParameterRule, SheetBlock } from '../protocol'
 import { change, line, look, useStudio } from '../store'
 import { openMask } from '../dialogs'
+import { FunctionField } from './function_field'
+import { TableField, tableRows, tableText } from './table_field'
 import { valueText } from './value_text'
 
 const CHECK_DELAY_MS = 200
@@ -32,7 +34,7 @@ function Dialog({ block, onClose }: { block: SheetBlock; onClose: () => void }) 
   const start = useMemo(
     () =>
       Object.fromEntries(
-        rules.map((rule) => [rule.name, block.formulas[rule.name] ?? valueText(valueOf(block, rule))]),
+        rules.map((rule) => [rule.name, block.formulas[rule.name] ?? textOf(rule, valueOf(block, rule))]),
       ),
     [block, rules],
   )
@@ -62,7 +64,7 @@ function Dialog({ block, onClose }: { block: SheetBlock; onClose: () => void }) 
           </Text>
         </Group>
       }
-      size={block.opens ? 580 : 'md'}
+      size={rules.some(namesFile) ? 720 : block.opens ? 580 : 'md'}
     >
       <form
         onSubmit={(event) => {
@@ -79,6 +81,7 @@ function Dialog({ block, onClose }: { block: SheetBlock; onClose: () => void }) 
               rule={rule}
               block={block}
               text={typed[rule.name] ?? ''}
+              start={start[rule.name] ?? ''}
               focus={index === 0}
               onText={(text) => setTyped((now) => ({ ...now, [rule.name]: text }))}
               onFault={(fault) =>
@@ -152,12 +155,13 @@ interface FieldProps {
   rule: ParameterRule
   block: SheetBlock
   text: string
+  start: string
   focus: boolean
   onText: (text: string) => void
   onFault: (fault: string) => void
 }
 
-function Field({ rule, block, text, focus, onText, onFault }: FieldProps) {
+function Field({ rule, block, text, start, focus, onText, onFault }: FieldProps) {
   const robots = useStudio((s) => s.welcome?.robots)
   const files = useStudio((s) => s.welcome?.files)
   const { fault, value } = useCheck(rule, block, text, onFault)
@@ -198,8 +202,11 @@ function Field({ rule, block, text, focus, onText, onFault }: FieldProps) {
       />
     )
   }
-  if (rule.kind === 'table' || rule.kind === 'function')
-    return <TextInput {...common} value={text} readOnly />
+  if (rule.kind === 'table') {
+    const rows = tableRows(valueOf(block, rule))
+    return <TableField {...{ rule, text, rows, focus, onText, onFault }} />
+  }
+  if (rule.kind === 'function') return <FunctionField {...{ rule, block, text, start, focus, onText }} />
   return (
     <TextInput
       {...common}
@@ -247,7 +254,17 @@ function useCheck(rule: ParameterRule, block: SheetBlock, text: string, onFault:
 }
 
 function sent(rule: ParameterRule, text: string, formula: boolean): unknown {
+  // An empty text is the default: rows in the diagram, or the function of a new block.
+  if (namesFile(rule)) return text ? (rule.kind === 'table' ? JSON.parse(text) : text) : null
   return rule.kind === 'boolean' && !formula ? text === 'true' : text
+}
+
+const namesFile = ({ kind }: ParameterRule): boolean => kind === 'table' || kind === 'function'
+
+function textOf(rule: ParameterRule, value: unknown): string {
+  if (rule.kind === 'table') return tableText(value)
+  if (rule.kind === 'function') return (value as { source: string }).source
+  return valueText(value)
 }
 
 /** The origin of a parameter: the block, or its mask. */

@@ -1,5 +1,5 @@
 import { useMemo } from 'react'
-import { addBlock, insertBlock } from '../canvas/insert'
+import { addBlock, insertBlock, placeAt } from '../canvas/insert'
 import { show, useDialogs } from '../dialogs'
 import { useStudio } from '../store'
 import { Face } from './palette'
@@ -39,19 +39,9 @@ export function QuickInsert() {
       }))}
       onPick={(index) => {
         const kind = found[index]
-        if (kind && at) insertBlock(kind.type, place(at), end ? { end } : {})
+        if (kind && at) void insertBlock(kind.type, placeAt(at), end ? { end } : {})
         else if (kind) addBlock(kind)
       }}
     />
   )
-}
-
-function place(at: { x: number; y: number }): { x: number; y: number } {
-  const pane = document.querySelector('.react-flow__viewport')
-  const matrix = new DOMMatrix(pane ? getComputedStyle(pane).transform : undefined)
-  const corner = document.querySelector('.react-flow')?.getBoundingClientRect()
-  return {
-    x: (at.x - (corner?.x ?? 0) - matrix.e) / matrix.a,
-    y: (at.y - (corner?.y ?? 0) - matrix.f) / matrix.a,
-  }
 }

@@ -1,6 +1,7 @@
 import { Text } from '@mantine/core'
 import { IconFileImport } from '@tabler/icons-react'
 import { useEffect, useState } from 'react'
+import { dropTable, isTable } from '../canvas/dropped_table'
 import { ask, refuse } from '../store'
 import './robot.css'
 
@@ -23,7 +24,8 @@ export function DropZone() {
       if (!brings(event)) return
       event.preventDefault()
       setOver(false)
-      for (const file of event.dataTransfer?.files ?? []) void open(file)
+      const at = { x: event.clientX, y: event.clientY }
+      for (const file of event.dataTransfer?.files ?? []) void (isTable(file) ? bring(file, at) : open(file))
     }
     addEventListener('dragenter', enter)
     addEventListener('dragover', enter)
@@ -42,22 +44,35 @@ export function DropZone() {
       <IconFileImport size={34} />
       <Text fw={600}>Drop it to open it</Text>
       <Text size="sm">a robot script (.m), a robot or a diagram (.json)</Text>
+      <Text size="sm">measurements (.csv, .parquet, .mat, .npz) become a block of the sheet</Text>
     </div>
   )
 }
 
 /** Send a file to the server, which reads it as data; scripts are not executed. */
 export async function open(file: File): Promise<void> {
+  const content = await base64Of(file)
+  if (content !== null) await ask({ kind: 'drop', name: file.name, content })
+}
+
+/** Store a file with measurements in the project folder, and add a block that plays it back. */
+async function bring(file: File, at: { x: number; y: number }): Promise<void> {
+  const content = await base64Of(file)
+  if (content !== null) await dropTable(file.name, content, at)
+}
+
+/** The content of a file; null if it is too large. */
+async function base64Of(file: File): Promise<string | null> {
   if (file.size > MOST_BYTES) {
     refuse({
       what: `the file has ${(file.size / 2 ** 20).toFixed(1)} MiB, and 5 MiB can be dropped`,
       where: file.name,
-      fix: 'put it into the folder of the studio and open it there',
+      fix: 'put it into the folder of the studio and choose it there',
     })
-    return
+    return null
   }
   const bytes = new Uint8Array(await file.arrayBuffer())
   let text = ''
   for (let k = 0; k < bytes.length; k += 0x8000) text += String.fromCharCode(...bytes.subarray(k, k + 0x8000))
-  await ask({ kind: 'drop', name: file.name, content: btoa(text) })
+  return btoa(text)
 }

@@ -15,9 +15,9 @@ from armblocks.equations import Shape
 def entry_names(diagram: Diagram, shapes: Mapping[str, Shape]) -> Mapping[str, tuple[str, ...]]:
     """Names of the entries of signals, by path; signals without known names are omitted.
 
-    Ports of robot blocks declare names. They apply to the signal at the port, and to all vectors of the same
-    length that elementwise blocks compute from it. A signal with two different lists of names has none.
-    ``shapes`` are those of all signals. Names are for display only.
+    Ports of robot blocks and of tables declare names. They apply to the signal at the port, and to all
+    vectors of the same length that elementwise blocks compute from it. A signal with two different lists of
+    names has none. ``shapes`` are those of all signals. Names are for display only.
     """
     flat = flat_diagram(diagram)
     if not any(_may_state_names(block) for block in flat.blocks.values()):
@@ -40,7 +40,7 @@ def entry_names(diagram: Diagram, shapes: Mapping[str, Shape]) -> Mapping[str, t
 
 
 def _may_state_names(block: Block) -> bool:
-    return any(rule.kind is ParameterKind.ROBOT for rule in block.parameters())
+    return any(rule.kind in (ParameterKind.ROBOT, ParameterKind.TABLE) for rule in block.parameters())
 
 
 def _alike(

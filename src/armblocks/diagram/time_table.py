@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from armblocks.errors import InputError
+from armblocks.errors import ArmblocksError, InputError
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,13 +18,23 @@ class TimeTable:
     Two rows with the same time are a jump: the left limits, then the values. The time of the first one is
     stored as the double before it.
 
-    Compared and hashed by content; ``source`` (the file that it comes from) and ``names`` (of the m columns)
-    are not compared. Raises ``InputError`` for invalid rows.
+    Compared and hashed by content. Not compared are ``names`` and ``units`` of the m columns, ``source`` (the
+    file that the table comes from), and the choice in that file: ``time`` is the column of times and
+    ``columns`` are those of values, empty where the file determines them. User interfaces show ``shown`` as
+    the path.
+
+    A table that could not be read has its ``fault``, and zeros as rows. Its shape is usable, its values are
+    not: reading them raises the fault. Raises ``InputError`` for invalid rows.
     """
 
     rows: ArrayLike
     names: tuple[str, ...] = ()
     source: str = ""
+    units: tuple[str, ...] = ()
+    time: str = ""
+    columns: tuple[str, ...] = ()
+    shown: str = ""
+    fault: ArmblocksError | None = None
     _bytes: bytes = field(init=False, repr=False, default=b"")
 
     def __post_init__(self) -> None:
@@ -52,16 +62,34 @@ class TimeTable:
         object.__setattr__(self, "rows", rows)
         object.__setattr__(self, "_bytes", rows.tobytes())
 
+    @classmethod
+    def unread(cls, fault: ArmblocksError, source: str, *, time: str, columns: tuple[str, ...]) -> TimeTable:
+        """The table of a file that could not be read."""
+        rows = np.zeros((2, 1 + max(len(columns), 1)))
+        rows[1, 0] = 1.0
+        return cls(rows, columns, source, time=time, columns=columns, fault=fault)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Number of rows, and number of columns with that of the times."""
+        count, width = np.shape(self.rows)
+        return count, width
+
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
+        if self.fault is not None:
+            raise self.fault
         return np.array(self.rows, dtype=dtype)
 
     def __reduce__(self) -> tuple[object, ...]:
-        return TimeTable, (np.asarray(self.rows), self.names, self.source)
+        chosen = (self.units, self.time, self.columns, self.shown, self.fault)
+        return TimeTable, (np.asarray(self.rows), self.names, self.source, *chosen)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, TimeTable):
             return NotImplemented
-        return np.shape(self.rows) == np.shape(other.rows) and self._bytes == other._bytes
+        if self.fault is not None or other.fault is not None:
+            return self is other
+        return self.shape == other.shape and self._bytes == other._bytes
 
     def __hash__(self) -> int:
         return hash(self._bytes)

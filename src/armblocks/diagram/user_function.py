@@ -6,9 +6,10 @@ import inspect
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from types import FunctionType
 
-from armblocks.diagram.function_files import load_function
+from armblocks.diagram.function_files import UnloadedFunction, line_of, load_function
 from armblocks.errors import InputError
 
 
@@ -50,10 +51,23 @@ class UserFunction:
     def source(self) -> str:
         """``file.py:name`` of a function at the top level of a file, else ``""``."""
         function = self.function
+        if isinstance(function, UnloadedFunction):
+            return function.source
         if not isinstance(function, FunctionType) or "<" in function.__qualname__:
             return ""
         file = function.__code__.co_filename
         return f"{file}:{function.__qualname__}" if file.endswith(".py") else ""
+
+    @property
+    def shown(self) -> str:
+        """``file.py:name`` with the path that user interfaces show."""
+        return self.function.shown if isinstance(self.function, UnloadedFunction) else self.source
+
+    def failing_line(self, error: BaseException) -> str:
+        """``"law.py, line 7: "``, the line of the function's file that led to an error, or ``""``."""
+        file = self.source.rpartition(":")[0]
+        line = line_of(error, file) if file else 0
+        return f"{Path(file).name}, line {line}: " if line else ""
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, UserFunction):

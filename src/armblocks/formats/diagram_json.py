@@ -39,6 +39,7 @@ from pathlib import Path
 
 from armblocks.diagram import BlockLibrary, Diagram
 from armblocks.formats.canonical_json import canonical_bytes
+from armblocks.formats.data_files import DataFiles, FilesAnywhere
 from armblocks.formats.diagram_reading import INNER_KEYS, DiagramReader
 from armblocks.formats.diagram_writing import DiagramWriter
 from armblocks.formats.json_document import KeyPath, Node, read_document, split_members
@@ -64,6 +65,7 @@ def diagram_from_bytes(
     trust: bool = False,
     draft: bool = False,
     read_library: ReadFile = read_library_file,
+    read_data: DataFiles | None = None,
 ) -> Diagram:
     """The checked diagram of a document; ``library`` holds the block types that it may use.
 
@@ -71,7 +73,7 @@ def diagram_from_bytes(
     ``resolve_robot`` returns the robot of a shipped name or a path. The diagram's Python functions are
     loaded, which runs their files, only with ``trust``. With ``draft`` the diagram need not be able to run:
     inputs may be unconnected and shapes may not fit. ``read_library`` opens the libraries that blocks are
-    linked to.
+    linked to, and ``read_data`` the tables and Python functions; without it, ``trust`` applies.
 
     Raises ``FormatError`` for violations of the format, ``UnknownNameError`` for unknown types, parameters,
     blocks, ports and robots, and ``DiagramError`` for a diagram that cannot be built. All name the file, and
@@ -80,19 +82,28 @@ def diagram_from_bytes(
     root = read_document(data, name, MOST_BYTES, DEEPEST)
     members, _ = split_members(root, _DOCUMENT_KEYS)
     _check_version(root, members)
-    robots = RobotReader(members.get("robots"), folder, resolve_robot, trust=trust)
-    libraries = Libraries(folder, _entry_reader(library, resolve_robot, trust=trust), read_library)
+    files = read_data or FilesAnywhere(trust)
+    robots = RobotReader(members.get("robots"), folder, resolve_robot, files)
+    libraries = Libraries(folder, _entry_reader(library, resolve_robot, files), read_library)
     reader = DiagramReader(library, robots, libraries, draft=draft)
     return reader.diagram(root, _DOCUMENT_KEYS, Path(name).stem)
 
 
-def diagram_to_bytes(diagram: Diagram, resolve_robot: ResolveRobot, *, folder: Path | None = None) -> bytes:
+def diagram_to_bytes(
+    diagram: Diagram,
+    resolve_robot: ResolveRobot,
+    *,
+    folder: Path | None = None,
+    project: Path | None = None,
+) -> bytes:
     """The canonical document of a diagram. Reading it gives an equal diagram.
 
     A robot is written as the shortest reference that gives an equal robot; paths are relative to ``folder``.
-    Raises ``FormatError`` if JSON cannot represent a value.
+    With ``project``, a table from a file is always a reference, also if the file has changed since it was
+    read, and files of this folder have relative paths. Raises ``FormatError`` if JSON cannot represent a
+    value.
     """
-    writer = DiagramWriter(RobotWriter(folder, resolve_robot), folder)
+    writer = DiagramWriter(RobotWriter(folder, resolve_robot, project), folder)
     document = {"format": FORMAT_VERSION, **writer.diagram(diagram)}
     if diagram.mask:
         document["parameters"] = writer.values(diagram)
@@ -109,7 +120,7 @@ def read_library(
     trust: bool = False,
 ) -> Mapping[str, Diagram]:
     """All diagrams of a library file, each linked to it. Raises the errors of :func:`diagram_from_bytes`."""
-    return Libraries(None, _entry_reader(library, resolve_robot, trust=trust)).entries(path)
+    return Libraries(None, _entry_reader(library, resolve_robot, FilesAnywhere(trust))).entries(path)
 
 
 def library_to_bytes(
@@ -126,13 +137,13 @@ def library_to_bytes(
     return canonical_bytes(document, one_line=_is_placement, deepest=DEEPEST)
 
 
-def _entry_reader(library: BlockLibrary, resolve_robot: ResolveRobot, *, trust: bool) -> ReadEntry:
+def _entry_reader(library: BlockLibrary, resolve_robot: ResolveRobot, files: DataFiles) -> ReadEntry:
     """Builds the diagrams of library entries, as for any document."""
 
     def read(root: Node, entry: Node, name: str, folder: Path, libraries: Libraries) -> Diagram:
         members, _ = split_members(root, _LIBRARY_KEYS)
         _check_version(root, members)
-        robots = RobotReader(members.get("robots"), folder, resolve_robot, trust=trust)
+        robots = RobotReader(members.get("robots"), folder, resolve_robot, files)
         return DiagramReader(library, robots, libraries, draft=False).diagram(entry, INNER_KEYS, name)
 
     return read

@@ -284,7 +284,7 @@ def _value(value: object) -> str:
             where=f"function {value.name}",
         )
     if isinstance(value, TimeTable):
-        return f"ab.load_table({_text(value.source)})" if value.source else _value(_nested(value))
+        return _table(value) if value.source else _value(_nested(value))
     if isinstance(value, tuple):
         return f"[{', '.join(_value(entry) for entry in cast('tuple[object, ...]', value))}]"
     if isinstance(value, float):
@@ -292,6 +292,13 @@ def _value(value: object) -> str:
             return f'float("{value}")'
         return str(int(value)) + ".0" if value.is_integer() and abs(value) < 1e15 else repr(value)
     return _text(value) if isinstance(value, str) else repr(value)
+
+
+def _table(table: TimeTable) -> str:
+    chosen = f", time={_text(table.time)}" if table.time else ""
+    if table.columns:
+        chosen += f", columns=[{', '.join(map(_text, table.columns))}]"
+    return f"ab.load_table({_text(table.source)}{chosen})"
 
 
 def _nested(table: TimeTable) -> tuple[object, ...]:

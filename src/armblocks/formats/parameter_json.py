@@ -24,7 +24,7 @@ def parameter_from(rule: Parameter, node: Node, robots: RobotReader) -> object:
         return robots.robot(node)
     if rule.kind is ParameterKind.FUNCTION:
         return robots.function(node) if node.value else rule.default
-    if rule.kind is ParameterKind.TABLE and isinstance(node.value, str):
+    if rule.kind is ParameterKind.TABLE and isinstance(node.value, str | dict):
         return robots.table(node)
     value = _with_infinities(node.value) if rule.kind in _NUMERIC else node.value
     with located(node):

@@ -13,12 +13,13 @@ An entry is a whole robot document, or a variant. In a variant, ``robot`` is a s
 ``friction`` is ``"none"``, ``"viscous"`` (without Coulomb friction) or ``"coulomb"`` (without viscous
 friction), and ``friction_model`` is the name of the formula.
 
-A table of values over time is the path of its file, relative to the diagram's folder, or its rows. A Python
-function is ``file.py:name``; it is loaded only if the user trusts the diagram.
+A table of values over time is the reference to its file (:mod:`armblocks.formats.data_files`), or its rows. A
+Python function is ``file.py:name``; it is loaded only if the user trusts the diagram.
 """
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -26,8 +27,8 @@ from pathlib import Path
 import numpy as np
 
 from armblocks.diagram import TimeTable, UserFunction
-from armblocks.diagram.function_files import load_function
 from armblocks.errors import ArmblocksError, FormatError, UnknownNameError
+from armblocks.formats.data_files import DataFiles, FilesAnywhere, TableReference
 from armblocks.formats.json_document import Node, closed_members
 from armblocks.formats.robot_files import is_path, shipped_robot
 from armblocks.formats.robot_json import robot_from, robot_to
@@ -55,9 +56,13 @@ class RobotReader:
     """Loads the robots and tables of one document. Errors have file and line."""
 
     def __init__(
-        self, table: Node | None, folder: Path | None, resolve_robot: ResolveRobot, *, trust: bool = False
+        self,
+        table: Node | None,
+        folder: Path | None,
+        resolve_robot: ResolveRobot,
+        data: DataFiles | None = None,
     ) -> None:
-        self._trust = trust
+        self._data = data or FilesAnywhere()
         self._folder = folder
         self._resolve_robot = resolve_robot
         self._own: dict[str, Robot] = {}
@@ -71,24 +76,16 @@ class RobotReader:
 
     def table(self, node: Node) -> TimeTable:
         """The table of a file beside the document."""
-        place = Path(node.text()) if self._folder is None else self._folder / node.text()
         try:
-            return load_table(place)
+            return self._data.table(_table_reference(node), self._folder)
         except ArmblocksError as error:
             what = f"{error.where}: {error.what}" if error.where else error.what
             raise node.error(what, allowed=error.allowed, fix=error.fix) from error
 
     def function(self, node: Node) -> UserFunction:
         """The Python function of a file beside the document, if code is trusted."""
-        reference = node.text()
-        if not self._trust:
-            raise node.error(
-                f"'{reference}' is Python code, which is run only for a trusted diagram",
-                allowed="a diagram without Python functions, or one that is trusted",
-                fix="read the code, then use load_diagram(..., trust=True) or --trust",
-            )
         try:
-            return UserFunction(load_function(reference, self._folder))
+            return self._data.function(node.text(), self._folder)
         except ArmblocksError as error:
             raise node.error(error.what, allowed=error.allowed, fix=error.fix) from error
 
@@ -121,7 +118,8 @@ class RobotReader:
 class RobotWriter:
     """Writes references to the robots of one document, and collects its ``table``."""
 
-    def __init__(self, folder: Path | None, resolve_robot: ResolveRobot) -> None:
+    def __init__(self, folder: Path | None, resolve_robot: ResolveRobot, project: Path | None = None) -> None:
+        self._project = project
         self._folder = folder
         self._resolve_robot = resolve_robot
         self._known: dict[Robot, str] = {}
@@ -148,17 +146,19 @@ class RobotWriter:
                 fix="move it to a file and import it",
                 where=f"function {function.name}",
             )
-        return f"{relative_to_folder(file, self._folder)}:{name}"
+        return f"{self._path(file)}:{name}"
 
     def table_reference(self, table: TimeTable) -> object:
-        """The path of the table's file if the file still has the same numbers, else its rows."""
-        if table.source and Path(table.source).is_file():
-            try:
-                same = load_table(table.source) == table
-            except ArmblocksError:
-                same = False
-            if same:
-                return relative_to_folder(table.source, self._folder)
+        """The reference to the table's file if the file still has the same numbers, else its rows.
+
+        A file of the project is always a reference.
+        """
+        if table.source and (self._project is not None or _is_unchanged(table)):
+            path = self._path(table.source)
+            if not table.time and not table.columns:
+                return path
+            chosen = {"time": table.time, "columns": list(table.columns)}
+            return {"file": path, **{key: value for key, value in chosen.items() if value}}
         rows = np.asarray(table)
         if rows.size > MOST_INLINE:
             raise FormatError(
@@ -169,6 +169,13 @@ class RobotWriter:
             )
         return rows.tolist()
 
+    def _path(self, source: str) -> str:
+        """The path of a file from the diagram's folder, through other folders of the project if necessary."""
+        place = Path(source)
+        if self._project is not None and self._folder is not None and place.is_relative_to(self._project):
+            return Path(os.path.relpath(place, self._folder)).as_posix()
+        return relative_to_folder(source, self._folder)
+
     def _new_key(self, robot: Robot) -> str:
         """A unique key: the previous key of the robot or its name, changed if another robot has it."""
         wish = robot.source.removeprefix(OWN) if robot.source.startswith(OWN) else robot.name
@@ -176,6 +183,29 @@ class RobotWriter:
         stem = "robot" if is_path(wish) or not wish else wish
         keys = (stem if number == 1 else f"{stem} {number}" for number in range(1, len(taken) + 2))
         return next(key for key in keys if key not in taken)
+
+
+def _is_unchanged(table: TimeTable) -> bool:
+    """Whether the file of a table still contains the table."""
+    try:
+        return load_table(table.source, time=table.time, columns=table.columns) == table
+    except ArmblocksError:
+        return False
+
+
+def _table_reference(node: Node) -> TableReference:
+    if isinstance(node.value, str):
+        return TableReference(file=node.value)
+    members = closed_members(node, ("file", "time", "columns"))
+    if "file" not in members:
+        raise node.error("the key 'file' is missing", allowed="the path of a file", fix='add "file"')
+    return TableReference(
+        file=members["file"].text(),
+        time=members["time"].text() if "time" in members else "",
+        columns=tuple(entry.text() for entry in members["columns"].elements())
+        if "columns" in members
+        else (),
+    )
 
 
 def shortest_reference(

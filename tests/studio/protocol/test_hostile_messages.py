@@ -7,6 +7,7 @@ import base64
 import copy
 import json
 from collections.abc import Iterator
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -60,14 +61,24 @@ HOSTILE: tuple[Any, ...] = (
 )
 
 
+ROWS = b"time,x\n0,1\n1,2\n"
+LAW = b"def law(u):\n    return u\n"
+
+
 def requests(document: str, robot: str) -> list[dict[str, Any]]:
     """At least one valid request of every kind."""
     place = {"x": 0.0, "y": 0.0, "width": None, "height": None, "flipped": False, "rotation": 0}
     block = {"name": "new", "type": "Gain", "parameters": {"gain": "2*pi"}, "place": place}
+    kept = base64.b64encode(ROWS).decode()
+    choice = {"file": "a.csv", "time": "time", "columns": ["x"]}
+    played = {"name": "played", "type": "FromFile", "parameters": {"data": choice}, "place": place}
+    called = {"name": "f", "type": "PythonFunction", "parameters": {"function": "law.py:law"}, "place": place}
     wire = {"source": "PID/y", "target": "new/u", "bends": [1.0]}
     note = {"x": 1.0, "y": 1.0, "text": "note"}
     edits: list[dict[str, Any]] = [
         {"kind": "add", "blocks": [block], "wires": [wire]},
+        {"kind": "add", "blocks": [played]},
+        {"kind": "add", "blocks": [called]},
         {"kind": "notes", "notes": {"/1": note}},
         {"kind": "parameters", "block": "PID", "values": {"P": "1"}},
         {"kind": "move", "places": {"PID": place}, "notes": {}},
@@ -149,6 +160,16 @@ def requests(document: str, robot: str) -> list[dict[str, Any]]:
         {"kind": "readings", "document": robot, **q},
         {"kind": "robot_of_block", **to_block},
         {"kind": "robot_tables"},
+        {"kind": "data_files", "holds": "table"},
+        {"kind": "preview_table", **choice},
+        {
+            "kind": "keep_file",
+            "name": "kept.csv",
+            "content": base64.b64encode(ROWS).decode(),
+            "replace": True,
+        },
+        {"kind": "read_source", "file": "law.py"},
+        {"kind": "trust_source", "file": "law.py", "digest": sha256(LAW).hexdigest(), "trusted": False},
     ]
 
 
@@ -184,6 +205,8 @@ def folder(tmp_path: Path) -> Path:
     project.mkdir()
     (tmp_path / "secret.json").write_text("SECRET")
     (project / "link.json").symlink_to(tmp_path / "secret.json")
+    (project / "a.csv").write_bytes(ROWS)
+    (project / "law.py").write_bytes(LAW)
     (project / "arm.json").write_bytes(write_robot(load_robot("puma560")))
     return project
 

@@ -48,7 +48,8 @@ class PythonFunction(Block):
     The result of the function must depend only on its arguments. It returns one value for each name in
     ``results``.
 
-    The file of a diagram stores ``file.py:name`` and runs no code unless it is trusted.
+    The file of a diagram stores ``file.py:name`` and runs no code unless it is trusted. The studio shows the
+    code, and runs it in a separate process after you have trusted it in this form.
     """
 
     title: ClassVar[str] = "Python Function"
@@ -106,7 +107,7 @@ class PythonFunction(Block):
             raise
         except Exception as error:
             raise InputError(
-                f"{where} cannot be traced: {type(error).__name__}: {error}"[:400],
+                f"{where} cannot be traced: {user.failing_line(error)}{type(error).__name__}: {error}"[:400],
                 allowed="arithmetic, NumPy's functions, and casadi.if_else, fmin, fmax in place of branches",
                 fix="replace 'if' by casadi.if_else, max by casadi.fmax, and functions of other libraries; "
                 "or use a CalledPythonFunction, which runs at its ticks",
@@ -204,9 +205,13 @@ class CalledPythonFunction(Block):
         try:
             returned: Any = user.function(**given)
             values = [returned] if len(names) == 1 else list(returned)
+        except ArmblocksError:
+            raise
         except Exception as error:
             raise InputError(
-                f"the function {user.name} failed: {type(error).__name__}: {error}"[:400],
+                f"the function {user.name} failed: {user.failing_line(error)}{type(error).__name__}: {error}"[
+                    :400
+                ],
                 allowed="a function that takes and returns numbers and arrays",
                 fix="correct the function",
             ) from error

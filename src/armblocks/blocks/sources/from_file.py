@@ -29,11 +29,13 @@ from armblocks.equations import last_at_or_below, read_entry
 class FromFile(Block):
     """A signal from a table: y = values of the rows around t, interpolated linearly or held.
 
-    In the file of a diagram, ``data`` is the path of a CSV, NPZ, MAT or Parquet file, relative to the
-    diagram's file. In Python it is the result of ``load_table``, or rows (time, value, …). Each row is an
-    event, so that no step passes over a row. The cost of a row does not depend on the length of the table.
-    Before and after the table the first and the last row are held, or the signal is ``zero`` (after the
-    table, from the time of the last row on).
+    In the file of a diagram, ``data`` names a CSV, NPZ, MAT or Parquet file, relative to the diagram's file,
+    and the columns of the times and of the values. In the studio it is chosen in the block's dialog, with a
+    preview, or by dropping the file on the sheet. In Python it is the result of ``load_table``, or rows
+    (time, value, …). Each row is an event, so that no step passes over a row. The cost of a row does not
+    depend on the length of the table. Before and after the table the first and the last row are held, or the
+    signal is ``zero`` (after the table, from the time of the last row on). Values are not converted: the unit
+    in a header such as ``q1 [deg]`` is that of the signal.
     """
 
     memoryless: ClassVar[bool] = True
@@ -56,7 +58,17 @@ class FromFile(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         _, width = self._size
-        return (Port("y", "the values", shape=(width - 1,) if width > 2 else ()),)
+        table: TimeTable = self.data
+        units = set(table.units)
+        return (
+            Port(
+                "y",
+                "the values",
+                unit=units.pop() if len(units) == 1 else "",
+                shape=(width - 1,) if width > 2 else (),
+                names=table.names if width > 2 else (),
+            ),
+        )
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
         return (State("row", (), "index of the last row in the past, from 0; -1 before the first row"),)

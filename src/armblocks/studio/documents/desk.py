@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-import base64
 import contextlib
 from collections.abc import Mapping, Sequence
 from pathlib import PurePath
 from typing import Any
 
 from armblocks import formats
-from armblocks.errors import FormatError, InputError, UnknownNameError
+from armblocks.errors import FormatError, UnknownNameError
+from armblocks.studio.documents.dropped import dropped_bytes
 from armblocks.studio.documents.open_files import OpenFile
 from armblocks.studio.documents.presenter import Opening, Place, Presenter
 from armblocks.studio.documents.project_folder import ProjectFolder
@@ -226,17 +226,4 @@ def _dropped_data(request: document_messages.Drop) -> bytes:
             allowed=", ".join(f"{' '.join(form.suffixes)} ({form.name})" for form in formats.ROBOT_FORMATS),
             fix="save the file in one of these formats",
         )
-    try:
-        data = base64.b64decode(request.content, validate=True)
-    except ValueError:  # binascii.Error, or characters outside ASCII
-        raise InputError(
-            "the content is not base64", where=where, allowed="base64", fix="drop the file again"
-        ) from None
-    if len(data) > document_messages.MOST_DROPPED:
-        raise FormatError(
-            f"the file has {len(data)} bytes",
-            where=where,
-            allowed=f"at most {document_messages.MOST_DROPPED}",
-            fix="choose a smaller file",
-        )
-    return data
+    return dropped_bytes(request.content, where)

@@ -74,12 +74,13 @@ class ProjectFolder:
         if not self.root.is_dir():
             raise FormatError("there is no such folder", where=str(root), fix="give a folder that exists")
 
-    def path(self, relative: str, suffixes: tuple[str, ...] = READABLE) -> Path:
-        """Return the resolved path of ``relative``."""
+    def path(self, relative: str, suffixes: tuple[str, ...] = READABLE, folder: Path | None = None) -> Path:
+        """Return the resolved path of ``relative``, a path from the project or from ``folder`` in it."""
         allowed = f"a file of the project folder that ends in {' or '.join(suffixes)}"
         # A Windows share or drive is refused before the file system is accessed: the access alone would send
         # the user's credentials to the share (CVE-2024-35178).
-        strange = "\0" in relative or "\\" in relative or ":" in relative or relative.startswith("/")
+        rooted = relative.startswith("/") and folder is None
+        strange = "\0" in relative or "\\" in relative or ":" in relative or rooted
         if not relative or strange or len(relative) > 1000:
             raise FormatError(
                 f"{relative[:80]!r} is not a path of the project",
@@ -87,7 +88,7 @@ class ProjectFolder:
                 where="project folder",
                 fix="choose a file of the project",
             )
-        found = (self.root / relative).resolve()
+        found = ((folder or self.root) / relative).resolve()
         if not found.is_relative_to(self.root) or found == self.root:
             raise FormatError(
                 f"'{relative[:80]}' is outside of the project folder",
@@ -141,6 +142,12 @@ class ProjectFolder:
             ) from error
         return Fingerprint.of(write_atomically(path, data), data)
 
+    def keep(self, relative: str, data: bytes, suffixes: tuple[str, ...]) -> None:
+        """Write a data file at the top of the folder, atomically."""
+        path = self.path(relative, suffixes)
+        check_file_name(relative)
+        write_atomically(path, data)
+
     def exists(self, relative: str) -> bool:
         """Whether the file exists."""
         return self.path(relative).exists()
@@ -170,15 +177,15 @@ class ProjectFolder:
                     if _STRAY.fullmatch(path.name) and time() - path.stat().st_mtime > STRAY_SECONDS:
                         path.unlink()
 
-    def files(self) -> list[str]:
-        """Paths of the files that can be opened, without hidden folders; at most :data:`MOST_FILES`."""
-        return sorted(_first(self._walk(), MOST_FILES))
+    def files(self, suffixes: tuple[str, ...] = READABLE) -> list[str]:
+        """Paths of the files with these suffixes, without hidden folders; at most :data:`MOST_FILES`."""
+        return sorted(_first(self._walk(suffixes), MOST_FILES))
 
-    def _walk(self) -> Iterator[str]:
+    def _walk(self, suffixes: tuple[str, ...]) -> Iterator[str]:
         for folder, folders, names in os.walk(self.root):
             folders[:] = sorted(f for f in folders if not f.startswith(".") and f not in _HIDDEN)
             for name in sorted(names):
-                if name.startswith(".") or Path(name).suffix.lower() not in READABLE:
+                if name.startswith(".") or Path(name).suffix.lower() not in suffixes:
                     continue
                 yield (Path(folder) / name).relative_to(self.root).as_posix()
 

@@ -82,6 +82,10 @@ class StateFolder:
     def _recent(self) -> Path:
         return self.root / "recent.json"
 
+    def write_private(self, name: str, value: object) -> None:
+        """Write a small file of this folder; write errors are ignored."""
+        self._write(self.root / name, value)
+
     def _write(self, path: Path, value: object) -> None:
         """Write a small file of this folder; write errors are ignored."""
         try:

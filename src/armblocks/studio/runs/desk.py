@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import secrets
+from collections.abc import Callable
+from typing import Any
 
-from armblocks import formats
+from armblocks.diagram import Diagram
 from armblocks.errors import InputError, UnknownNameError
-from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.protocol.answers import Answers
 from armblocks.studio.protocol.message import Message
 from armblocks.studio.protocol.messages import runs as run_messages
@@ -17,7 +18,6 @@ from armblocks.studio.runs.record import RunRecord
 from armblocks.studio.runs.report import report_of
 from armblocks.studio.runs.workers import Workers
 from armblocks.studio.sheet.open_documents import OpenDocuments
-from armblocks.studio.sheet.parameter_values import ResolveRobot
 
 PAGE_SECONDS = 1.5
 """Delay of the first worker process after a page was opened, so that the page can draw first, s."""
@@ -27,18 +27,13 @@ class RunDesk:
     """Starts runs, passes commands to them, and sends their messages to all pages that show the diagram."""
 
     def __init__(
-        self,
-        folder: ProjectFolder,
-        pages: Pages,
-        diagrams: OpenDocuments,
-        resolve_robot: ResolveRobot,
+        self, pages: Pages, diagrams: OpenDocuments, job: Callable[[Diagram], dict[str, Any]]
     ) -> None:
         self.processes: dict[str, RunProcess] = {}
         self.workers = Workers()
-        self._folder = folder
         self._pages = pages
         self._diagrams = diagrams
-        self._resolve_robot = resolve_robot
+        self._job = job
         self._records: dict[str, RunRecord] = {}
         self._sending: set[asyncio.Task[None]] = set()
 
@@ -99,14 +94,7 @@ class RunDesk:
                 other.end()
                 del self.processes[other.key]
                 self._records.pop(other.key).close()
-        job = {
-            "diagram": formats.diagram_to_bytes(
-                open_file.document.diagram, self._resolve_robot, folder=self._folder.root
-            ).decode(),
-            "folder": str(self._folder.root),
-            "speed": request.speed,
-            "tuned": request.tuned,
-        }
+        job = {**self._job(open_file.document.diagram), "speed": request.speed, "tuned": request.tuned}
         run = RunProcess(key, open_file.key, worker, notify)
         self.processes[key], self._records[key] = run, record
         run.start(job)

@@ -6,7 +6,6 @@ changes during the run and its interruption are not repeated.
 
 from __future__ import annotations
 
-import asyncio
 import tempfile
 from collections.abc import Mapping
 from multiprocessing.connection import Connection
@@ -15,7 +14,7 @@ from typing import Any
 
 from armblocks.errors import ArmblocksError, SimulationError
 from armblocks.studio.runs.worker import begun, limit_process
-from armblocks.studio.runs.workers import process_context
+from armblocks.studio.runs.workers import answer_of
 
 MOST_SECONDS = 300.0
 
@@ -25,23 +24,11 @@ async def report_of(job: Mapping[str, Any]) -> bytes:
 
     Raises ``SimulationError`` with the error of the run or of the report, or if the report takes too long.
     """
-    context = process_context()
-    ours, theirs = context.Pipe(duplex=False)
-    process = context.Process(target=write, args=(theirs, dict(job)), daemon=True)
-    process.start()
-    theirs.close()
-    try:
-        return await asyncio.to_thread(_received, ours)
-    finally:
-        process.kill()
-        ours.close()
+    return _page(await answer_of(write, job, MOST_SECONDS))
 
 
-def _received(pipe: Connection) -> bytes:
-    try:
-        reply = pipe.recv_bytes() if pipe.poll(MOST_SECONDS) else b""
-    except EOFError:
-        reply = b""
+def _page(reply: bytes) -> bytes:
+    """The page in a reply of the process. Raises ``SimulationError``."""
     if not reply:
         raise SimulationError(
             "the report exceeded its time or memory limit",

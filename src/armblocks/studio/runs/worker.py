@@ -1,8 +1,9 @@
 """The worker process of one run: started in advance, given one job, ended with the run.
 
-A job is JSON: ``diagram`` (a canonical document), ``folder`` (for robot files of the project), ``run`` and
-``document`` (keys), ``speed`` (simulated seconds per second, ``null`` for as fast as possible), ``tuned``
-(trial values of tunable parameters). Commands are the requests of :mod:`armblocks.studio.protocol.messages`;
+A job is JSON: ``diagram`` (a canonical document), ``folder`` (for files of the project), ``trusted`` (paths
+and digests of Python files whose code may run), ``run`` and ``document`` (keys), ``speed``
+(simulated seconds per second, ``null`` for as fast as possible), ``tuned`` (trial values of tunable
+parameters). Commands are the requests of :mod:`armblocks.studio.protocol.messages`;
 the worker executes them between two parts of the run.
 """
 
@@ -15,7 +16,6 @@ import signal
 import sys
 from collections.abc import Mapping
 from multiprocessing.connection import Connection
-from pathlib import Path
 from time import perf_counter, sleep
 from typing import Any, Literal
 
@@ -25,13 +25,15 @@ from numpy.typing import NDArray
 from armblocks import formats
 from armblocks.blocks import BLOCKS
 from armblocks.compiler.target import host_target
-from armblocks.diagram import diagram_views
-from armblocks.errors import ArmblocksError, SimulationError
+from armblocks.diagram import Diagram, TimeTable, diagram_views
+from armblocks.errors import ArmblocksError, DiagramError, SimulationError
 from armblocks.face.diagram_run import DiagramRun
 from armblocks.face.model import CompiledDiagram
 from armblocks.simulation import SimulationResult
 from armblocks.simulation.jumps import Jumps, merged
+from armblocks.studio.documents.project_data import ProjectData, files_of, unloaded_fault
 from armblocks.studio.documents.project_folder import ProjectFolder
+from armblocks.studio.documents.trusted_files import TrustedFiles
 from armblocks.studio.protocol.frames import sample_frame, thinned
 from armblocks.studio.protocol.messages import runs as run_messages
 from armblocks.studio.runs.history import RunHistory
@@ -77,20 +79,30 @@ def limit_process() -> None:
 
 def begun(job: Mapping[str, Any]) -> RunHistory:
     """Return the run of a job before its first step; raises ``ArmblocksError``."""
-    folder = Path(job["folder"])
-    diagram = formats.diagram_from_bytes(
-        job["diagram"].encode(),
-        "model",
-        BLOCKS,
-        formats.load_robot,
-        folder=folder,
-        read_library=ProjectFolder(folder).read_library,
-        draft=True,  # tracing rejects diagrams that cannot run
-    )
+    diagram = diagram_of(job)
+    for path, value in files_of(diagram):
+        fault = value.fault if isinstance(value, TimeTable) else unloaded_fault(value)
+        if fault is not None:
+            raise DiagramError(fault.what, where=f"block '{path}'", allowed=fault.allowed, fix=fault.fix)
     history = RunHistory(CompiledDiagram(diagram))
     for path, value in job["tuned"].items():
         history.tune(path, tuned_value(value, path))
     return history
+
+
+def diagram_of(job: Mapping[str, Any]) -> Diagram:
+    """Return the diagram of a job, possibly incomplete; runs the code of its trusted Python files."""
+    folder = ProjectFolder(job["folder"])
+    return formats.diagram_from_bytes(
+        job["diagram"].encode(),
+        "model",
+        BLOCKS,
+        formats.load_robot,
+        folder=folder.root,
+        read_library=folder.read_library,
+        read_data=ProjectData(folder, TrustedFiles(pairs=job.get("trusted", ())), runs_code=True),
+        draft=True,  # tracing rejects diagrams that cannot run
+    )
 
 
 class _Run:

@@ -10,15 +10,21 @@ from __future__ import annotations
 import asyncio
 import multiprocessing
 import sys
+from collections.abc import Callable, Mapping
 from multiprocessing.connection import Connection
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from armblocks.errors import SimulationError
 
 if TYPE_CHECKING:
     from multiprocessing.context import ForkServerContext, SpawnContext
 
-COPIED = ("__main__", "armblocks.studio.runs.worker", "armblocks.studio.runs.report")
+COPIED = (
+    "__main__",
+    "armblocks.studio.runs.worker",
+    "armblocks.studio.runs.report",
+    "armblocks.studio.runs.checks",
+)
 """Modules that the fork server imports."""
 
 
@@ -29,6 +35,29 @@ def process_context() -> ForkServerContext | SpawnContext:
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(list(COPIED))
     return context
+
+
+async def answer_of(
+    answer: Callable[[Connection, dict[str, Any]], None], job: Mapping[str, Any], seconds: float
+) -> bytes:
+    """Let a new process send one message about a job; ``b""`` if it ends or takes longer."""
+    context = process_context()
+    ours, theirs = context.Pipe(duplex=False)
+    process = context.Process(target=answer, args=(theirs, dict(job)), daemon=True)
+    await asyncio.to_thread(process.start)
+    theirs.close()
+    try:
+        return await asyncio.to_thread(_received, ours, seconds)
+    finally:
+        process.kill()
+        ours.close()
+
+
+def _received(pipe: Connection, seconds: float) -> bytes:
+    try:
+        return pipe.recv_bytes() if pipe.poll(seconds) else b""
+    except (EOFError, OSError):
+        return b""
 
 
 def _work(pipe: Connection) -> None:

@@ -19,8 +19,10 @@ from armblocks.drawing.diagram_file import drawing_bytes
 from armblocks.errors import ArmblocksError, InertiaWarning
 from armblocks.robot import Robot
 from armblocks.studio.documents.desk import DocumentDesk
+from armblocks.studio.documents.project_data import ProjectData
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.documents.state_folder import StateFolder
+from armblocks.studio.documents.trusted_files import TrustedFiles
 from armblocks.studio.protocol.answers import Answers
 from armblocks.studio.protocol.envelope import Envelope, Reply
 from armblocks.studio.protocol.message import Fault
@@ -29,8 +31,10 @@ from armblocks.studio.protocol.page import NoRequestError, Page, Pages
 from armblocks.studio.robots.desk import RobotDesk
 from armblocks.studio.robots.open_robots import OpenRobots
 from armblocks.studio.robots.presenter import RobotPresenter
+from armblocks.studio.runs.checks import Checks
 from armblocks.studio.runs.desk import RunDesk
 from armblocks.studio.runs.settings import setting_rules, solver_choices
+from armblocks.studio.sheet.data_desk import DataDesk
 from armblocks.studio.sheet.lines import LinesOfSheets
 from armblocks.studio.sheet.nesting import with_robot
 from armblocks.studio.sheet.open_documents import OpenDocuments
@@ -61,21 +65,21 @@ class Hub:
         self._folder = folder
         self._kept = StateFolder(folder.root)
         self._pages = Pages()
-        self._diagrams = OpenDocuments(folder, self._kept, self._resolve_robot)
-        self.runs = RunDesk(folder, self._pages, self._diagrams, self._resolve_robot)
+        data = ProjectData(folder, TrustedFiles(self._kept))
+        checks = Checks(data, self._resolve_robot)
+        self._diagrams = OpenDocuments(folder, self._kept, self._resolve_robot, data)
+        self.runs = RunDesk(self._pages, self._diagrams, checks.job)
         lines = LinesOfSheets()
         robots = RobotPresenter(OpenRobots(folder, self._kept), folder, self._robot_saved)
-        self.documents = DocumentDesk(
-            folder,
-            self._pages,
-            {"diagram": DiagramPresenter(self._diagrams, self._pages, self.runs, lines), "robot": robots},
-        )
+        self._shown = DiagramPresenter(self._diagrams, self._pages, self.runs, lines, checks.of)
+        self.documents = DocumentDesk(folder, self._pages, {"diagram": self._shown, "robot": robots})
         self.answers = Answers()
         self.answers.on(Ping, self._ping)
         self.answers.on(Files, self._files)
         for part in (
             self.documents,
             SheetQueries(folder, self.documents, self._diagrams, self._resolve_robot, lines),
+            DataDesk(data, self._files_changed),
             RobotDesk(folder, self.documents, robots, self._diagrams),
             self.runs,
         ):
@@ -176,6 +180,11 @@ class Hub:
         with warnings.catch_warnings():  # the robot editor shows them
             warnings.simplefilter("ignore", InertiaWarning)
             return formats.load_robot(self._folder.robot_path(name, formats.list_robots()))
+
+    def _files_changed(self) -> None:
+        """Check all open diagrams again after a change of a table or of the trust in a Python file."""
+        for found in self._diagrams:
+            self._shown.changed(found)
 
     async def _robot_saved(self, robot: Robot) -> None:
         """Update the diagrams that use a robot whose file was saved, as one undo step each."""

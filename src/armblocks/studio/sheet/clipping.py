@@ -59,7 +59,7 @@ def clipped(
         mask=diagram.mask,
         mask_values=diagram.mask_values,
     )
-    return formats.diagram_to_bytes(part, resolve_robot, folder=folder).decode()
+    return formats.diagram_to_bytes(part, resolve_robot, folder=folder, project=folder).decode()
 
 
 def pasted(

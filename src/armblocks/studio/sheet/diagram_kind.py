@@ -9,6 +9,7 @@ from armblocks import formats
 from armblocks.blocks import BLOCKS
 from armblocks.diagram import Diagram
 from armblocks.errors import UnknownNameError
+from armblocks.formats.data_files import DataFiles
 from armblocks.studio.documents.file_kind import FileKind
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.sheet.document import Document
@@ -21,9 +22,10 @@ class DiagramKind(FileKind[Diagram, Document]):
 
     name = "diagram"
 
-    def __init__(self, folder: ProjectFolder, resolve_robot: ResolveRobot) -> None:
+    def __init__(self, folder: ProjectFolder, resolve_robot: ResolveRobot, data: DataFiles) -> None:
         self._folder = folder
         self._resolve_robot = resolve_robot
+        self._data = data
 
     def new(self) -> Diagram:
         """An empty diagram."""
@@ -38,7 +40,9 @@ class DiagramKind(FileKind[Diagram, Document]):
 
     def edited(self, value: Diagram, version: int = 0) -> Document:
         """An open diagram."""
-        return Document(value, self._resolve_robot, version=version, read_diagram=self.from_text)
+        return Document(
+            value, self._resolve_robot, version=version, read_diagram=self.from_text, data=self._data
+        )
 
     def from_file(self, data: bytes, place: Path) -> Diagram:
         """Read a diagram and place every block; it may be linked to libraries of the project."""
@@ -50,12 +54,14 @@ class DiagramKind(FileKind[Diagram, Document]):
             folder=place.parent,
             draft=True,
             read_library=self._folder.read_library,
+            read_data=self._data,
         )
         return placed(read)
 
     def to_file(self, value: Diagram, place: Path) -> bytes:
         """The canonical document of the diagram; paths of project robots are relative to its folder."""
-        return formats.diagram_to_bytes(value, self._resolve_robot, folder=place.parent)
+        root = self._folder.root
+        return formats.diagram_to_bytes(value, self._resolve_robot, folder=place.parent, project=root)
 
     def renamed(self, value: Diagram, place: Path) -> Diagram:
         """Return the diagram with the name of its file."""
@@ -74,12 +80,14 @@ class DiagramKind(FileKind[Diagram, Document]):
             folder=self._folder.root,
             draft=True,
             read_library=self._folder.read_library,
+            read_data=self._data,
         )
         return placed(read)
 
     def to_text(self, value: Diagram) -> str:
         """The canonical document of the diagram."""
-        return formats.diagram_to_bytes(value, self._resolve_robot, folder=self._folder.root).decode()
+        root = self._folder.root
+        return formats.diagram_to_bytes(value, self._resolve_robot, folder=root, project=root).decode()
 
     def parts(self, value: Diagram) -> int:
         """Number of blocks of the top sheet."""

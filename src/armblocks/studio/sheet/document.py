@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from armblocks.diagram import Diagram
+from armblocks.formats.data_files import DataFiles
 from armblocks.studio.documents.aspects import Aspect, changed_aspects
 from armblocks.studio.documents.edited import Edited, Outcome
 from armblocks.studio.protocol.messages.documents import Change
@@ -30,9 +31,10 @@ class Document(Edited[Diagram]):
         *,
         version: int = 0,
         read_diagram: ReadDiagram | None = None,
+        data: DataFiles | None = None,
     ) -> None:
         super().__init__(diagram, version=version)
-        self._context = EditContext(resolve_robot, read_diagram or reader(resolve_robot))
+        self._context = EditContext(resolve_robot, read_diagram or reader(resolve_robot), data)
 
     @property
     def diagram(self) -> Diagram:

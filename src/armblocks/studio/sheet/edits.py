@@ -31,6 +31,7 @@ from armblocks.diagram.mask import Scope
 from armblocks.diagram.names import folded
 from armblocks.drawing.wires import moved_bends
 from armblocks.errors import DiagramError, UnknownNameError
+from armblocks.formats.data_files import DataFiles
 from armblocks.studio.documents.edit_table import EditTable
 from armblocks.studio.protocol.messages.sheet_edits import (
     AddBlocks,
@@ -71,10 +72,11 @@ MOST_BLOCKS = 20_000
 
 @dataclasses.dataclass(frozen=True)
 class EditContext:
-    """Functions that edits need besides the diagram: search for robots, and reading of copied blocks."""
+    """What edits need besides the diagram: search for robots, reading of copied blocks and of data files."""
 
     resolve_robot: ResolveRobot
     read_diagram: ReadDiagram
+    data: DataFiles | None = None
 
 
 EDITS: EditTable[Diagram, [EditContext]] = EditTable()
@@ -107,7 +109,7 @@ def _add(edit: AddBlocks, diagram: Diagram, context: EditContext) -> Diagram:
     for new in edit.blocks:
         check_free(new.name, taken, where)
         taken[folded(new.name)] = new.name
-        blocks[new.name] = _made(new, diagram.mask_values, context.resolve_robot)
+        blocks[new.name] = _made(new, diagram.mask_values, context)
         layout[new.name] = _placement(new.place)
     added = dataclasses.replace(diagram, blocks=blocks, layout=layout)
     if edit.instead:
@@ -133,18 +135,19 @@ def _check_room(diagram: Diagram, more: int) -> None:
         )
 
 
-def _made(new: NewBlock, scope: Scope, resolve_robot: ResolveRobot) -> Block:
+def _made(new: NewBlock, scope: Scope, context: EditContext) -> Block:
+    resolve_robot, where = context.resolve_robot, f"block '{new.name}'"
     kind = BLOCKS[new.type]
     rules = {rule.name: rule for rule in kind.parameters()}
     values: dict[str, Any] = {}
     for name, value in new.parameters.items():
         if name not in rules:
-            raise UnknownNameError(f"parameter of {new.type}", name, rules, where=f"block '{new.name}'")
-        values[name] = parameter_value(rules[name], value, f"block '{new.name}'", resolve_robot, scope)
+            raise UnknownNameError(f"parameter of {new.type}", name, rules, where=where)
+        values[name] = parameter_value(rules[name], value, where, resolve_robot, scope, context.data)
     for name, rule in rules.items():
         if rule.required and name not in values:
             default = DEFAULT_ROBOT if rule.kind is ParameterKind.ROBOT else None
-            values[name] = parameter_value(rule, default, f"block '{new.name}'", resolve_robot)
+            values[name] = parameter_value(rule, default, where, resolve_robot)
     made = kind(**values)
     # The sheet of a new subsystem must be drawable as well.
     return dataclasses.replace(made, diagram=placed(made.diagram)) if isinstance(made, DiagramBlock) else made
@@ -338,7 +341,9 @@ def _set_parameters(edit: SetParameters, diagram: Diagram, context: EditContext)
     for name, value in edit.values.items():
         if name not in rules:
             raise UnknownNameError("parameter", name, rules, where=where)
-        values[name] = parameter_value(rules[name], value, where, context.resolve_robot, diagram.mask_values)
+        values[name] = parameter_value(
+            rules[name], value, where, context.resolve_robot, diagram.mask_values, context.data
+        )
     changed = block_in_scope(edit.block, old.with_parameters(**values), diagram.mask_values)
     return with_block(diagram, edit.block, changed)
 

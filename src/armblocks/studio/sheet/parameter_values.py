@@ -7,14 +7,13 @@ and scripts, :mod:`armblocks.matlab`; Python evaluates nothing.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, cast
-
-import numpy as np
 
 from armblocks.diagram import Parameter, ParameterFormula, ParameterKind, TimeTable, UserFunction
 from armblocks.diagram.mask import Scope, formula_number, formula_value, parameters_read
 from armblocks.errors import InputError, UnknownNameError
+from armblocks.formats.data_files import DataFiles, TableReference
 from armblocks.robot import Robot
 
 ResolveRobot = Callable[[str], Robot]
@@ -26,18 +25,28 @@ _INFINITIES = {"inf": math.inf, "-inf": -math.inf}
 
 
 def parameter_value(
-    rule: Parameter, typed: Any, where: str, resolve_robot: ResolveRobot, scope: Scope | None = None
+    rule: Parameter,
+    typed: Any,
+    where: str,
+    resolve_robot: ResolveRobot,
+    scope: Scope | None = None,
+    data: DataFiles | None = None,
 ) -> Any:
     """Return the checked value of a parameter that a page sends; ``None`` selects the default.
 
-    A text that contains mask parameters of the diagram, ``scope``, is stored as a formula. Raises
-    ``InputError`` with the place ``where`` (a block) and the parameter name.
+    A text that contains mask parameters of the diagram, ``scope``, is stored as a formula. ``data`` reads
+    tables and functions of files. Raises ``InputError`` with the place ``where`` (a block) and the parameter
+    name.
     """
     place = f"{where}, parameter '{rule.name}'"
     if typed is None and not rule.required:
         return rule.default
     if rule.kind is ParameterKind.ROBOT:
         return _robot(rule, typed, place, resolve_robot)
+    if data is not None and rule.kind is ParameterKind.TABLE and isinstance(typed, dict):
+        return rule.check(data.table(_table_reference(cast("dict[str, Any]", typed), place), None), place)
+    if data is not None and rule.kind is ParameterKind.FUNCTION and isinstance(typed, str):
+        return rule.check(data.function(typed, None), place)
     if isinstance(typed, str) and scope:
         numeric = rule.kind in _NUMERIC
         if typed.strip() in scope or (numeric and parameters_read(typed, scope, place)):
@@ -89,9 +98,9 @@ def parameter_json(value: Any) -> Any:
     if isinstance(value, Robot):
         return {"robot": value.name, "source": value.source}
     if isinstance(value, TimeTable):
-        return {"table": f"{np.shape(value.rows)[0]} rows", "source": value.source}
+        return _table_json(value)
     if isinstance(value, UserFunction):
-        return {"function": value.name, "source": ""}
+        return {"function": value.name, "source": value.shown}
     if isinstance(value, complex):
         return f"{value.real!r}{value.imag:+}i" if value.imag else parameter_json(value.real)
     if isinstance(value, tuple):
@@ -99,6 +108,31 @@ def parameter_json(value: Any) -> Any:
     if isinstance(value, float) and math.isinf(value):
         return "inf" if value > 0 else "-inf"
     return value
+
+
+def _table_json(table: TimeTable) -> dict[str, Any]:
+    """A table as pages see it: its size, and the file and columns that :func:`parameter_value` takes."""
+    count, width = table.shape
+    values = f"{width - 1} column{'' if width == 2 else 's'} of values"
+    return {
+        "table": f"{count} rows, {values}",
+        "source": table.shown or table.source,
+        "time": table.time,
+        "columns": list(table.columns),
+    }
+
+
+def _table_reference(typed: Mapping[str, Any], place: str) -> TableReference:
+    file, time, columns = typed.get("file"), typed.get("time", ""), typed.get("columns", [])
+    names = cast("list[Any]", columns) if isinstance(columns, list) else [None]
+    if not (isinstance(file, str) and isinstance(time, str) and all(isinstance(name, str) for name in names)):
+        raise InputError(
+            "this is not a choice of columns",
+            where=place,
+            allowed="a file of the project, a column of times, and columns of values",
+            fix="choose a file",
+        )
+    return TableReference(file=file, time=time, columns=tuple(map(str, names)))
 
 
 def _robot(rule: Parameter, typed: Any, place: str, resolve_robot: ResolveRobot) -> Any:

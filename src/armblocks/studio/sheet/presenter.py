@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import asyncio
 import dataclasses
+from collections.abc import Awaitable, Callable
 from typing import Protocol
 
 from armblocks.diagram import Diagram
 from armblocks.errors import UnknownNameError
 from armblocks.studio.documents.presenter import Opening, Place, Presenter
-from armblocks.studio.protocol.messages.sheets import Checked, DiagramChange, DiagramContent
+from armblocks.studio.protocol.messages.sheets import (
+    Checked,
+    DiagramChange,
+    DiagramContent,
+    Finding,
+    WireKind,
+)
 from armblocks.studio.protocol.page import Page, Pages
-from armblocks.studio.sheet.check import check
 from armblocks.studio.sheet.lines import LinesOfSheets, other_lines
 from armblocks.studio.sheet.nesting import inside, linked_part
 from armblocks.studio.sheet.open_documents import OpenDocument, OpenDocuments
@@ -33,13 +39,23 @@ class RunsOfDiagrams(Protocol):
         ...
 
 
+CheckDiagram = Callable[[Diagram], Awaitable[tuple[list[Finding], dict[str, WireKind]]]]
+"""Returns the findings of a diagram, and the known types of its signals."""
+
+
 class DiagramPresenter(Presenter[OpenDocument]):
     """Shows on each page the sheet of a diagram that the page has selected."""
 
     def __init__(
-        self, files: OpenDocuments, pages: Pages, runs: RunsOfDiagrams, lines: LinesOfSheets
+        self,
+        files: OpenDocuments,
+        pages: Pages,
+        runs: RunsOfDiagrams,
+        lines: LinesOfSheets,
+        check: CheckDiagram,
     ) -> None:
         super().__init__(files)
+        self._check_diagram = check
         self._lines = lines
         self._documents = files
         self._pages = pages
@@ -98,7 +114,7 @@ class DiagramPresenter(Presenter[OpenDocument]):
     async def _check(self, open_file: OpenDocument) -> None:
         await asyncio.sleep(STILL_SECONDS)
         diagram, version_now = open_file.document.diagram, open_file.document.version
-        findings, wires = await asyncio.to_thread(check, diagram)
+        findings, wires = await self._check_diagram(diagram)
         if open_file.document.version == version_now:
             event = Checked(document=open_file.key, version=version_now, findings=findings, wires=wires)
             await self._pages.notify_showing(open_file.key, event)

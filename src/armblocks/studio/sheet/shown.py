@@ -128,9 +128,14 @@ def _sheet_block(name: str, block: Block, diagram: Diagram) -> SheetBlock:
     shown = drawn_blocks(diagram)[name]
     drawn = _drawn(shown, dataclasses.replace(place, x=0.0, y=0.0), sum_sides(diagram).get(name))
     own: dict[str, Any] = {"name": name, "place": Place(**dataclasses.asdict(place))}
-    if shown is not block:
-        own["parameters"] = _parameters(block)
+    if shown is not block or _names_files(type(block)):
+        own["parameters"] = _parameters(block)  # equal tables may come from different files
     return drawn.model_copy(update=own)
+
+
+@lru_cache(maxsize=1024)
+def _names_files(kind: type[Block]) -> bool:
+    return any(rule.kind is ParameterKind.TABLE for rule in kind.parameters())
 
 
 @lru_cache(maxsize=4096)

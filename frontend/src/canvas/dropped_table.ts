@@ -1,0 +1,53 @@
+import { create } from 'zustand'
+import { show } from '../dialogs'
+import { ask, refuse, useStudio } from '../store'
+import { named } from './table_choice'
+import { insertBlock, placeAt } from './insert'
+
+const SUFFIXES = /\.(csv|npz|mat|parquet)$/i
+
+/** Whether a file contains a table of measurements, by its name. */
+export const isTable = (file: File): boolean => SUFFIXES.test(file.name)
+
+/** A dropped table that waits for a decision: another file has its name. */
+export interface DroppedTable {
+  name: string
+  content: string
+  at: { x: number; y: number }
+}
+
+export const useDroppedTable = create<{ waiting: DroppedTable | null }>(() => ({ waiting: null }))
+
+/** Store a dropped table in the project folder and add a block with it, unless another file has its name. */
+export async function dropTable(name: string, content: string, at: DroppedTable['at']): Promise<void> {
+  if (!useStudio.getState().document) {
+    refuse({ what: 'no diagram is open', where: name, fix: 'open a diagram, and drop the file on its sheet' })
+    return
+  }
+  const kept = await ask({ kind: 'keep_file', name, content })
+  if (!kept) return
+  if (kept.stored) return addTableBlock(kept.path, at)
+  useDroppedTable.setState({ waiting: { name, content, at } })
+  show('dropped_table')
+}
+
+/** Replace the file of the same name. */
+export async function replaceTable({ name, content, at }: DroppedTable): Promise<void> {
+  const kept = await ask({ kind: 'keep_file', name, content, replace: true })
+  if (kept) await addTableBlock(kept.path, at)
+}
+
+/** Add a block whose parameter is the table of a file, and open its dialog for the choice of columns. */
+export async function addTableBlock(file: string, at: DroppedTable['at']): Promise<void> {
+  for (const kind of useStudio.getState().library.values()) {
+    const rule = kind.parameters.find((parameter) => parameter.kind === 'table')
+    if (!rule) continue
+    const stem = file.replace(/^.*\//, '').replace(SUFFIXES, '')
+    const choice = { file, time: '', columns: [] }
+    const preview = await ask({ kind: 'preview_table', ...choice })
+    const parameters = { [rule.name]: preview ? named(choice, preview) : choice }
+    const name = await insertBlock(kind.type, placeAt(at), { parameters, name: stem })
+    if (name !== undefined) useStudio.getState().edit(name)
+    return
+  }
+}

@@ -1,0 +1,36 @@
+import { Button, Group, Modal, Stack, Text } from '@mantine/core'
+import { show, useDialogs } from '../dialogs'
+import { addTableBlock, replaceTable, useDroppedTable } from './dropped_table'
+
+/** Another file of the project has the name of a dropped table. */
+export function DroppedTableDialog() {
+  const opened = useDialogs((s) => s.open === 'dropped_table')
+  const waiting = useDroppedTable((s) => s.waiting)
+  const close = () => show(null)
+  if (!waiting) return null
+  const go = (act: () => Promise<void>) => {
+    close()
+    void act()
+  }
+  return (
+    <Modal opened={opened} onClose={close} title={`Replace ${waiting.name}?`} size="md">
+      <Stack gap="sm">
+        <Text size="sm">
+          The folder of the studio contains another file with this name. Blocks that use it would get the new
+          values.
+        </Text>
+        <Group justify="flex-end" gap="xs">
+          <Button variant="default" onClick={close} data-autofocus>
+            Cancel
+          </Button>
+          <Button variant="default" onClick={() => go(() => addTableBlock(waiting.name, waiting.at))}>
+            Use the present file
+          </Button>
+          <Button color="red" onClick={() => go(() => replaceTable(waiting))}>
+            Replace
+          </Button>
+        </Group>
+      </Stack>
+    </Modal>
+  )
+}

@@ -1,0 +1,43 @@
+import { Select } from '@mantine/core'
+import { useEffect, useState } from 'react'
+import type { DataFile } from '../protocol'
+import { SCROLLED } from '../scrolled'
+import { ask } from '../store'
+
+interface Props {
+  holds: 'table' | 'function'
+  label: React.ReactNode
+  description: string
+  /** The path of the file from the project folder, or `''`. */
+  file: string
+  focus: boolean
+  onFile: (file: string) => void
+}
+
+const WORDS = {
+  table: 'No CSV, NPZ, MAT or Parquet file in the folder of the studio: drop one on the sheet.',
+  function: 'No Python file in the folder of the studio.',
+}
+
+/** Chooses a file of the project folder by typing a part of its path. */
+export function DataFileSelect({ holds, label, description, file, focus, onFile }: Props) {
+  const [files, setFiles] = useState<DataFile[] | null>(null)
+  useEffect(() => void ask({ kind: 'data_files', holds }).then((found) => setFiles(found ?? [])), [holds])
+  const known = files?.map(({ path }) => path) ?? []
+  return (
+    <Select
+      {...SCROLLED}
+      searchable
+      openOnFocus={false}
+      selectFirstOptionOnChange
+      label={label}
+      description={description}
+      data={file && !known.includes(file) ? [file, ...known] : known}
+      value={file || null}
+      placeholder="Choose a file"
+      onChange={(next) => next && onFile(next)}
+      nothingFoundMessage={files?.length ? 'no such file' : files ? WORDS[holds] : 'reading the folder …'}
+      data-autofocus={focus || undefined}
+    />
+  )
+}

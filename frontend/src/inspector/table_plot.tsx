@@ -1,0 +1,40 @@
+import type { TablePreview } from '../protocol'
+
+const WIDTH = 560
+const HEIGHT = 96
+const COLOURS = 8
+
+/** A small plot of the values over time, each scaled to the same common range. */
+export function TablePlot({ preview: { times, curves, chosen } }: { preview: TablePreview }) {
+  const values = curves.flat()
+  const [left, right] = [times[0] ?? 0, times.at(-1) ?? 1]
+  let [low, high] = [Math.min(...values), Math.max(...values)]
+  if (low === high) [low, high] = [low - 1, high + 1]
+  const x = (time: number) => (WIDTH * (time - left)) / (right - left || 1)
+  const y = (value: number) => HEIGHT - 4 - ((HEIGHT - 8) * (value - low)) / (high - low)
+  return (
+    <div className="data-plot">
+      <svg
+        viewBox={`0 0 ${WIDTH} ${HEIGHT}`}
+        preserveAspectRatio="none"
+        role="img"
+        aria-label={`Plot of ${chosen.slice(0, curves.length).join(', ')}`}
+      >
+        {curves.map((curve, number) => (
+          <polyline
+            key={chosen[number]}
+            points={curve.map((value, k) => `${x(times[k]!).toFixed(2)},${y(value).toFixed(2)}`).join(' ')}
+            className={`s-trace-${number % COLOURS}`}
+            fill="none"
+            strokeWidth={1.3}
+            vectorEffect="non-scaling-stroke"
+          />
+        ))}
+      </svg>
+      <span className="numbers top">{range(high)}</span>
+      <span className="numbers bottom">{range(low)}</span>
+    </div>
+  )
+}
+
+const range = (value: number): string => String(Number(value.toPrecision(4)))

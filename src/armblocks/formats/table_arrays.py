@@ -1,0 +1,200 @@
+"""Columns from files of arrays: NPZ, MAT and Parquet. No code in files is executed."""
+
+from __future__ import annotations
+
+import io
+import math
+import zipfile
+from collections.abc import Mapping
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.errors import FormatError, InputError
+from armblocks.extras import from_extra
+from armblocks.formats.table_columns import (
+    LARGEST_EXACT,
+    MOST_NUMBERS,
+    Column,
+    ColumnFile,
+    repeated_notes,
+    time_column,
+    unique_names,
+    with_units,
+)
+
+Array = NDArray[Any]
+
+
+def read_npz(data: bytes) -> ColumnFile:
+    """The columns of the arrays of an NPZ file; the first axis is time."""
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        _check_size(sum(entry.file_size for entry in archive.infolist()) // 8)
+    with np.load(io.BytesIO(data), allow_pickle=False) as archive:
+        return _columns({name: archive[name] for name in archive.files})
+
+
+def read_mat(data: bytes) -> ColumnFile:
+    """The columns of the variables and structures of a MAT file; the first axis is time."""
+    with from_extra("data", "MAT files"):
+        import scipy.io
+    if data[:128].lstrip().startswith(b"MATLAB 7.3") or data[:8] == b"\x89HDF\r\n\x1a\n":
+        raise FormatError(
+            "this is a MAT file of version 7.3",
+            allowed="MAT files of version 4 to 7",
+            where="a MAT file",
+            fix="save it in MATLAB with the option -v7, or as CSV",
+        )
+    mat = cast("Any", scipy.io)
+    shapes: list[tuple[str, tuple[int, ...], str]] = mat.whosmat(io.BytesIO(data))
+    _check_size(sum(math.prod(shape) for _, shape, _ in shapes))
+    contents: dict[str, Any] = mat.loadmat(io.BytesIO(data))
+    return _columns(_members({name: value for name, value in contents.items() if not name.startswith("__")}))
+
+
+def _members(contents: Mapping[str, Any]) -> dict[str, Any]:
+    """The variables, and those in structures of one element, as ``structure/member``."""
+    found: dict[str, Any] = {}
+    for name, value in contents.items():
+        array = np.asarray(value)
+        if array.dtype.names and array.size == 1:
+            inside = _members({field: array[field].item() for field in array.dtype.names})
+            found |= {f"{name}/{field}": member for field, member in inside.items()}
+        else:
+            found[name] = value
+    return found
+
+
+def read_parquet(data: bytes) -> ColumnFile:
+    """The columns of a Parquet file."""
+    with from_extra("data", "Parquet files"):
+        import pyarrow.parquet as pq
+    stored = cast("Any", pq).ParquetFile(io.BytesIO(data))
+    _check_size(stored.metadata.num_rows * max(stored.metadata.num_columns, 1))
+    table = stored.read()
+    columns = [_parquet_column(str(name), table.column(k)) for k, name in enumerate(table.column_names)]
+    names = unique_names(["index" if c.name.startswith(_INDEX) else c.name for c in columns])
+    named = [
+        Column(name=name, kind=c.kind, values=c.values, fault=c.fault, plain=not c.name.startswith(_INDEX))
+        for name, c in zip(names, columns)
+    ]
+    return ColumnFile(columns=with_units(named), notes=tuple(repeated_notes([c.name for c in columns])))
+
+
+_INDEX = "__index_level_"
+"""Names that pandas gives to an index without a name."""
+
+
+def _parquet_column(name: str, given: Any) -> Column:
+    import pyarrow as pa
+
+    arrow = cast("Any", pa)
+    kinds = arrow.types
+    if kinds.is_dictionary(given.type):
+        given = given.cast(given.type.value_type)
+    if kinds.is_decimal(given.type):
+        given = given.cast(arrow.float64())
+    if kinds.is_date(given.type) or kinds.is_timestamp(given.type) or kinds.is_duration(given.type):
+        return _column(name, given.to_numpy())
+    if kinds.is_boolean(given.type) and given.null_count:
+        given = given.cast(arrow.int8())
+    if kinds.is_integer(given.type) and given.null_count:
+        given = given.cast(arrow.float64(), safe=True)
+    if not (kinds.is_integer(given.type) or kinds.is_floating(given.type) or kinds.is_boolean(given.type)):
+        return Column(name=name, kind="text", fault=f"its values are of type {str(given.type)[:40]}")
+    return _column(name, given.to_numpy())
+
+
+def _check_size(numbers: int) -> None:
+    if numbers > MOST_NUMBERS:
+        raise FormatError(
+            f"the file has {numbers} numbers",
+            allowed=f"at most {MOST_NUMBERS}",
+            where="a file of arrays",
+            fix="split or shorten it",
+        )
+
+
+def _columns(arrays: Mapping[str, Any]) -> ColumnFile:
+    """Arrays as columns.
+
+    The first axis is time. An array whose last axis, and not its first, has the length of the times is read
+    along that axis, as Simulink stores signals beside a row of times.
+    """
+    plain = {name: np.asarray(given) for name, given in arrays.items()}
+    flat = {
+        name: array.ravel() if array.ndim >= 2 and max(array.shape) == array.size else array
+        for name, array in plain.items()
+    }
+    vectors = [_column(name, array) for name, array in flat.items() if array.ndim == 1]
+    notes: list[str] = []
+    key = time_column(ColumnFile(columns=with_units(vectors)))
+    count = next((column.rows for column in vectors if column.name == key), 0)
+    found: list[Column] = []
+    for name, array in flat.items():
+        if array.ndim < 2:
+            found.append(_column(name, np.atleast_1d(array)))
+            continue
+        if array.dtype.kind not in "biuf" or not array.size:
+            found.append(Column(name=name, kind="text", fault=_unusable(array)))
+            continue
+        if not count:
+            array = _upright(name, array, notes)
+        elif array.shape[0] != count == array.shape[-1]:
+            array = np.moveaxis(array, -1, 0)
+            notes.append(f"The rows of '{name}' are its signals.")
+        columns = array.reshape(array.shape[0], -1)
+        found += [_column(f"{name}[{k}]", columns[:, k]) for k in range(columns.shape[1])]
+    return ColumnFile(columns=with_units(found), notes=tuple(notes))
+
+
+def _upright(name: str, array: Array, notes: list[str]) -> Array:
+    """A matrix that contains the times: by columns, or by rows where only the first row can be times."""
+    if array.ndim != 2 or array.shape[0] >= array.shape[1]:
+        return array
+    down, across = (bool(np.all(np.diff(line.astype(np.float64)) > 0.0)) for line in (array[:, 0], array[0]))
+    if down and across:
+        raise InputError(
+            f"the matrix '{name}' has {array.shape[0]} rows and {array.shape[1]} columns, and both its first "
+            "row and its first column can be times",
+            allowed="a time in each row, or a separate variable 'time'",
+            where="a file of arrays",
+            fix="transpose the matrix, or store the times as a vector 'time'",
+        )
+    if across:
+        notes.append(f"The rows of '{name}' are its signals, the first one the times.")
+        return array.T
+    return array
+
+
+def _unusable(array: Array) -> str:
+    if not array.size:
+        return "it is empty"
+    words = {"c": "its values are complex", "U": "it contains text", "S": "it contains text"}
+    return words.get(array.dtype.kind, "it contains objects")
+
+
+def _column(name: str, array: Array) -> Column:
+    """A vector as a column."""
+    kind = array.dtype.kind
+    if not array.size or kind not in "biufmM":
+        return Column(name=name, kind="text", fault=_unusable(array))
+    if kind == "M":
+        if bool(np.isnat(array).any()):
+            return Column(name=name, kind="date", fault="a row has no date")
+        return Column(name=name, kind="date", values=_seconds(array - array[0]))
+    if kind == "m":
+        return Column(name=name, values=_seconds(array))
+    if kind in "iu" and max(abs(int(array.max())), abs(int(array.min()))) > LARGEST_EXACT:
+        what = "its integers exceed 2^53, so they are not exact as numbers; subtract an offset"
+        return Column(name=name, fault=what)
+    values = np.ascontiguousarray(array, dtype=np.float64)
+    return Column(name=name, kind="boolean" if kind == "b" else "number", values=values)
+
+
+def _seconds(durations: Array) -> NDArray[np.float64]:
+    """Durations as numbers of seconds; ``NaT`` is NaN."""
+    absent = np.isnat(durations)
+    ticks = durations.astype("timedelta64[ns]").astype(np.int64)
+    return np.where(absent, np.nan, ticks / 1e9)

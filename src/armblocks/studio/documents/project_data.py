@@ -1,0 +1,196 @@
+"""Tables and Python functions of the project, by the rules of the project folder.
+
+A file that cannot be read gives a value with its fault, so that a diagram with it can be shown and corrected.
+The server runs no Python code of the user; only worker processes do (``runs_code``).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import OrderedDict
+from collections.abc import Iterator
+from pathlib import Path
+from threading import Lock
+
+from armblocks.diagram import Diagram, TimeTable, UserFunction
+from armblocks.diagram.function_files import (
+    FunctionOutline,
+    UnloadedFunction,
+    functions_of,
+    run_source,
+    split_reference,
+)
+from armblocks.diagram.levels import joined, levels_of
+from armblocks.errors import ArmblocksError, FormatError, UnknownNameError
+from armblocks.files import read_bounded
+from armblocks.formats.data_files import DataFiles, TableReference
+from armblocks.formats.table_columns import ColumnFile, table_of
+from armblocks.formats.table_files import TABLE_SUFFIXES, is_strict, load_columns
+from armblocks.studio.documents.project_folder import ProjectFolder
+from armblocks.studio.documents.trusted_files import TrustedFiles, digest_of
+
+SOURCE_SUFFIXES = (".py",)
+MOST_SOURCE = 256 * 1024
+"""Maximum size of a Python file, bytes."""
+MOST_CACHED = 4
+"""Number of files whose columns stay in memory."""
+
+
+class ProjectData(DataFiles):
+    """Reads the tables and functions that the diagrams of a project name."""
+
+    def __init__(self, folder: ProjectFolder, trusted: TrustedFiles, *, runs_code: bool = False) -> None:
+        self.folder = folder
+        self.trusted = trusted
+        self._runs_code = runs_code
+        self._read: OrderedDict[tuple[Path, int, int, int], ColumnFile] = OrderedDict()
+        self._reading = Lock()
+
+    # -- tables ----------------------------------------------------------------------------------------------
+
+    def columns(self, path: Path) -> ColumnFile:
+        """The columns of a file; a file that has not changed is read once. Raises ``ArmblocksError``."""
+        with self._reading:
+            try:
+                status = path.stat()
+            except OSError:
+                return load_columns(path)  # raises the error
+            key = (path, status.st_mtime_ns, status.st_size, status.st_ino)
+            if key not in self._read:
+                self._read[key] = load_columns(path)
+                while len(self._read) > MOST_CACHED:
+                    self._read.popitem(last=False)
+            self._read.move_to_end(key)
+            return self._read[key]
+
+    def table(self, reference: TableReference, folder: Path | None) -> TimeTable:
+        """The table of a file of the project, with its fault if it cannot be read."""
+        try:
+            path = self.folder.path(reference.file, TABLE_SUFFIXES, folder)
+        except ArmblocksError as error:
+            return _unread(error, reference, reference.file, "")
+        shown = self.shown(path)
+        try:
+            strict = is_strict(path)
+            found = table_of(self.columns(path), shown, reference.time, reference.columns, strict=strict)
+        except ArmblocksError as error:
+            fault = FormatError(error.what, where=shown, allowed=error.allowed, fix=error.fix)
+            return _unread(fault, reference, str(path), shown)
+        return dataclasses.replace(found, source=str(path), shown=shown)
+
+    # -- functions -------------------------------------------------------------------------------------------
+
+    def source(self, path: Path) -> bytes:
+        """The content of a Python file. Raises ``FormatError``."""
+        return read_bounded(path, MOST_SOURCE)
+
+    def function(self, reference: str, folder: Path | None) -> UserFunction:
+        """The function of a file of the project. Raises ``ArmblocksError`` if the file does not define it."""
+        path, outline, source = self._outline(reference, folder)
+        shown = self.shown(path)
+        fault = FormatError(
+            f"the code of {shown} has not been run",
+            where=shown,
+            allowed="functions of trusted files, in a run",
+            fix="run the model",
+        )
+        if self._runs_code and (shown, digest_of(source)) not in self.trusted:
+            fault = _untrusted(shown)
+        elif self._runs_code:
+            try:
+                return UserFunction(run_source(source, path, shown, outline.name))
+            except FormatError as error:
+                fault = error
+        name = outline.name
+        return UserFunction(UnloadedFunction(f"{path}:{name}", f"{shown}:{name}", outline.arguments, fault))
+
+    def _outline(self, reference: str, folder: Path | None) -> tuple[Path, FunctionOutline, bytes]:
+        file, name = split_reference(reference)
+        path = self.folder.path(file, SOURCE_SUFFIXES, folder)
+        source = self.source(path)
+        known = functions_of(source, self.shown(path))
+        if name not in known:
+            raise UnknownNameError("function", name, known, where=self.shown(path))
+        return path, known[name], source
+
+    def shown(self, path: Path) -> str:
+        """The path of a file from the project folder."""
+        return path.relative_to(self.folder.root).as_posix()
+
+    # -- diagrams --------------------------------------------------------------------------------------------
+
+    def faults(self, diagram: Diagram) -> Iterator[tuple[str, ArmblocksError]]:
+        """The paths of blocks whose files cannot be used now, and the reasons."""
+        for path, value in files_of(diagram):
+            fault = self._fault_of_table(value) if isinstance(value, TimeTable) else self._fault_of(value)
+            if fault is not None:
+                yield path, fault
+
+    def _fault_of_table(self, table: TimeTable) -> ArmblocksError | None:
+        if not table.shown:
+            return table.fault
+        now = self.table(TableReference(file=table.shown, time=table.time, columns=table.columns), None)
+        if now.fault is None and now.shape[1] != table.shape[1]:
+            return FormatError(
+                f"{table.shown} has changed: it has {now.shape[1] - 1} columns of values instead of "
+                f"{table.shape[1] - 1}",
+                where=table.shown,
+                fix="open the block and choose its columns again",
+            )
+        return now.fault
+
+    def _fault_of(self, function: UserFunction) -> ArmblocksError | None:
+        value = function.function
+        if not isinstance(value, UnloadedFunction):
+            return None
+        try:
+            path, outline, source = self._outline(value.shown, None)
+        except ArmblocksError as error:
+            return error
+        shown = self.shown(path)
+        if outline.arguments != value.arguments:
+            return FormatError(
+                f"{shown} has changed: the arguments of {outline.name} are others",
+                where=shown,
+                fix="open the block and load the function again",
+            )
+        return None if (shown, digest_of(source)) in self.trusted else _untrusted(shown)
+
+
+def files_of(diagram: Diagram) -> Iterator[tuple[str, TimeTable | UserFunction]]:
+    """The tables and functions of files in a hierarchy, with the paths of their blocks."""
+    for level, sheet in levels_of(diagram).items():
+        for name, block in sheet.blocks.items():
+            for rule in block.own_parameters():
+                value = block.parameter_value(rule.name)
+                if not isinstance(value, TimeTable | UserFunction):
+                    continue
+                in_file = (
+                    value.source or value.fault if isinstance(value, TimeTable) else unloaded_fault(value)
+                )
+                if in_file:
+                    yield joined(level, name), value
+
+
+def unloaded_fault(function: UserFunction) -> ArmblocksError | None:
+    """Why the code of a function has not been run, or ``None``."""
+    return function.function.fault if isinstance(function.function, UnloadedFunction) else None
+
+
+def has_functions(diagram: Diagram) -> bool:
+    """Whether a block names a function of a file."""
+    return any(isinstance(value, UserFunction) for _, value in files_of(diagram))
+
+
+def _unread(fault: ArmblocksError, reference: TableReference, source: str, shown: str) -> TimeTable:
+    table = TimeTable.unread(fault, source, time=reference.time, columns=reference.columns)
+    return dataclasses.replace(table, shown=shown)
+
+
+def _untrusted(shown: str) -> FormatError:
+    return FormatError(
+        f"the code of {shown} is not trusted in its present form",
+        where=shown,
+        allowed="Python code that you have read and trusted",
+        fix="open the block, read the code, and trust it",
+    )

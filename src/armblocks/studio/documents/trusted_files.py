@@ -1,0 +1,63 @@
+"""Python files whose code the user trusts: by path and content, so that a changed file is not trusted."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable
+from typing import Any
+
+from armblocks.errors import FormatError
+from armblocks.files import read_bounded
+from armblocks.studio.documents.state_folder import StateFolder
+
+MOST_TRUSTED = 1000
+MOST_BYTES = 1 << 20
+
+
+def digest_of(source: bytes) -> str:
+    """The SHA-256 of the content of a file, hexadecimal."""
+    return hashlib.sha256(source).hexdigest()
+
+
+class TrustedFiles:
+    """Pairs of a path in the project and the digest of its content.
+
+    They are stored in the private folder of the user, outside the project: no file of a project can make
+    itself trusted.
+    """
+
+    def __init__(self, kept: StateFolder | None = None, pairs: Iterable[Iterable[str]] = ()) -> None:
+        self._kept = kept
+        self._pairs: dict[tuple[str, str], None] = {}
+        for pair in (*self._read(), *pairs):
+            path, digest = pair
+            self._pairs[str(path), str(digest)] = None
+
+    @property
+    def pairs(self) -> list[list[str]]:
+        """The pairs, for a worker process."""
+        return [list(pair) for pair in self._pairs]
+
+    def __contains__(self, pair: object) -> bool:
+        return pair in self._pairs
+
+    def set(self, path: str, digest: str, *, trusted: bool) -> None:
+        """Trust a content of a file, or trust no content of it."""
+        if trusted:
+            self._pairs[path, digest] = None
+        else:
+            self._pairs = {pair: None for pair in self._pairs if pair[0] != path}
+        for pair in list(self._pairs)[:-MOST_TRUSTED]:
+            del self._pairs[pair]
+        if self._kept is not None:
+            self._kept.write_private("trusted.json", {"files": self.pairs})
+
+    def _read(self) -> list[tuple[str, str]]:
+        if self._kept is None:
+            return []
+        try:
+            found: Any = json.loads(read_bounded(self._kept.root / "trusted.json", MOST_BYTES))
+            return [(str(path), str(digest)) for path, digest in found["files"]]
+        except (FormatError, ValueError, KeyError, TypeError):
+            return []

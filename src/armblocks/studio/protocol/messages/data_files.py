@@ -1,0 +1,129 @@
+"""Files of the project that blocks name: tables of measurements and Python functions.
+
+All paths are relative to the project folder.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from armblocks.studio.protocol.message import Fault, Message, Request
+from armblocks.studio.protocol.messages.documents import MOST_DROPPED
+
+Path = Annotated[str, Field(max_length=1000)]
+Name = Annotated[str, Field(max_length=1000)]
+
+
+class DataFile(Message):
+    """A file of the project; ``size`` in bytes."""
+
+    path: str
+    size: int
+
+
+class DataFileList(Request[list[DataFile]]):
+    """Return the files that a parameter of this kind may name."""
+
+    kind: Literal["data_files"] = "data_files"
+    holds: Literal["table", "function"]
+
+
+class TableColumn(Message):
+    """A column of a file. ``fault`` says why it has no numbers; ``rows`` is then 0."""
+
+    name: str
+    unit: str
+    kind: str
+    rows: int
+    fault: str
+
+
+class TablePreview(Message):
+    """The columns of a file, and the table of the chosen ones, or its ``fault``.
+
+    ``time`` is the column with the times, ``chosen`` are those of the values. ``rows`` are the first rows of
+    these columns as text. ``times`` (s) and ``curves`` are points for a plot: the least and the greatest
+    values of groups of rows. ``spacing`` is the least and the greatest distance of two times, s.
+    """
+
+    columns: list[TableColumn]
+    time: str
+    chosen: list[str]
+    rows: list[list[str]]
+    count: int
+    spacing: tuple[float, float]
+    times: list[float]
+    curves: list[list[float]]
+    notes: list[str]
+    fault: Fault | None
+
+
+class PreviewTable(Request[TablePreview]):
+    """Read a file; ``time`` and ``columns`` are empty where the file determines them."""
+
+    kind: Literal["preview_table"] = "preview_table"
+    file: Path
+    time: Name = ""
+    columns: Annotated[list[Name], Field(max_length=10_000)] = Field(default_factory=list[Name])
+
+
+class KeptFile(Message):
+    """The path of a dropped file; ``stored`` is false if another file has this name."""
+
+    path: str
+    stored: bool
+
+
+class KeepFile(Request[KeptFile]):
+    """Store a dropped file with a table in the project folder; ``replace``: also over another file."""
+
+    kind: Literal["keep_file"] = "keep_file"
+    name: str = Field(max_length=255)
+    content: str = Field(max_length=4 * MOST_DROPPED // 3 + 4)
+    """Content of the file, base64."""
+    replace: bool = False
+
+
+class SourceFunction(Message):
+    """A function of a Python file; ``line`` is that of its definition."""
+
+    name: str
+    arguments: list[str]
+    line: int
+    doc: str
+
+
+class FunctionSource(Message):
+    """The content of a Python file, which has not been run; ``fault`` says why it is not valid.
+
+    ``digest`` identifies the content; ``trusted`` says whether its code may run. Invisible characters are
+    written as ``\\\\u202e``; ``hidden`` is their number.
+    """
+
+    text: str
+    digest: str
+    trusted: bool
+    hidden: int
+    functions: list[SourceFunction]
+    fault: Fault | None
+
+
+class ReadSource(Request[FunctionSource]):
+    """Return the content of a Python file."""
+
+    kind: Literal["read_source"] = "read_source"
+    file: Path
+
+
+class TrustSource(Request[None]):
+    """Trust the content of a Python file that the page has shown, or no content of it.
+
+    Refused if the file has another content than ``digest`` by now.
+    """
+
+    kind: Literal["trust_source"] = "trust_source"
+    file: Path
+    digest: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+    trusted: bool

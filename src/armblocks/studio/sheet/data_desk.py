@@ -1,0 +1,156 @@
+"""Requests about the tables and Python functions of the project."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from collections.abc import Callable
+from importlib.util import decode_source
+from inspect import Parameter
+from pathlib import Path, PurePath
+
+from armblocks.diagram.function_files import functions_of
+from armblocks.errors import ArmblocksError, FormatError, InputError
+from armblocks.files import read_bounded
+from armblocks.formats.table_files import TABLE_SUFFIXES, columns_of
+from armblocks.studio.documents.dropped import dropped_bytes
+from armblocks.studio.documents.project_data import SOURCE_SUFFIXES, ProjectData
+from armblocks.studio.documents.trusted_files import digest_of
+from armblocks.studio.protocol.answers import Answers
+from armblocks.studio.protocol.message import Fault
+from armblocks.studio.protocol.messages import data_files as say
+from armblocks.studio.protocol.page import Page
+from armblocks.studio.sheet.table_preview import table_preview
+
+_INVISIBLE = re.compile(
+    "[\u0000-\u0008\u000b\u000c\u000e-\u001f\u007f-\u009f\u00ad\u061c\u200b-\u200f"
+    "\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb]"
+)
+"""Control characters and those that change the direction of text or have no width."""
+
+
+class DataDesk:
+    """Handles these requests. ``recheck`` starts the check of all open diagrams after a change of a file."""
+
+    def __init__(self, data: ProjectData, recheck: Callable[[], None]) -> None:
+        self._data = data
+        self._folder = data.folder
+        self._recheck = recheck
+
+    def register(self, answers: Answers) -> None:
+        """Register the handlers of these requests."""
+        answers.on(say.DataFileList, self._files)
+        answers.on(say.PreviewTable, self._preview)
+        answers.on(say.KeepFile, self._keep)
+        answers.on(say.ReadSource, self._source)
+        answers.on(say.TrustSource, self._trust)
+
+    async def _files(self, _: Page, request: say.DataFileList) -> list[say.DataFile]:
+        suffixes = TABLE_SUFFIXES if request.holds == "table" else SOURCE_SUFFIXES
+        return await asyncio.to_thread(self._listed, suffixes)
+
+    def _listed(self, suffixes: tuple[str, ...]) -> list[say.DataFile]:
+        found: list[say.DataFile] = []
+        for path in self._folder.files(suffixes):
+            try:
+                found.append(say.DataFile(path=path, size=self._folder.path(path, suffixes).stat().st_size))
+            except (ArmblocksError, OSError):  # a link that leads outside, or a file that was removed
+                continue
+        return found
+
+    async def _preview(self, _: Page, request: say.PreviewTable) -> say.TablePreview:
+        path = self._folder.path(request.file, TABLE_SUFFIXES)
+
+        def read() -> say.TablePreview:
+            try:
+                file = self._data.columns(path)
+            except ArmblocksError as error:
+                raise _relative(error, request.file) from None
+            return table_preview(file, request.file, request.time, request.columns)
+
+        return await asyncio.to_thread(read)
+
+    async def _keep(self, _: Page, request: say.KeepFile) -> say.KeptFile:
+        data = dropped_bytes(request.content, request.name[:80])
+        name = PurePath(request.name).name
+        path = self._folder.path(name, TABLE_SUFFIXES)
+
+        def keep() -> bool:
+            try:
+                columns_of(data, path)
+            except ArmblocksError as error:
+                raise _relative(error, name) from None
+            if path.exists() and not request.replace:
+                return _has_content(path, data)
+            self._folder.keep(name, data, TABLE_SUFFIXES)
+            return True
+
+        stored = await asyncio.to_thread(keep)
+        if stored:
+            self._recheck()
+        return say.KeptFile(path=name, stored=stored)
+
+    async def _source(self, _: Page, request: say.ReadSource) -> say.FunctionSource:
+        path = self._folder.path(request.file, SOURCE_SUFFIXES)
+        source = self._data.source(path)
+        fault: Fault | None = None
+        functions: list[say.SourceFunction] = []
+        try:
+            text = decode_source(source)  # as Python reads it, by the encoding that the file declares
+        except (SyntaxError, UnicodeDecodeError) as error:
+            raise FormatError(
+                f"the file is not text: {error}"[:200], where=request.file, fix="save it as UTF-8"
+            ) from None
+        try:
+            functions = [
+                say.SourceFunction(
+                    name=one.name,
+                    arguments=[_argument(entry) for entry in one.arguments],
+                    line=one.line,
+                    doc=one.doc,
+                )
+                for one in functions_of(source, request.file).values()
+            ]
+        except FormatError as error:
+            fault = Fault(what=error.what, where=error.where, allowed=error.allowed, fix=error.fix)
+        shown, hidden = _INVISIBLE.subn(lambda found: f"\\u{ord(found[0]):04x}", text)
+        digest = digest_of(source)
+        return say.FunctionSource(
+            text=shown,
+            digest=digest,
+            trusted=(self._data.shown(path), digest) in self._data.trusted,
+            hidden=hidden,
+            functions=functions,
+            fault=fault,
+        )
+
+    async def _trust(self, _: Page, request: say.TrustSource) -> None:
+        path = self._folder.path(request.file, SOURCE_SUFFIXES)
+        shown = self._data.shown(path)
+        if request.trusted and digest_of(self._data.source(path)) != request.digest:
+            raise InputError(
+                "the file has changed since it was shown",
+                where=shown,
+                allowed="the content that was shown",
+                fix="load it again, read it, and then trust it",
+            )
+        self._data.trusted.set(shown, request.digest, trusted=request.trusted)
+        self._recheck()
+
+
+def _argument(argument: Parameter) -> str:
+    """An argument as the page shows it; one with a default is not an input."""
+    stars = {Parameter.VAR_POSITIONAL: "*", Parameter.VAR_KEYWORD: "**"}.get(argument.kind, "")
+    return f"{stars}{argument.name}{'' if argument.default is Parameter.empty else '=…'}"
+
+
+def _has_content(path: Path, data: bytes) -> bool:
+    try:
+        return read_bounded(path, len(data)) == data
+    except FormatError:
+        return False
+
+
+def _relative(error: ArmblocksError, shown: str) -> FormatError:
+    """The error with the path in the project in place of the absolute one."""
+    return FormatError(error.what, where=shown, allowed=error.allowed, fix=error.fix)
