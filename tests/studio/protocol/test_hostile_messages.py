@@ -165,7 +165,7 @@ def requests(document: str, robot: str) -> list[dict[str, Any]]:
         {
             "kind": "keep_file",
             "name": "kept.csv",
-            "content": base64.b64encode(ROWS).decode(),
+            "content": kept,
             "replace": True,
         },
         {"kind": "read_source", "file": "law.py"},
