@@ -116,6 +116,17 @@ def wait_until(page: Page, true: Callable[[], bool]) -> None:
     raise AssertionError("the condition did not become true")
 
 
+def select_block(page: Page, name: str) -> None:
+    """Click a block until it is selected: a click is lost while the sheet is fitted into its panel."""
+
+    def is_selected() -> bool:
+        found = block(page, name)
+        found.click()
+        return bool(found.evaluate("element => element.closest('.react-flow__node').matches('.selected')"))
+
+    wait_until(page, is_selected)
+
+
 def copied_text(page: Page, part: str) -> str:
     """Wait until the clipboard contains a text with this part, and return the text.
 

@@ -19,6 +19,7 @@ from building import (
     new_diagram,
     play_slowly,
     run,
+    select_block,
     wire,
 )
 from playwright.sync_api import Page, expect
@@ -187,7 +188,7 @@ def test_a_run_is_paused_stepped_resumed_and_stopped(page: Page) -> None:
 
 
 def test_blocks_are_copied_as_text(page: Page) -> None:
-    block(page, "PID").click()
+    select_block(page, "PID")
     page.keyboard.press("Control+c")
     assert list(json.loads(copied_text(page, '"blocks"'))["blocks"]) == ["PID"]
     page.keyboard.press("Control+v")

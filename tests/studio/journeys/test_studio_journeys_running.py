@@ -191,12 +191,12 @@ def test_scope_measurements_equal_the_closed_form(opened: Opened) -> None:
     expect(table.locator("tbody tr")).to_have_count(1)
 
 
-def test_scope_exports_contain_all_samples(opened: Opened) -> None:
+def test_scope_exports_contain_all_samples_and_jumps(opened: Opened) -> None:
     page = opened(lag_model("exported"))
     run(page)
     rows = list(csv.reader(io.StringIO(saved(page, "scope", "Samples as CSV").decode())))
     assert rows[0] == ["time [s]", "gain", "lag"]
-    result = ab.simulate(lag_model("exported"))
+    result = ab.simulate(lag_model("exported")).with_jumps()
     wanted = np.column_stack([result.time, result["gain/y"], result["lag/y"]])
     np.testing.assert_array_equal(np.array(rows[1:], dtype=float), wanted)
     picture = ElementTree.fromstring(saved(page, "scope", "Picture as SVG"))
