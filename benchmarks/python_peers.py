@@ -193,9 +193,9 @@ def pathsim_run(model: str) -> dict[str, Any]:
 
     simulation = Simulation(blocks, connections, log=False, **settings)
     begin = time.perf_counter()
-    told = simulation.run(duration, adaptive=adaptive)
+    message = simulation.run(duration, adaptive=adaptive)
     seconds = time.perf_counter() - begin
-    steps = int(told.get("total_steps", 0))
+    steps = int(message.get("total_steps", 0))
     return {"seconds": seconds, "steps": steps, "final": [float(block.outputs[0]) for block in outputs]}
 
 

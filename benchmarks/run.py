@@ -129,14 +129,14 @@ def compared_table(group: str, repeats: int) -> list[str]:
 
 
 def simulations_part(repeats: int) -> list[str]:
-    told = (simulations.__doc__ or "").split("Multirate: ")[0].strip().splitlines()[2:]
-    return ["## Whole simulations", "", *compared_table("simulations", repeats), "", *told]
+    message = (simulations.__doc__ or "").split("Multirate: ")[0].strip().splitlines()[2:]
+    return ["## Whole simulations", "", *compared_table("simulations", repeats), "", *message]
 
 
 def multirate_part(repeats: int) -> list[str]:
-    told = "Multirate: " + (simulations.__doc__ or "").split("Multirate: ")[1].strip()
+    message = "Multirate: " + (simulations.__doc__ or "").split("Multirate: ")[1].strip()
     compared = compared_table("multirate", max(1, repeats // 3))
-    return ["## A multirate simulation", "", *compared, "", *told.splitlines()]
+    return ["## A multirate simulation", "", *compared, "", *message.splitlines()]
 
 
 def growth_part(repeats: int) -> list[str]:
@@ -227,8 +227,8 @@ def main() -> None:
     else:
         text = results.read_text().split("\n## What was missed")[0].rstrip() + "\n"
         for section in sections.values():
-            told = ["", f"Measured separately on {today}: {machine[-1]}."]
-            text = replaced(text, [*section, *told])
+            message = ["", f"Measured separately on {today}: {machine[-1]}."]
+            text = replaced(text, [*section, *message])
         text += "\n" + (HERE / "NOTES.md").read_text().rstrip() + "\n"
     results.write_text(text)
 

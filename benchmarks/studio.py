@@ -285,7 +285,7 @@ async def session(uri: str, cookie: str, origin: str, ended: list[str], waits: l
         uri, additional_headers={"Cookie": cookie}, origin=origin, max_size=None
     ) as socket:
         numbers = iter(range(1, 10**6))
-        asked: dict[int, tuple[float, asyncio.Future]] = {}
+        requested: dict[int, tuple[float, asyncio.Future]] = {}
         document: dict[str, object] = {}
         over = asyncio.Event()
 
@@ -293,24 +293,24 @@ async def session(uri: str, cookie: str, origin: str, ended: list[str], waits: l
             async for message in socket:
                 if isinstance(message, bytes):
                     continue
-                said = json.loads(message)
-                if said["kind"] == "reply":
-                    begin, answer = asked.pop(said["number"])
-                    if said.get("fault"):
-                        answer.set_exception(RuntimeError(said["fault"]["what"]))
+                reply = json.loads(message)
+                if reply["kind"] == "reply":
+                    begin, answer = requested.pop(reply["number"])
+                    if reply.get("fault"):
+                        answer.set_exception(RuntimeError(reply["fault"]["what"]))
                     else:
                         answer.set_result(time.perf_counter() - begin)
-                elif said["kind"] in ("opened", "changed"):
-                    document.update(said["state"])
-                elif said["kind"] == "run_progress" and said["state"] in ("done", "failed", "stopped"):
-                    ended.append(said["state"])
+                elif reply["kind"] in ("opened", "changed"):
+                    document.update(reply["state"])
+                elif reply["kind"] == "run_progress" and reply["state"] in ("done", "failed", "stopped"):
+                    ended.append(reply["state"])
                     over.set()
 
         async def ask(request: dict[str, object]) -> float:
             number = next(numbers)
-            asked[number] = (time.perf_counter(), asyncio.get_running_loop().create_future())
+            requested[number] = (time.perf_counter(), asyncio.get_running_loop().create_future())
             await socket.send(json.dumps({"number": number, "request": request}))
-            return await asked[number][1]
+            return await requested[number][1]
 
         listening = asyncio.create_task(listen())
         await ask({"kind": "open_shipped", "document_kind": "diagram", "name": "van_der_pol_pid"})

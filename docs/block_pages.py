@@ -186,7 +186,7 @@ def parameter_table(kind: type[Block]) -> list[str]:
     return [
         "## Parameters",
         "",
-        *table(("parameter", "may be", "unit", "default", "tunable", "meaning"), rows),
+        *table(("parameter", "allowed values", "unit", "default", "tunable", "meaning"), rows),
     ]
 
 
@@ -206,8 +206,15 @@ def allowed(rule: Parameter) -> str:
 
 
 def default_text(rule: Parameter) -> str:
-    """The default as Python; empty for a required parameter."""
-    return "" if rule.required else f"`{rule.default!r}`"
+    """The default as Python; a diagram by its blocks, a function by its name; empty for a required
+    parameter."""
+    if rule.required:
+        return ""
+    if isinstance(rule.default, Diagram):
+        return f"a diagram of {' and '.join(f'`{name}`' for name in rule.default.blocks)}"
+    if callable(rule.default):
+        return f"`{getattr(rule.default, '__name__', repr(rule.default))}`"
+    return f"`{rule.default!r}`"
 
 
 def behaviour(diagram: Diagram) -> list[str]:

@@ -167,16 +167,16 @@ def main() -> int:
     )
     parser.add_argument("--no-tests", action="store_true", help="hashes only")
     parser.add_argument("groups", nargs="*", help="groups of numbers (see bits_hashes.py; default: all)")
-    asked = parser.parse_args()
+    requested = parser.parse_args()
     if platform.machine().lower() not in ("x86_64", "amd64"):
         parser.error("this script compares with an x86-64 processor and has to run on one")
     prepare("test")
-    found = x86_64_hashes(asked.groups)
-    if asked.arm64:
+    found = x86_64_hashes(requested.groups)
+    if requested.arm64:
         arm64 = Arm64(FOLDER)
-        found["ARM64"] = arm64.run(HASHES, *asked.groups)
+        found["ARM64"] = arm64.run(HASHES, *requested.groups)
         say(f"== ARM64\n{found['ARM64']}")
-        if not asked.no_tests:
+        if not requested.no_tests:
             say("== tests on ARM64")
             say(
                 arm64.run(

@@ -236,18 +236,18 @@ def main() -> None:
     parser.add_argument("--lanes", type=int, default=2)
     parser.add_argument("--details", action="store_true", help="a line for each array, too")
     parser.add_argument("groups", nargs="*", help=f"which: {', '.join(GROUPS)} (default: all)")
-    asked = parser.parse_args()
-    if asked.cpu:
-        compile_for(asked.cpu, asked.lanes)
+    requested = parser.parse_args()
+    if requested.cpu:
+        compile_for(requested.cpu, requested.lanes)
     warnings.simplefilter("ignore")
-    for group in asked.groups or GROUPS:
+    for group in requested.groups or GROUPS:
         whole = hashlib.sha256()
         count = 0
         for name, numbers in GROUPS[group]():
             data = canonical(numbers)
             whole.update(name.encode() + data)
             count += 1
-            if asked.details:
+            if requested.details:
                 print(f"  {group} | {name} {hashlib.sha256(data).hexdigest()[:12]}")
         print(f"{group}: {whole.hexdigest()[:24]} ({count} arrays)")
         sys.stdout.flush()

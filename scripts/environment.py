@@ -46,24 +46,25 @@ def prepare(*extras: str) -> None:
         sys.exit(f"armblocks needs Python {oldest} or newer; this is {sys.version.split()[0]}")
     if not _runs():
         _create()
-    wanted_by_pyproject = _digest()
-    present = _read_stamp(wanted_by_pyproject)
+    digest = _digest()
+    present = _read_stamp(digest)
     if present is not None and set(extras) <= present:
         return
-    together = sorted(set(extras) | (present or set()))
-    target = f".[{','.join(together)}]" if together else "."
+    all_extras = sorted(set(extras) | (present or set()))
+    target = f".[{','.join(all_extras)}]" if all_extras else "."
     say(f"== install armblocks {target} (a minute or more the first time)")
     code = _pip_install("--editable", target)
     if code != 0:
         sys.exit(f"pip could not install armblocks (exit code {code}); see its message above")
-    STAMP.write_text(json.dumps({"digest": wanted_by_pyproject, "extras": together}), encoding="utf-8")
+    STAMP.write_text(json.dumps({"digest": digest, "extras": all_extras}), encoding="utf-8")
 
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 
 
 def prepare_browser() -> None:
-    """Check that a browser for the journeys through the studio exists; on Debian and Ubuntu, install one.
+    """Check that a browser for the journeys, the browser tests of the studio, exists; on Debian and Ubuntu,
+    install one.
 
     Exits with a message if no browser can be found or installed, so that the check is not skipped silently.
     """
@@ -95,11 +96,11 @@ def _create() -> None:
         )
 
 
-PIPS_STEPS = ("Downloading", "Using cached", "Installing collected packages")
+PIP_STEPS = ("Downloading", "Using cached", "Installing collected packages")
 """Beginnings of the lines in which pip reports its progress."""
 
 
-def _pip_install(*what: str) -> int:
+def _pip_install(*arguments: str) -> int:
     """Run pip and show each of its steps with its start time; return the exit code."""
     # Bytecode is created at import: creating it for all modules takes longer than the installation.
     command = [
@@ -111,7 +112,7 @@ def _pip_install(*what: str) -> int:
         "--no-compile",
         "--progress-bar",
         "off",
-        *what,
+        *arguments,
     ]
     start = time.monotonic()
     with subprocess.Popen(
@@ -126,7 +127,7 @@ def _pip_install(*what: str) -> int:
         assert pip.stdout is not None
         for line in pip.stdout:
             step = line.strip()
-            if step.startswith(PIPS_STEPS):
+            if step.startswith(PIP_STEPS):
                 say(f"   {time.monotonic() - start:4.0f} s  {step.partition(':')[0]}")
     return pip.returncode
 
@@ -137,7 +138,7 @@ def _digest() -> str:
 
     pyproject = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     project = pyproject["project"]
-    asked = [
+    relevant = [
         pyproject["build-system"],
         project["name"],
         project["version"],
@@ -146,7 +147,7 @@ def _digest() -> str:
         project.get("scripts"),
         str(ROOT),
     ]
-    return hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()
+    return hashlib.sha256(json.dumps(relevant, sort_keys=True).encode()).hexdigest()
 
 
 def _read_stamp(digest: str) -> set[str] | None:

@@ -64,13 +64,13 @@ def studio(model: str) -> Generator[str]:
         command = [sys.executable, "-m", "armblocks", "studio", model, "--no-browser", "--folder", folder]
         process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
         assert process.stdout is not None
-        said = ""
+        message = ""
         try:
-            while not (found := re.search(r"http://\S+", said)):
+            while not (found := re.search(r"http://\S+", message)):
                 line = process.stdout.readline()
                 if not line:
-                    raise SystemExit(f"the studio did not start: {said}")
-                said += line.strip()
+                    raise SystemExit(f"the studio did not start: {message}")
+                message += line.strip()
             yield found.group()
         finally:
             process.send_signal(signal.SIGINT)

@@ -16,7 +16,10 @@ from armblocks.pictures.style import FONT_STACK, MONO_STACK, PALETTE
 from armblocks.studio.protocol.schema import message_schema
 
 FRONTEND = Path(__file__).resolve().parent.parent / "frontend"
-BANNER = "/* Made from src/armblocks/studio/protocol/messages by scripts/studio_types.py: do not edit. */"
+BANNER = """/*
+ * The types of all messages between server and page; long, because there are many messages.
+ * Made from src/armblocks/studio/protocol/messages by scripts/studio_types.py: do not edit.
+ */"""
 
 
 def types() -> str:

@@ -89,8 +89,8 @@ class Step:
         with self._output.open("rb") as output:
             while True:
                 ended = self._ended.wait(GLANCE_SECONDS)
-                if said := output.read():
-                    sys.stdout.buffer.write(said)
+                if text := output.read():
+                    sys.stdout.buffer.write(text)
                     sys.stdout.buffer.flush()
                 if ended:
                     return
@@ -140,14 +140,14 @@ def main() -> int:
     parser.add_argument(
         "steps", nargs="*", metavar="step", help=f"which steps: {', '.join(STEPS)} (default: all)"
     )
-    asked = parser.parse_args().steps
-    for name in asked:
+    requested = parser.parse_args().steps
+    for name in requested:
         if name not in STEPS:
             parser.error(f"there is no step named '{name}'; the steps are {', '.join(STEPS)}")
     prepare("test")
     prepare_browser()
     start = time.perf_counter()
-    done = run_steps([name for name in STEPS if not asked or name in asked])
+    done = run_steps([name for name in STEPS if not requested or name in requested])
     say("== summary")
     for step in done:
         verdict = "passed" if step.code == 0 else f"FAILED (exit code {step.code})"

@@ -78,10 +78,10 @@ def effort(request: pytest.FixtureRequest) -> Iterator[None]:
     Other tests show that the effort does not change the results. With ``ARMBLOCKS_EFFORT=full`` all tests
     compile as users do.
     """
-    asked = os.environ.get("ARMBLOCKS_EFFORT", "little")
+    requested = os.environ.get("ARMBLOCKS_EFFORT", "little")
     full = any(request.path.is_relative_to(TESTS / place) for place in FULL_EFFORT)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ARMBLOCKS_EFFORT", "full" if full else asked)
+        patch.setenv("ARMBLOCKS_EFFORT", "full" if full else requested)
         yield
 
 

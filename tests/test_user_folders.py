@@ -26,16 +26,16 @@ def test_user_folders_on_unix(
     for name in ("XDG_CACHE_HOME", "XDG_STATE_HOME", "XDG_DATA_HOME"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("HOME", str(tmp_path))
-    asked = system("armblocks", appauthor=False)
-    assert (asked.user_cache_path, asked.user_state_path) == (tmp_path / cache, tmp_path / state)
+    requested = system("armblocks", appauthor=False)
+    assert (requested.user_cache_path, requested.user_state_path) == (tmp_path / cache, tmp_path / state)
 
 
 def test_user_folders_on_windows(monkeypatch: pytest.MonkeyPatch) -> None:
     folders = {"CSIDL_LOCAL_APPDATA": "local"}
     monkeypatch.setattr("platformdirs.windows.get_win_folder", folders.__getitem__)
-    asked = Windows("armblocks", appauthor=False)
-    assert Path(asked.user_cache_dir) == Path("local/armblocks/Cache")
-    assert Path(asked.user_state_dir) == Path("local/armblocks")
+    requested = Windows("armblocks", appauthor=False)
+    assert Path(requested.user_cache_dir) == Path("local/armblocks/Cache")
+    assert Path(requested.user_state_dir) == Path("local/armblocks")
 
 
 def test_a_variable_sets_the_folders_and_without_a_home_there_are_none(

@@ -1,6 +1,7 @@
 import './mantine_later.css'
 import { ConnectDialog } from './canvas/connect_dialog'
 import { DroppedTableDialog } from './canvas/dropped_table_dialog'
+import { ContextMenu } from './context_menu'
 import { CommandPalette } from './command_palette'
 import { OpenDialog } from './documents/open_dialog'
 import { RecoveryDialog } from './documents/recovery_dialog'
@@ -17,6 +18,7 @@ import { Shortcuts } from './shortcuts'
 export function AllDialogs() {
   return (
     <>
+      <ContextMenu />
       <BlockDialog />
       <MaskDialog />
       <Configuration />

@@ -1,4 +1,5 @@
-import { align, distribute, flip, group, rotate, chosenBlocks } from './canvas/arranging'
+import { align, comment, distribute, flip, ground, group, rotate, chosenBlocks } from './canvas/arranging'
+import { rename } from './canvas/block_node'
 import { copy, cut, duplicate, paste } from './canvas/clipboard'
 import { addNote, sheetView, ZOOM_STEP } from './canvas/sheet_actions'
 import { openConfiguration, openMask, openTour, save, show } from './dialogs'
@@ -62,8 +63,30 @@ const LIST: Command[] = [
     possible: () => !useStudio.getState().document?.linked.length && !masked()?.link,
     run: () => openMask(masked()?.name),
   },
+  {
+    title: 'Rename',
+    keys: 'F2',
+    onSheet: true,
+    possible: chosen,
+    run: () => rename(chosenBlocks()[0]!.name),
+  },
   { title: 'Rotate', keys: 'Ctrl+R', onSheet: true, possible: chosen, run: rotate },
   { title: 'Flip', keys: 'Ctrl+I', onSheet: true, possible: chosen, run: flip },
+  {
+    title: 'Comment out, or uncomment',
+    keys: 'Ctrl+Shift+X',
+    onSheet: true,
+    possible: chosen,
+    run: () => comment('out'),
+  },
+  {
+    title: 'Comment through, or uncomment',
+    keys: 'Ctrl+Shift+Y',
+    onSheet: true,
+    possible: chosen,
+    run: () => comment('through'),
+  },
+  { title: 'Ground and terminate unconnected ports', run: ground },
   { title: 'Duplicate', keys: 'Ctrl+D', onSheet: true, possible: selected, run: () => void duplicate() },
   { title: 'Copy', keys: 'Ctrl+C', onSheet: true, possible: selected, run: () => void copy() },
   { title: 'Cut', keys: 'Ctrl+X', onSheet: true, possible: selected, run: () => void cut() },

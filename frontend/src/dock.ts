@@ -8,15 +8,22 @@ export function setDock(api: DockviewApi): void {
 }
 
 const MARKED_MS = 1200
+/** Time in which a chart is drawn at the first run, whose code is then loaded. */
+const PATIENCE_MS = 3000
 
 /** Show the chart of a block in the panel of the scopes, and mark it for a moment. */
 export function showScope(path: string): void {
   dock?.getPanel('scopes')?.api.setActive()
-  requestAnimationFrame(() => {
+  const end = performance.now() + PATIENCE_MS
+  const mark = () => {
     const chart = document.querySelector(`.scopes [data-view="${CSS.escape(path)}"]`)
-    if (!chart) return
+    if (!chart) {
+      if (performance.now() < end) requestAnimationFrame(mark)
+      return
+    }
     chart.scrollIntoView({ block: 'nearest', inline: 'nearest' })
     chart.classList.add('marked')
     setTimeout(() => chart.classList.remove('marked'), MARKED_MS)
-  })
+  }
+  requestAnimationFrame(mark)
 }

@@ -1,21 +1,22 @@
-/** The keys of one part of the page that are not commands, such as navigation keys. */
-interface KeysOf {
+/** Keys that are not commands, such as navigation keys, for one part of the page. */
+interface KeyGroup {
   place: string
   /** The source files that handle these keys; a test compares them. */
   sources: string[]
   /** Key combinations, separated by a comma, and their effect. */
-  keys: [ways: string, what: string][]
+  keys: [combinations: string, effect: string][]
 }
 
-export const KEYS: KeysOf[] = [
+export const KEYS: KeyGroup[] = [
   {
     place: 'On the sheet',
     sources: ['canvas/sheet_keys.ts'],
     keys: [
       ['letters', 'Add a block: type its name'],
-      ['Tab', 'Go from block to block'],
+      ['Tab', 'Select the next block'],
+      ['F2', 'Rename the block; edit the note'],
       ['Enter', 'Open the block: its parameters, or the sheet inside; edit the note'],
-      ['arrows', 'Move what is selected; with Shift by single pixels'],
+      ['arrows', 'Move the selection; with Shift by one pixel'],
       ['Del, Backspace', 'Delete blocks, wires and notes'],
       ['Esc', 'Clear the selection; again: leave the subsystem'],
       ['>', 'Draw a wire by the names of its ends'],
@@ -24,26 +25,30 @@ export const KEYS: KeysOf[] = [
       ['+, =', 'Zoom in'],
       ['-', 'Zoom out'],
       ['1', 'Show the sheet at 100 %'],
-      ['?', 'This list'],
+      ['?', 'Show this list'],
     ],
   },
   {
     place: 'With the mouse on the sheet',
-    sources: [],
+    sources: ['canvas/pointer_drag.ts'],
     keys: [
       ['Shift+drag', 'Disconnect a block and connect its neighbours'],
-      ['Ctrl+drag', 'Duplicate the selected blocks at the pointer'],
+      ['Ctrl+drag, right drag', 'Duplicate blocks at the pointer; from a line: branch'],
+      ['right click, Menu key', 'Commands on a block, line, port, chart, the sheet or the arm'],
+      ['Alt while dragging', 'Do not align the block with others'],
       ['drag a corner', 'Resize the selected block'],
       ['drag from a port', 'Draw a wire; on the empty sheet add a block at its end'],
-      ['double click', 'Open a block, or write its name; after a run show the chart of a scope'],
+      ['double click', 'Open a block, or edit its name; after a run show the chart of a scope'],
+      ['double click on a wire', 'Name its signal'],
       ['double click on the empty sheet', 'Add a block'],
       ['middle button', 'Move the sheet'],
       ['Ctrl+wheel', 'Zoom'],
+      ['Esc', 'Cancel the copy or the branch'],
     ],
   },
   {
     place: 'Names and notes',
-    sources: ['canvas/block_node.tsx', 'canvas/note_node.tsx'],
+    sources: ['canvas/block_node.tsx', 'canvas/note_node.tsx', 'canvas/signal_names.tsx'],
     keys: [
       ['Enter', 'Accept the name'],
       ['Ctrl+Enter', 'Accept the note'],
@@ -80,8 +85,9 @@ export const KEYS: KeysOf[] = [
     sources: [],
     keys: [
       ['wheel', 'Zoom the time axis of all scopes; over the value axis zoom that scope\u2019s values'],
-      ['drag', 'Pan the time axis; over the value axis pan the values'],
-      ['Shift+drag', 'Move the time cursor'],
+      ['drag', 'Zoom the time axis into the range; over the value axis move the values'],
+      ['Shift+drag, Shift+wheel', 'Move the time axis; also with the middle button'],
+      ['click', 'Set the time cursor'],
       ['double click', 'Show the whole run; on the value axis show all values'],
     ],
   },
@@ -90,10 +96,10 @@ export const KEYS: KeysOf[] = [
     sources: ['robot/stage.tsx'],
     keys: [
       ['arrows', 'Turn the view'],
-      ['+, =', 'Nearer'],
-      ['-', 'Farther'],
-      ['Home', 'From a corner'],
-      ['Space', 'Show all of the arm'],
+      ['+, =', 'Zoom in'],
+      ['-', 'Zoom out'],
+      ['Home', 'View from a corner'],
+      ['Space', 'Show the whole arm'],
     ],
   },
   {
@@ -103,10 +109,10 @@ export const KEYS: KeysOf[] = [
       ['Ctrl+S', 'Save the robot'],
       ['Ctrl+Z', 'Undo'],
       ['Ctrl+Y, Ctrl+Shift+Z', 'Redo'],
-      ['↑, ↓', 'The same cell of the next or previous link'],
+      ['↑, ↓', 'Go to the same cell of the next or previous link'],
       ['Enter', 'Accept and go to the next link; with Shift to the previous link'],
       ['Esc', 'Discard the change of the cell'],
-      ['?', 'This list'],
+      ['?', 'Show this list'],
     ],
   },
 ]

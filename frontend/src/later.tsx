@@ -1,5 +1,6 @@
 import { lazy, memo, Suspense, useEffect, type ComponentType } from 'react'
 import { create } from 'zustand'
+import { useContextMenu } from './context_menu_state'
 import { useDialogs, useTour } from './dialogs'
 import { useStudio } from './store'
 
@@ -42,5 +43,6 @@ export function useWanted(): boolean {
   const dialog = useDialogs((s) => s.open !== null)
   const touring = useTour((s) => s.stop !== null)
   const editing = useStudio((s) => s.editing !== null)
-  return dialog || touring || editing
+  const menu = useContextMenu((s) => s.opened)
+  return dialog || touring || editing || menu
 }

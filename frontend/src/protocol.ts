@@ -1,4 +1,7 @@
-/* Made from src/armblocks/studio/protocol/messages by scripts/studio_types.py: do not edit. */
+/*
+ * The types of all messages between server and page; long, because there are many messages.
+ * Made from src/armblocks/studio/protocol/messages by scripts/studio_types.py: do not edit.
+ */
 
 export interface Messages {
   envelope: Envelope;
@@ -97,15 +100,18 @@ export interface Change {
     | BendWires
     | BreakLink
     | SetCell
+    | CommentBlocks
     | Connect
     | SetConvention
     | Describe
+    | GroundPorts
     | GroupBlocks
     | KeepTuned
     | LogSignal
     | SetMask
     | MoveBlocks
     | MoveJoint
+    | NameSignal
     | SetNotes
     | SetParameters
     | PasteBlocks
@@ -196,6 +202,14 @@ export interface SetCell {
   angles: "deg" | "rad";
 }
 /**
+ * Comment blocks out or through, or remove their comments; see :mod:`armblocks.diagram.comments`.
+ */
+export interface CommentBlocks {
+  kind: "comment";
+  blocks: string[];
+  comment: "out" | "through" | "";
+}
+/**
  * Add a wire. With ``replace`` the present wire of the input is removed.
  */
 export interface Connect {
@@ -217,6 +231,14 @@ export interface SetConvention {
 export interface Describe {
   kind: "describe";
   text: string;
+}
+/**
+ * Add a Ground or a Terminator at every unconnected port of these blocks; without blocks, of the
+ * sheet.
+ */
+export interface GroundPorts {
+  kind: "ground";
+  blocks?: string[];
 }
 /**
  * Move blocks into a new subsystem; its ports are the wires that cross its boundary.
@@ -311,6 +333,14 @@ export interface MoveJoint {
   by: -1 | 1;
 }
 /**
+ * Name the signal at an output ``block/port``; an empty name removes the name.
+ */
+export interface NameSignal {
+  kind: "name_signal";
+  port: string;
+  name: string;
+}
+/**
  * Add notes or change their text.
  */
 export interface SetNotes {
@@ -393,7 +423,7 @@ export interface Close {
   discard?: boolean;
 }
 /**
- * Pause, resume, stop or step a run. ``step`` and ``back`` move by one recorded instant.
+ * Pause, resume, stop or step a run. ``step`` and ``back`` move by one sample.
  */
 export interface Control {
   run: string;
@@ -597,7 +627,7 @@ export interface Reload {
   kind: "reload";
 }
 /**
- * Pause a run and return to an instant (s). Later samples are discarded; tuned values remain.
+ * Pause a run and return to a time (s). Later samples are discarded; tuned values remain.
  */
 export interface Rewind {
   run: string;
@@ -820,6 +850,7 @@ export interface SheetBlock {
   };
   mask: ParameterRule[];
   link: string;
+  comment?: "out" | "through" | "";
 }
 /**
  * A port on the edge of its block: position from the block's corner in px, and direction of its wire.
@@ -860,6 +891,8 @@ export interface WireLines {
   };
   dots: [number, number][];
   label: string;
+  name?: string;
+  name_at?: [number, number, "start" | "middle"] | null;
 }
 /**
  * A robot after a change: the complete content, because one cell may affect many others.
@@ -1047,7 +1080,7 @@ export interface RunProgress {
   reason?: string;
 }
 /**
- * A run has returned to an earlier instant (s); only the first ``count`` samples remain valid.
+ * A run has returned to an earlier time (s); only the first ``count`` samples remain valid.
  */
 export interface RunRewound {
   kind: "run_rewound";
@@ -1081,6 +1114,7 @@ export interface Channel {
   shape: number[];
   unit: string;
   entries: string[];
+  title?: string;
 }
 /**
  * The plot or 3-D view of a sink; ``signals`` are the recorded signals that it shows.
@@ -1106,7 +1140,7 @@ export interface Tunable {
   high: number | null;
 }
 /**
- * A parameter of a run has this value from this instant (s) on.
+ * A parameter of a run has this value from this time (s) on.
  */
 export interface RunTuned {
   kind: "run_tuned";

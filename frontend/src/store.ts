@@ -230,6 +230,12 @@ export async function showBlock(inside: string[], name: string): Promise<void> {
   useStudio.setState({ selection: new Set([name]), sought: name })
 }
 
+/** The names of the blocks and signals of the visible sheet, which a new block cannot have. */
+export function takenNames(): string[] {
+  const { blocks = {}, lines = {} } = useStudio.getState().document ?? {}
+  return [...Object.keys(blocks), ...Object.values(lines).flatMap(({ name }) => (name ? [name] : []))]
+}
+
 /** An unused name for a new block: "Gain", "Gain 2", … */
 export function freeName(wish: string, taken: Iterable<string>): string {
   const folded = new Set([...taken].map((name) => name.toLowerCase()))

@@ -13,7 +13,14 @@ if TYPE_CHECKING:
     from armblocks import blocks, errors
     from armblocks.analysis.linear_system import LinearSystem
     from armblocks.analysis.operating_point import OperatingPoint
-    from armblocks.diagram import Diagram, DiagramBuilder, DiagramDifference, diagram_difference, formula
+    from armblocks.diagram import (
+        Diagram,
+        DiagramBuilder,
+        DiagramDifference,
+        diagram_difference,
+        formula,
+        with_comments,
+    )
     from armblocks.equations import SimulationOptions
     from armblocks.face.arm import Arm
     from armblocks.face.block_examples import block_example
@@ -111,6 +118,7 @@ else:
             "to_python": "armblocks.face.diagrams",
             "trim": "armblocks.face.trimming",
             "write_files": "armblocks.face.reporting",
+            "with_comments": "armblocks.diagram",
             "write_report": "armblocks.face.reporting",
         },
     )
@@ -169,6 +177,7 @@ __all__ = [
     "standard_dh",
     "to_python",
     "trim",
+    "with_comments",
     "write_files",
     "write_report",
 ]

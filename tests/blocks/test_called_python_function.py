@@ -164,8 +164,8 @@ def test_a_failed_call_names_block_and_time_and_keeps_the_earlier_samples() -> N
         return {0.0: 1.0, 1.0: np.ones(3), 2.0: np.nan}.get(t, 1 / 0 if t > 2.5 else u)
 
     for begin, says in (
-        (0.0, r"block 'f' at t = 1 s: 'y' became \[1\. 1\. 1\.\], of shape \(3,\)"),
-        (1.0, r"'y' became nan"),
+        (0.0, r"block 'f' at t = 1 s: 'y' is \[1\. 1\. 1\.\], of shape \(3,\)"),
+        (1.0, r"'y' is nan"),
         (2.0, r"the function late failed: ZeroDivisionError"),
     ):
         builder = DiagramBuilder("d")

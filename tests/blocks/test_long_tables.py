@@ -20,7 +20,7 @@ from armblocks.blocks import (
     Prelookup,
 )
 from armblocks.blocks.long_tables import SHORT
-from armblocks.blocks.splines import spline_slopes
+from armblocks.blocks.splines import spline_derivatives
 from armblocks.diagram import trace_diagram
 from armblocks.errors import DiagramError, InputError
 
@@ -224,7 +224,9 @@ def test_derivatives_of_splines_agree_with_scipy(count: int, spacing: str) -> No
     y = np.random.default_rng(count + 1).normal(size=(count, 2))
     expected = np.tile(np.diff(y, axis=0) / np.diff(x), (2, 1)) if count == 2 else CubicSpline(x, y)(x, 1)
     scale = np.abs(expected).max(axis=0)
-    np.testing.assert_allclose(spline_slopes(x.tolist(), y) / scale, expected / scale, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(
+        spline_derivatives(x.tolist(), y) / scale, expected / scale, rtol=0, atol=1e-12
+    )
 
 
 def test_a_long_spline_is_tuned_during_a_run_without_compilation() -> None:

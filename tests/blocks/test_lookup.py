@@ -23,7 +23,7 @@ from armblocks.blocks import (
     Prelookup,
     Pulse,
 )
-from armblocks.blocks.splines import spline_slopes
+from armblocks.blocks.splines import spline_derivatives
 from armblocks.errors import DiagramError, InputError
 
 RANDOM = np.random.default_rng(22)
@@ -54,7 +54,7 @@ def test_cubic_interpolation_agrees_with_scipy(n: int) -> None:
     table = LookupTable1D(positions=x, table=y, method="cubic", extrapolation="linear")
     assert evaluate(table, u)["y"] == pytest.approx(spline(u), rel=1e-11, abs=1e-12)
     beyond = evaluate(table, [x[0] - 1, x[-1] + 2])["y"]
-    slopes = spline_slopes(x.tolist(), y)
+    slopes = spline_derivatives(x.tolist(), y)
     assert beyond == pytest.approx([y[0] - slopes[0], y[-1] + 2 * slopes[-1]], rel=1e-11)
     held = evaluate(LookupTable1D(positions=x, table=y, method="cubic"), [x[0] - 1, x[-1] + 2])["y"]
     assert held.tolist() == [y[0], y[-1]]

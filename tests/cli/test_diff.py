@@ -46,11 +46,11 @@ def test_the_json_output_has_the_same_changes(invoke: Invoke, tmp_path: Path, ch
     ab.save_diagram(changed, tmp_path / "new.json")
     result = invoke("diff", "kr180model", "new.json", "--json")
     assert result.exit_code == 1
-    said = json.loads(result.stdout)
-    assert said["same"] is False
-    assert said["parameters"] == [{"path": "jtraj", "name": "tmax", "before": 10.0, "after": 5.0}]
-    assert said["settings"] == [{"path": "", "name": "stop_time", "before": 10.0, "after": 5.0}]
-    assert said["added"] == said["removed"] == said["wires_added"] == []
+    message = json.loads(result.stdout)
+    assert message["same"] is False
+    assert message["parameters"] == [{"path": "jtraj", "name": "tmax", "before": 10.0, "after": 5.0}]
+    assert message["settings"] == [{"path": "", "name": "stop_time", "before": 10.0, "after": 5.0}]
+    assert message["added"] == message["removed"] == message["wires_added"] == []
 
 
 def test_changed_logged_outputs_and_notes_are_listed(invoke: Invoke, tmp_path: Path) -> None:
@@ -58,9 +58,9 @@ def test_changed_logged_outputs_and_notes_are_listed(invoke: Invoke, tmp_path: P
     notes = {"/n1": Note(x=0.0, y=0.0, text="held by a PID")}
     new = dataclasses.replace(old, logged=(PortRef("PID", "y"),), notes=notes)
     ab.save_diagram(new, tmp_path / "new.json")
-    said = invoke("diff", "van_der_pol_pid", "new.json").stdout
-    assert "Logged\n  + PID/y\n" in said
-    assert 'Notes\n  ~ /n1: none -> "held by a PID"\n' in said
+    message = invoke("diff", "van_der_pol_pid", "new.json").stdout
+    assert "Logged\n  + PID/y\n" in message
+    assert 'Notes\n  ~ /n1: none -> "held by a PID"\n' in message
     found = json.loads(invoke("diff", "van_der_pol_pid", "new.json", "--json").stdout)
     assert found["logged_added"] == [{"path": "", "port": "PID/y"}]
     assert found["notes"] == [{"path": "", "name": "/n1", "before": None, "after": "held by a PID"}]

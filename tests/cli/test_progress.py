@@ -10,11 +10,11 @@ from armblocks.cli.progress import RunProgress
 
 
 @pytest.mark.parametrize(
-    ("spent", "fraction", "told"),
+    ("spent", "fraction", "message"),
     [(10.0, 0.5, "about 10 s left"), (60.0, 0.1, "about 9 min left"), (3600.0, 0.25, "about 3.0 h left")],
 )
 def test_a_long_run_shows_the_remaining_time(
-    spent: float, fraction: float, told: str, monkeypatch: pytest.MonkeyPatch
+    spent: float, fraction: float, message: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now = [100.0]
     monkeypatch.setattr(module.time, "perf_counter", lambda: now[0])
@@ -22,12 +22,12 @@ def test_a_long_run_shows_the_remaining_time(
     with RunProgress("model", Console(file=text, width=200)) as progress:
         now[0] += spent
         progress(1.0, fraction, 3.0)
-    assert f"t = 1 s, 3 x real time, {told}" in text.getvalue()
+    assert f"t = 1 s, 3 x real time, {message}" in text.getvalue()
 
 
-@pytest.mark.parametrize(("factor", "told"), [(0.00612, "0.00612"), (3.0, "3"), (123456.0, "123,456")])
+@pytest.mark.parametrize(("factor", "message"), [(0.00612, "0.00612"), (3.0, "3"), (123456.0, "123,456")])
 def test_the_speed_relative_to_real_time_is_shown(
-    factor: float, told: str, monkeypatch: pytest.MonkeyPatch
+    factor: float, message: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now = [100.0]
     monkeypatch.setattr(module.time, "perf_counter", lambda: now[0])
@@ -35,7 +35,7 @@ def test_the_speed_relative_to_real_time_is_shown(
     with RunProgress("model", Console(file=text, width=200)) as progress:
         now[0] += 60.0
         progress(1.0, 0.5, factor)
-    assert f"t = 1 s, {told} x real time" in text.getvalue()
+    assert f"t = 1 s, {message} x real time" in text.getvalue()
 
 
 def test_a_run_that_is_nearly_finished_shows_no_remaining_time(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -84,13 +84,13 @@ def test_a_bad_file_is_refused_with_one_message_and_writes_nothing(
     data = content if isinstance(content, bytes) else content.encode()
     (tmp_path / "tried.json").write_bytes(data)
     result = invoke("run", "tried.json", "--out", "kept", "--no-figures", "--no-jumps")
-    said = " ".join(result.stderr.split())
+    text = " ".join(result.stderr.split())
     assert result.exit_code == 2, result.output
-    assert said.startswith("error: ")
-    assert said.count("error: ") == 1
+    assert text.startswith("error: ")
+    assert text.count("error: ") == 1
     assert "Traceback" not in result.output
-    assert words in said
-    assert len(said) < 500
+    assert words in text
+    assert len(text) < 500
     assert sorted(path.name for path in tmp_path.iterdir()) == ["evil.py", "tried.json"]
 
 

@@ -69,7 +69,7 @@ def test_a_long_function_in_pieces_equals_the_uncut_one_bit_for_bit(monkeypatch:
     in_pieces = function_in_pieces()
     found = in_pieces(x, u)
     singles = [in_pieces(x[row], u[row]) for row in range(21)]
-    told = [interpret(tape, [x[row], u[row]]) for row in (0, 7, 19)]
+    message = [interpret(tape, [x[row], u[row]]) for row in (0, 7, 19)]
     monkeypatch.setenv("ARMBLOCKS_CACHE_DIR", "")
     monkeypatch.setattr(pieces, "LONGEST", 10**9)
     whole = compile_function(traced)(x, u)
@@ -77,7 +77,7 @@ def test_a_long_function_in_pieces_equals_the_uncut_one_bit_for_bit(monkeypatch:
         np.testing.assert_array_equal(found[slot], whole[slot])
         np.testing.assert_array_equal(found[slot], [single[slot] for single in singles])
         # Functions differ by one or two units in the last place; the recursion damps earlier differences.
-        wanted = [values[slot] for values in told]
+        wanted = [values[slot] for values in message]
         np.testing.assert_allclose(found[slot][[0, 7, 19]], wanted, rtol=1e-12, atol=1e-13)
 
 
@@ -128,8 +128,8 @@ def test_all_optimisation_efforts_give_the_same_bits() -> None:
         for vector in vectors[len(tape.input_sizes) :]:
             vector[:] = np.nan
     assert len(found) == 2 and found[0] == found[1]
-    told = interpret(tape, vectors[: len(tape.input_sizes)])
-    for given, expected in zip(found[0][len(tape.input_sizes) :], told):
+    message = interpret(tape, vectors[: len(tape.input_sizes)])
+    for given, expected in zip(found[0][len(tape.input_sizes) :], message):
         np.testing.assert_allclose(np.frombuffer(given), expected, rtol=1e-12, atol=1e-13)
 
 
@@ -142,8 +142,8 @@ def test_an_environment_variable_limits_the_optimisation_effort(monkeypatch: pyt
 
     monkeypatch.setattr(native, "compile_object", compiled)
     monkeypatch.setenv("ARMBLOCKS_CACHE_DIR", "")
-    for asked, given in (("", "FULL"), ("full", "FULL"), ("little", "LITTLE")):
-        monkeypatch.setenv("ARMBLOCKS_EFFORT", asked)
+    for requested, given in (("", "FULL"), ("full", "FULL"), ("little", "LITTLE")):
+        monkeypatch.setenv("ARMBLOCKS_EFFORT", requested)
         load_code(("empty",), lambda: "")
         load_code(("empty",), lambda: "", Effort.LITTLE)
         assert made == [Effort[given], Effort.LITTLE]

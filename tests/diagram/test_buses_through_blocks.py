@@ -189,14 +189,14 @@ def two_buses(second: str, width: int = 1) -> DiagramBuilder:
 
 
 def test_different_buses_at_the_inputs_are_refused_with_both_ports() -> None:
-    said = "'u1' is a bus with p, q, but input 'u2' is "
-    with pytest.raises(DiagramError, match=f"{said}a bus with p, r") as caught:
+    text = "'u1' is a bus with p, q, but input 'u2' is "
+    with pytest.raises(DiagramError, match=f"{text}a bus with p, r") as caught:
         two_buses("p, r").build()
     assert "choose" in str(caught.value.where)
     builder = DiagramBuilder("mixed")
     one = builder.add("one", Constant())
     builder.add("choose", ManualSwitch(), builder.add("bus", BusCreator(names="p, q"), one, one), one)
-    with pytest.raises(DiagramError, match=f"{said}the single signal 'one/y'"):
+    with pytest.raises(DiagramError, match=f"{text}the single signal 'one/y'"):
         builder.build()
     assert two_buses("p, q", width=3).build()  # a scalar is broadcast to a vector, as without buses
 

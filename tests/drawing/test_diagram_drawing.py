@@ -3,7 +3,7 @@
 import dataclasses
 import itertools
 import xml.etree.ElementTree as ET
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 
 import pytest
@@ -45,8 +45,11 @@ from armblocks.drawing.diagram_drawing import (
     diagram_svg,
 )
 from armblocks.drawing.diagram_layout import boxes
+from armblocks.drawing.wire_names import name_place
+from armblocks.drawing.wires import Obstacle
 from armblocks.face.block_examples import example_block
-from armblocks.pictures.picture import Curve, Picture, text_marks
+from armblocks.pictures.picture import Curve, Group, Mark, Picture, Polyline, Raster, Text, text_marks
+from armblocks.pictures.style import Tone
 from armblocks.pictures.text_width import text_width
 
 EXAMPLES = ("kr180model", "falling_pendulum", "puma560_computed_torque", "van_der_pol_pid")
@@ -214,6 +217,52 @@ def test_a_wire_without_room_has_labels_at_both_ends() -> None:
         builder.place(name, x, 0.0)
     texts = [mark.text for mark in text_marks(diagram_picture(builder.draft()))]
     assert texts.count("ramp") == 3, "its name and two labels"
+
+
+@pytest.mark.parametrize("kind", ["Gain", "Sum", "Fkine", "Scope", "Subsystem", "PID"])
+def test_commented_blocks_are_grey_with_their_sign(kind: str) -> None:
+    """Out: a percent sign; through: a line from each input to its output."""
+    diagram = ab.block_example(kind)
+    name = next(name for name, block in diagram.blocks.items() if block.type_name() == kind)
+    box = boxes(diagram)[name]
+    tones = {Tone.HAIRLINE, Tone.SUNKEN, Tone.MUTED, None}
+
+    def painted(marks: Iterable[Mark]) -> Iterator[Tone | None]:
+        for mark in marks:
+            if isinstance(mark, Group):
+                yield from painted(mark.marks)
+            elif isinstance(mark, Text):
+                yield mark.tone
+            elif not isinstance(mark, Raster):
+                yield from (mark.stroke, mark.fill)
+
+    out = block_marks(box, comment="out")
+    assert set(painted(out)) <= tones
+    assert isinstance(out[-1], Text)
+    assert out[-1].text == "%"
+    if kind in ("Fkine", "Scope"):
+        return
+    through = block_marks(box, comment="through")
+    lines = through[len(out) - 1 :]
+    assert set(painted(through[: len(out) - 1])) <= tones
+    assert [(*line.points[0], *line.points[-1]) for line in lines if isinstance(line, Polyline)] == [
+        (box.inputs[0].x, box.inputs[0].y, box.outputs[0].x, box.outputs[0].y)
+    ]
+    svg = diagram_svg(dataclasses.replace(diagram, commented={name: "through"}))
+    assert f"{name} ({box.block.title}, commented through)" in svg
+
+
+def test_the_name_of_a_signal_covers_no_block() -> None:
+    """The longest segment is used, unless a block is there; below the line, if there is no room above."""
+    path = ((0.0, 0.0), (100.0, 0.0), (100.0, 60.0), (400.0, 60.0))
+    far = Obstacle(500.0, 500.0, 1.0, 1.0, (500.0, 500.0, 1.0, 1.0))
+    above = Obstacle(100.0, 20.0, 300.0, 38.0, (100.0, 58.0, 1.0, 1.0))
+    both = Obstacle(100.0, 20.0, 300.0, 80.0, (100.0, 58.0, 1.0, 1.0))
+    assert name_place("speed", [path], [far]) == (250.0, 56.0, "middle")
+    assert name_place("speed", [path], [above]) == (250.0, 72.0, "middle")
+    assert name_place("speed", [path], [both]) == (50.0, -4.0, "middle")
+    assert name_place("speed", [path[1:3]], [far]) == (104.0, 33.6, "start")
+    assert name_place("speed", [()], [far]) is name_place("", [path], [far]) is None
 
 
 def test_an_empty_diagram_has_a_drawing() -> None:

@@ -29,7 +29,7 @@ class Placed:
     input_side: str
     output_side: str
 
-    def spot(self, side: str, k: int, count: int) -> tuple[float, float]:
+    def port_position(self, side: str, k: int, count: int) -> tuple[float, float]:
         """The position of port ``k`` of ``count`` on a side."""
         share = (k + 0.5) / count
         if side in ("left", "right"):
@@ -50,10 +50,10 @@ class SheetModel:
         found: dict[str, Port] = {}
         for name, block in self.blocks.items():
             for k in range(block.inputs):
-                place = block.spot(block.input_side, k, block.inputs)
+                place = block.port_position(block.input_side, k, block.inputs)
                 found[f"{name}/u{k}"] = Port(name, *place, SIDES[block.input_side], False)
             for k in range(block.outputs):
-                place = block.spot(block.output_side, k, block.outputs)
+                place = block.port_position(block.output_side, k, block.outputs)
                 found[f"{name}/y{k}"] = Port(name, *place, SIDES[block.output_side], True)
         return found
 
@@ -101,8 +101,8 @@ def drawing(model: SheetModel, routed: Mapping[str, RoutedNet]) -> Drawing:
 
 
 def check_connections(model: SheetModel, routed: Mapping[str, RoutedNet]) -> None:
-    wanted = {f"{b}/u{k}": f"{d}/y{j}" for (b, k), (d, j) in model.drivers.items()}
-    assert read(drawing(model, routed)) == wanted
+    expected = {f"{b}/u{k}": f"{d}/y{j}" for (b, k), (d, j) in model.drivers.items()}
+    assert read(drawing(model, routed)) == expected
 
 
 def random_model(draw: random.Random) -> SheetModel:
@@ -170,10 +170,10 @@ def test_a_user_drawn_route_is_used_and_other_targets_branch_from_it() -> None:
     bends = (60.0, 50.0, 120.0)
     path = bent(SOURCE, bends, FAR)
     assert path == ((0, 0), (60, 0), (60, 50), (120, 50), (120, 100), (200, 100))
-    (laid,) = route([], [Net(SOURCE, (NEAR, FAR), ((), bends))])
-    assert laid.paths[1] == path
-    assert laid.paths[0] == ((60, 0), (200, 0))
-    assert laid.dots == ((60, 0),)
+    (routed_net,) = route([], [Net(SOURCE, (NEAR, FAR), ((), bends))])
+    assert routed_net.paths[1] == path
+    assert routed_net.paths[0] == ((60, 0), (200, 0))
+    assert routed_net.dots == ((60, 0),)
     # After a rotation of the block the route does not end at its port: the wire is routed automatically.
     assert bent(SOURCE, bends, WireEnd(200, 100, 0, 1)) is None
     assert bent(SOURCE, (), FAR) is None
@@ -185,9 +185,9 @@ def test_an_illegal_user_drawn_route_is_replaced(source: float, bend: float) -> 
     block = Obstacle(45.0, 20.0, 40.0, 60.0, (45.0, 82.0, 40.0, 16.0))
     start, end = WireEnd(0, source, 1, 0), WireEnd(200, 160 if source else 100, 1, 0)
     shorter = Net(WireEnd(120, 20, 1, 0), (WireEnd(200, 60, 1, 0),), ((150.0,),))
-    kept, laid = route([block], [shorter, Net(start, (end,), ((bend,),))])
-    assert kept.paths == (bent(shorter.source, (150.0,), shorter.targets[0]),)
-    (path,) = laid.paths
+    unchanged, routed_net = route([block], [shorter, Net(start, (end,), ((bend,),))])
+    assert unchanged.paths == (bent(shorter.source, (150.0,), shorter.targets[0]),)
+    (path,) = routed_net.paths
     assert path != bent(start, (bend,), end)
     assert path[0] == (start.x, start.y) and path[-1] == (end.x, end.y)
 

@@ -24,7 +24,7 @@ from armblocks.diagram import UserFunction, content_key
 from armblocks.simulation import Samples
 from armblocks.simulation.jumps import Jumps
 
-WAYS: dict[str, Callable[[Any], Any]] = {
+COPY_FUNCTIONS: dict[str, Callable[[Any], Any]] = {
     "pickle": lambda value: pickle.loads(pickle.dumps(value)),
     "copy": copy.copy,
     "deepcopy": copy.deepcopy,
@@ -103,27 +103,27 @@ def test_every_public_type_is_among_the_examples() -> None:
     assert types - {"DiagramRun"} <= examples().keys()
 
 
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("way", COPY_FUNCTIONS)
 def test_a_copy_has_the_content_of_the_original(way: str) -> None:
     for name, value in examples().items():
-        assert content(WAYS[way](value)) == content(value), name
+        assert content(COPY_FUNCTIONS[way](value)) == content(value), name
 
 
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("way", COPY_FUNCTIONS)
 def test_arrays_of_copies_are_read_only(way: str) -> None:
     payload, system, table = (examples()[name] for name in ("Payload", "LinearSystem", "TimeTable"))
     assert payload.numbers.sum() == 2.0  # computed and cached before the copy
-    copies = [WAYS[way](value) for value in (payload, system, table)]
+    copies = [COPY_FUNCTIONS[way](value) for value in (payload, system, table)]
     assert not any(array.flags.writeable for array in (copies[0].numbers, copies[1].A, copies[2].rows))
 
 
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("way", COPY_FUNCTIONS)
 def test_a_copy_computes_the_same_bits(way: str) -> None:
     arm, diagram = ab.load_robot("puma560"), ab.load_diagram("kr180model")
     q = np.linspace(-1, 1, 6)
-    assert WAYS[way](arm).rne(q, q, q).tobytes() == arm.rne(q, q, q).tobytes()
+    assert COPY_FUNCTIONS[way](arm).rne(q, q, q).tobytes() == arm.rne(q, q, q).tobytes()
     for model in (diagram, ab.compile_diagram(diagram)):
-        again = ab.simulate(WAYS[way](model), stop_time=0.5)
+        again = ab.simulate(COPY_FUNCTIONS[way](model), stop_time=0.5)
         assert again.signals.tobytes() == ab.simulate(diagram, stop_time=0.5).signals.tobytes()
 
 
@@ -150,12 +150,12 @@ def raised(kind: type[errors.ArmblocksError]) -> errors.ArmblocksError:
     return error
 
 
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("way", COPY_FUNCTIONS)
 def test_copies_of_errors_keep_all_their_parts(way: str) -> None:
     kinds = [kind for kind in vars(errors).values() if isinstance(kind, type)]
     for kind in kinds:
         if issubclass(kind, errors.ArmblocksError):
-            assert content(WAYS[way](raised(kind))) == content(raised(kind))
+            assert content(COPY_FUNCTIONS[way](raised(kind))) == content(raised(kind))
 
 
 def test_a_python_function_is_pickled_by_its_name(tmp_path: Path) -> None:
@@ -191,7 +191,7 @@ def test_a_local_function_or_lambda_cannot_be_pickled() -> None:
 
 def test_a_run_in_progress_cannot_be_pickled() -> None:
     run = ab.begin("van_der_pol_pid")
-    for way in WAYS.values():
+    for way in COPY_FUNCTIONS.values():
         with pytest.raises(errors.InputError, match=r"a run in progress cannot be copied.*initial_state"):
             way(run)
     with pytest.raises(errors.InputError, match=r"native code cannot be pickled"):

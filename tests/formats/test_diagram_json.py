@@ -115,6 +115,13 @@ def diagrams(draw: st.DrawFn) -> Diagram:
     last = builder.add(names[0], Constant(value=draw(numbers | st.tuples(numbers, numbers))))
     for name in names[1:]:
         last = builder.add(name, draw(st.sampled_from([Gain(gain=draw(numbers)), Integrator()])), last)
+        match draw(st.sampled_from(["", "out", "through"])):
+            case "out":
+                builder.comment_out(last)
+            case "through" if isinstance(last.block, Integrator):
+                builder.comment_through(last)
+            case _:
+                pass
     for name in draw(st.sets(st.sampled_from(names))):
         builder.place(
             name, draw(numbers), draw(numbers), width=draw(st.none() | numbers), flipped=draw(st.booleans())
@@ -494,6 +501,7 @@ def test_a_description_is_kept_and_may_be_absent() -> None:
 def _nested(depth: int) -> Diagram:
     builder = DiagramBuilder("inner", extras={"": {"colour": "red"}})
     builder.output("y", builder.add("gain", Gain(gain=2.0), builder.input("u", unit="m")))
+    builder.comment_through("gain")
     builder.place("gain", 10.0, 20.0)
     diagram = builder.build()
     for level in range(depth):
@@ -514,6 +522,7 @@ def test_diagrams_inside_blocks_are_written_and_read_again(schema: jsonschema.Dr
         assert b'"gain": {"x": 10, "y": 20}' in data
         assert b'"colour": "red"' in data
         if depth < 10:  # the validator recurses
+            assert b'"commented": "through"' in data
             schema.validate(json.loads(data))
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from armblocks.compiler.native import load_code
 from armblocks.integration.elimination_plan import JacobianPattern
-from armblocks.integration.linear_equations import LinearEquations, LinearSpace
+from armblocks.integration.linear_equations import LinearEquations, LinearEquationsLayout
 from armblocks.routines.llvm import definitions
 from armblocks.routines.memory import Reals
 from armblocks.routines.routine import Program, Routine
@@ -26,33 +26,33 @@ class Solver:
         pattern = JacobianPattern(
             states=states, size=len(J), rows=tuple(rows.tolist()), columns=tuple(columns.tolist())
         )
-        self.space = LinearSpace(pattern)
+        self.layout = LinearEquationsLayout(pattern)
         program = Program()
-        equations = LinearEquations(program, self.space, GAMMA)
+        equations = LinearEquations(program, self.layout, GAMMA)
 
         def sparse(r: Routine, scratch: Reals, h: Real) -> Integer:
             r.call(equations.factor, scratch, h)
             r.call(equations.solve, scratch)
-            judge = equations.solved_well
-            return r.call(judge, scratch, h).count() if judge else r.integer(1).value
+            check = equations.is_accurate
+            return r.call(check, scratch, h).count() if check else r.integer(1).value
 
-        def whole(r: Routine, scratch: Reals, h: Real) -> Integer:
-            r.call(equations.factor_whole, scratch, h)
+        def dense(r: Routine, scratch: Reals, h: Real) -> Integer:
+            r.call(equations.factor_dense, scratch, h)
             r.call(equations.solve, scratch)
-            judge = equations.solved_well
-            return r.call(judge, scratch, h).count() if judge else r.integer(1).value
+            check = equations.is_accurate
+            return r.call(check, scratch, h).count() if check else r.integer(1).value
 
         def rate(r: Routine, scratch: Reals) -> Real:
             return r.call(equations.rate_bound, scratch)
 
-        for function in (sparse, whole, rate):
+        for function in (sparse, dense, rate):
             program.define(function, public=True)
         text = "\n\n".join(definitions(program).values())
         self.code = load_code(("linear equations test", text), lambda: text)
         kind = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_double)
-        self.functions = {name: kind(self.code.address(name)) for name in ("sparse", "whole")}
+        self.functions = {name: kind(self.code.address(name)) for name in ("sparse", "dense")}
         self.rate = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p)(self.code.address("rate"))
-        self.scratch = np.empty(self.space.length)
+        self.scratch = np.empty(self.layout.length)
         self.scratch[: len(rows)] = J[rows, columns]
         E = np.zeros(len(J))
         E[:states] = 1.0 / GAMMA
@@ -60,10 +60,10 @@ class Solver:
 
     def solve(self, how: str, right: np.ndarray) -> tuple[bool, np.ndarray]:
         """Return whether the solution passes the accuracy check, and the solution."""
-        space = self.space
-        self.scratch[space.right : space.right + space.size] = right
-        good = self.functions[how](self.scratch.ctypes.data, H)
-        return bool(good), self.scratch[space.solution : space.solution + space.size].copy()
+        layout = self.layout
+        self.scratch[layout.right : layout.right + layout.size] = right
+        accurate = self.functions[how](self.scratch.ctypes.data, H)
+        return bool(accurate), self.scratch[layout.solution : layout.solution + layout.size].copy()
 
 
 def random_sparse(seed: int, n: int, filled: float) -> np.ndarray:
@@ -75,9 +75,9 @@ def random_sparse(seed: int, n: int, filled: float) -> np.ndarray:
 def test_both_eliminations_agree_with_numpy(n: int, filled: float) -> None:
     solver = Solver(random_sparse(n, n, filled) + np.eye(n), n)
     right = np.random.default_rng(0).normal(size=n)
-    for how in ("sparse", "whole"):
-        good, found = solver.solve(how, right)
-        assert good
+    for how in ("sparse", "dense"):
+        accurate, found = solver.solve(how, right)
+        assert accurate
         np.testing.assert_allclose(found, np.linalg.solve(solver.matrix, right), rtol=1e-10, atol=1e-12)
 
 
@@ -100,9 +100,9 @@ def test_the_rate_bound_is_above_every_eigenvalue_and_near_the_largest(n: int, s
 
 
 def test_small_and_full_matrices_have_no_plan() -> None:
-    assert Solver(random_sparse(1, 8, 0.2), 8).space.plan is None
-    assert Solver(np.ones((20, 20)), 20).space.plan is None
-    assert Solver(np.eye(20), 20).space.plan is not None
+    assert Solver(random_sparse(1, 8, 0.2), 8).layout.plan is None
+    assert Solver(np.ones((20, 20)), 20).layout.plan is None
+    assert Solver(np.eye(20), 20).layout.plan is not None
 
 
 def test_a_vanishing_pivot_is_detected_and_pivoting_solves_the_equations() -> None:
@@ -114,10 +114,10 @@ def test_a_vanishing_pivot_is_detected_and_pivoting_solves_the_equations() -> No
     solver = Solver(J, n)
     right = np.random.default_rng(3).normal(size=n)
     expected = np.linalg.solve(solver.matrix, right)
-    good, _ = solver.solve("sparse", right)
-    assert not good
-    good, found = solver.solve("whole", right)
-    assert good
+    accurate, _ = solver.solve("sparse", right)
+    assert not accurate
+    accurate, found = solver.solve("dense", right)
+    assert accurate
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
 
 
@@ -127,10 +127,10 @@ def test_the_accuracy_check_does_not_depend_on_units() -> None:
     J = random_sparse(7, n, 0.06) - np.eye(n)
     units = 10.0 ** np.random.default_rng(1).integers(-12, 13, n)
     right = np.random.default_rng(2).normal(size=n)
-    good, plain = Solver(J, n).solve("sparse", right)
-    assert good
-    good, scaled = Solver(J * units[:, np.newaxis] / units, n).solve("sparse", right * units)
-    assert good
+    accurate, plain = Solver(J, n).solve("sparse", right)
+    assert accurate
+    accurate, scaled = Solver(J * units[:, np.newaxis] / units, n).solve("sparse", right * units)
+    assert accurate
     np.testing.assert_allclose(scaled / units, plain, rtol=1e-9, atol=1e-11)
 
 
@@ -140,8 +140,8 @@ def test_implicit_equations_are_eliminated_with_the_states() -> None:
     J = random_sparse(5, n + m, 0.1)
     J[n:, n:] = np.roll(np.diag([1.0, 2.0, 3.0, 4.0]), 1, axis=0)
     solver = Solver(J, n)
-    assert solver.space.plan is not None
+    assert solver.layout.plan is not None
     right = np.random.default_rng(4).normal(size=n + m)
-    good, found = solver.solve("sparse", right)
-    assert good
+    accurate, found = solver.solve("sparse", right)
+    assert accurate
     np.testing.assert_allclose(found, np.linalg.solve(solver.matrix, right), rtol=1e-9)

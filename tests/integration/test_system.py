@@ -11,7 +11,7 @@ import pytest
 from armblocks.compiler import cache, pieces
 from armblocks.equations import HybridSystem, TracedFunction, continuous_system, signature
 from armblocks.errors import CompileError
-from armblocks.integration.system import CompiledSystem, compile_system, recall_system
+from armblocks.integration.system import CompiledSystem, cached_system, compile_system
 
 
 def pendulum(length: float = 2.0) -> HybridSystem:
@@ -51,9 +51,9 @@ def test_signals_of_a_batch_agree_with_casadi(count: int) -> None:
     system = pendulum()
     compiled = compile_system(system)
     random = np.random.default_rng(count)
-    no = np.empty((count, 0))
+    empty = np.empty((count, 0))
     t, x, p = random.uniform(0, 1, count), random.normal(size=(count, 2)), np.array([9.81, 0.3])
-    y = compiled.evaluate_signals(t, x, no, no, p)
+    y = compiled.evaluate_signals(t, x, empty, empty, p)
     assert y.shape == (5, count)
     expected = np.array([system.signals(t[k], x[k], (), (), p)[0] for k in range(min(count, 20))])
     np.testing.assert_allclose(y[:, :20].T, expected, rtol=1e-14, atol=1e-15)
@@ -62,12 +62,12 @@ def test_signals_of_a_batch_agree_with_casadi(count: int) -> None:
 def test_signals_at_one_time_and_at_many_times_have_the_same_bits() -> None:
     compiled = compile_system(pendulum())
     random = np.random.default_rng(5)
-    no = np.empty((37, 0))
+    empty = np.empty((37, 0))
     t, x, p = random.uniform(0, 1, 37), random.normal(size=(37, 2)), np.array([9.81, 0.3])
-    whole = compiled.evaluate_signals(t, x, no, no, p)
+    whole = compiled.evaluate_signals(t, x, empty, empty, p)
     for k in range(37):
         assert (
-            compiled.evaluate_signals(t[k : k + 1], x[k : k + 1], no[:1], no[:1], p)[:, 0].tobytes()
+            compiled.evaluate_signals(t[k : k + 1], x[k : k + 1], empty[:1], empty[:1], p)[:, 0].tobytes()
             == whole[:, k].tobytes()
         )
 
@@ -76,13 +76,13 @@ def test_code_of_a_long_tape_without_lanes_gives_the_same_bits(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     random = np.random.default_rng(6)
-    no = np.empty((37, 0))
+    empty = np.empty((37, 0))
     t, x, p = random.uniform(0, 1, 37), random.normal(size=(37, 2)), np.array([9.81, 0.3])
     x[5] = 1e300
-    in_lanes = compile_system(pendulum()).evaluate_signals(t, x, no, no, p)
+    in_lanes = compile_system(pendulum()).evaluate_signals(t, x, empty, empty, p)
     monkeypatch.setenv("ARMBLOCKS_CACHE_DIR", "")
     monkeypatch.setattr(pieces, "LONGEST", 0)
-    assert compile_system(pendulum()).evaluate_signals(t, x, no, no, p).tobytes() == in_lanes.tobytes()
+    assert compile_system(pendulum()).evaluate_signals(t, x, empty, empty, p).tobytes() == in_lanes.tobytes()
 
 
 def test_derivative_start_and_breakpoints_depend_on_the_parameters() -> None:
@@ -98,7 +98,7 @@ def test_derivative_start_and_breakpoints_depend_on_the_parameters() -> None:
 
 
 def same(one: CompiledSystem, other: CompiledSystem) -> bool:
-    no = np.empty((9, 0))
+    empty = np.empty((9, 0))
     t, x = np.linspace(0, 1, 9), np.linspace(-1, 1, 18).reshape(9, 2)
     p = one.parameter_values
     return (
@@ -107,8 +107,8 @@ def same(one: CompiledSystem, other: CompiledSystem) -> bool:
         == (other.states, other.parameters, other.signals_layout)
         and one.aliases == other.aliases
         and p.tobytes() == other.parameter_values.tobytes()
-        and one.evaluate_signals(t, x, no, no, p).tobytes()
-        == other.evaluate_signals(t, x, no, no, p).tobytes()
+        and one.evaluate_signals(t, x, empty, empty, p).tobytes()
+        == other.evaluate_signals(t, x, empty, empty, p).tobytes()
     )
 
 
@@ -123,24 +123,24 @@ def never() -> HybridSystem:
 
 
 def test_a_cached_system_is_loaded_without_tracing(own_cache: Path) -> None:
-    first = recall_system("pendulum 2 m", pendulum)
+    first = cached_system("pendulum 2 m", pendulum)
     first.evaluate_signals(
         np.zeros(1), np.zeros((1, 2)), np.empty((1, 0)), np.empty((1, 0)), first.parameter_values
     )
-    second = recall_system("pendulum 2 m", never)
+    second = cached_system("pendulum 2 m", never)
     assert same(first, second)
     assert second.tape("derivative").digest == first.tape("derivative").digest
-    other = recall_system("pendulum 3 m", lambda: pendulum(3.0))
+    other = cached_system("pendulum 3 m", lambda: pendulum(3.0))
     assert not same(first, other)
 
 
 def test_damaged_records_and_tapes_are_written_again(own_cache: Path) -> None:
-    first = recall_system("pendulum", pendulum)
+    first = cached_system("pendulum", pendulum)
     for content in (b"[]", b"not json", b'{"name": "pendulum"}'):
         cache.store(cache.record_name("system pendulum"), content)
-        assert same(first, recall_system("pendulum", pendulum))
+        assert same(first, cached_system("pendulum", pendulum))
     cache.store(cache.object_name(("tape", first.tape("signals").digest)), b"no tape")
-    again = recall_system("pendulum", pendulum)
+    again = cached_system("pendulum", pendulum)
     assert again.tape("signals").digest == first.tape("signals").digest
     for path in own_cache.glob("??/*"):
         path.unlink()
@@ -149,9 +149,9 @@ def test_damaged_records_and_tapes_are_written_again(own_cache: Path) -> None:
 
 def test_without_a_cache_the_system_is_traced_each_time(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ARMBLOCKS_CACHE_DIR", "")
-    assert same(recall_system("x", pendulum), recall_system("x", pendulum))
+    assert same(cached_system("x", pendulum), cached_system("x", pendulum))
     with pytest.raises(AssertionError, match="was traced again"):
-        recall_system("x", never)
+        cached_system("x", never)
 
 
 def test_an_operation_without_a_tape_opcode_is_refused_on_compilation(

@@ -99,7 +99,7 @@ def test_the_core_runs_without_the_extras_and_names_missing_libraries(tmp_path: 
     assert written == {"report.html", "diagram.svg", "data.csv", "figures"}
     assert {path.suffix for path in (tmp_path / "report" / "figures").iterdir()} == {".svg"}
     assert not (tmp_path / "other").exists()
-    said = json.loads((tmp_path / "said.json").read_text(encoding="utf-8"))
+    message = json.loads((tmp_path / "said.json").read_text(encoding="utf-8"))
     wanted = {
         "data frame": ("pandas", "data", "data frames"),
         "save parquet": ("pyarrow", "data", "Parquet files"),
@@ -114,10 +114,10 @@ def test_the_core_runs_without_the_extras_and_names_missing_libraries(tmp_path: 
         "poles": ("scipy", "analysis", "poles of a linear system"),
         "widget": ("anywidget", "notebook", "widgets in notebooks"),
     }
-    assert said.keys() == wanted.keys()
+    assert message.keys() == wanted.keys()
     for name, (library, extra, use) in wanted.items():
-        assert f"the library '{library}' is not installed; it is needed for {use}" in said[name]
-        assert said[name].endswith(
+        assert f"the library '{library}' is not installed; it is needed for {use}" in message[name]
+        assert message[name].endswith(
             f'Allowed: everything else works without it. Fix: pip install "armblocks[{extra}]".'
         )
 

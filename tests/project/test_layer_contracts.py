@@ -77,7 +77,7 @@ def test_every_contract_detects_its_violation(copy: Path) -> None:
             "a", encoding="utf-8"
         ) as stream:
             stream.write(f"\n{line}\n")
-    verdicts, said = judge(copy)
+    verdicts, message = judge(copy)
     assert not any(verdicts.values()), verdicts
     for contract, (package, _, imported) in VIOLATIONS.items():
-        assert f"armblocks.{package} -> {imported} (l." in said[contract], contract
+        assert f"armblocks.{package} -> {imported} (l." in message[contract], contract

@@ -43,8 +43,8 @@ def constructions() -> Iterator[tuple[str, str, ast.Call]]:
 
 def lacking(place: str, kind: str, call: ast.Call) -> set[str]:
     """The missing arguments of an error's construction."""
-    said = {keyword.arg for keyword in call.keywords if not _is_empty(keyword.value)}
-    missing = {"where", "fix"} - said - OWN.get(kind, set())
+    message = {keyword.arg for keyword in call.keywords if not _is_empty(keyword.value)}
+    missing = {"where", "fix"} - message - OWN.get(kind, set())
     return missing - {"where"} if place.startswith(PLACE_IS_ADDED) else missing
 
 

@@ -211,11 +211,21 @@ def contradictions(
     stays = np.any(
         [wrong[k : k + n] & wrong[k + 1 : k + n + 1] & wrong[k + 2 : k + n + 2] for k in range(3)], axis=0
     )
-    right = exact | (near & ~stays)
+    # Rounding may also leave an input next to a border, such as -0.15000000000000002 next to -0.15.
+    rounded = np.zeros(y.shape, dtype=bool)
+    for value in wide.values():
+        rounded = rounded | _has_rounding_error(value)
+    right = exact | (near & (~stays | rounded))
     if right.all():
         return None
     place = tuple(np.argwhere(~right)[0])
     return int(place[0]), float(y[place]), float(wanted[place])
+
+
+def _has_rounding_error(value: np.ndarray) -> np.ndarray:
+    """Return where a value differs from a decimal with nine places by rounding only."""
+    error = np.abs(value - np.round(value, 9))
+    return (error > 0.0) & (error < 1e-12)
 
 
 def _spread(value: np.ndarray, rank: int) -> np.ndarray:

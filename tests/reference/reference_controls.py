@@ -71,6 +71,14 @@ class _ControlBlock:
     def modes_differ(self) -> bool:
         return bool(self.arrays["x:side"][0] != self.side())
 
+    def followed(self, port: str) -> str | None:
+        """Return the input that an output equals now, if there is one."""
+        return None
+
+    def inputs_followed(self, port: str) -> list[str]:
+        """Return the inputs that an output may equal."""
+        return []
+
     def u(self, port: str, default: float = 1.0) -> float:
         return float(self.arrays[f"u:{port}"][0]) if f"u:{port}" in self.arrays else default
 
@@ -170,6 +178,12 @@ class Held(_ControlBlock):
             return np.zeros_like(self.arrays["x:held"]) + np.ravel(self.block.initial)
         return self.arrays["x:held"]
 
+    def followed(self, port: str) -> str | None:
+        return "u" if self.u("works") else None
+
+    def inputs_followed(self, port: str) -> list[str]:
+        return ["u"]
+
     def names(self, kind: str) -> list[str]:
         return ["held"] if kind == "capture" and not self.block.fires else []
 
@@ -192,10 +206,16 @@ class Merged(_ControlBlock):
     def begin(self) -> None:
         self.arrays["x:held"][:] = np.ravel(self.block.initial)
 
+    def inputs_followed(self, port: str) -> list[str]:
+        return [f"u{number}" for number in range(1, self.block.inputs + 1)]
+
+    def followed(self, port: str) -> str | None:
+        return next((u for u in self.inputs_followed(port) if self.u(f"works{u[1:]}")), None)
+
     def value(self, kind: str, port: str) -> np.ndarray:
-        for number in range(1, self.block.inputs + 1):
-            if self.u(f"works{number}"):
-                return self.arrays[f"u:u{number}"] + 0.0 * self.arrays["x:held"]
+        source = self.followed(port)
+        if source is not None:
+            return self.arrays[f"u:{source}"] + 0.0 * self.arrays["x:held"]
         if self.u("anew", 0.0):
             return np.zeros_like(self.arrays["x:held"]) + np.ravel(self.block.initial)
         return self.arrays["x:held"]

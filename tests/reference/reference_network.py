@@ -215,8 +215,14 @@ class Network:
             target[:] = source
 
     def _rate(self, block: Any, port: str) -> None:
-        if block.block.sampled or not isinstance(block, BlockNumbers):
-            block.rates.setdefault(port, np.zeros_like(block.outputs[port]))[:] = 0.0
+        total = block.rates.setdefault(port, np.zeros_like(block.outputs[port]))
+        if block.block.sampled:
+            total[:] = 0.0
+            return
+        if not isinstance(block, BlockNumbers):
+            source = block.followed(port)
+            ref = None if source is None else self.drivers[block.name, source]
+            total[:] = 0.0 if ref is None else self.blocks[ref.block].rates[ref.port]
             return
         rates: dict[str, np.ndarray] = {}
         for key in sorted(block.needs("out", port)):
@@ -228,7 +234,7 @@ class Network:
             elif letter == "x" and f"x:{entry}" in block.rates:
                 rates[key] = block.rates.setdefault(f"of {key}", np.zeros_like(block.arrays[key]))
                 rates[key][:] = block.rates[f"x:{entry}"]
-        block.rates.setdefault(port, np.zeros_like(block.outputs[port]))[:] = block.rate(port, rates)
+        total[:] = block.rate(port, rates)
 
     def _solve(self, loop: tuple[Node, ...]) -> None:
         """Solve an algebraic loop by Newton's method with difference quotients for all its signals."""

@@ -143,8 +143,13 @@ class EvaluationOrder:
                 raise UnsupportedError(f"'{name}' is differentiated twice")
             if block.lines:
                 raise UnsupportedError(f"the delayed signal '{name}' is differentiated")
-            if block.block.sampled or not isinstance(block, BlockNumbers):
+            if block.block.sampled:
                 return {("out", name, port)}, set()
+            if not isinstance(block, BlockNumbers):
+                if port == "elapsed":
+                    raise UnsupportedError(f"the time since '{name}' is differentiated")
+                rates = {self._rate_of(name, entry) for entry in block.inputs_followed(port)}
+                return {("out", name, port)} | rates, soft
             needed = block.needs("out", port)
             hard = self._inputs_of(block, needed) | {("out", name, port)}
             for key in needed:

@@ -41,5 +41,5 @@ def test_entries_of_a_mux_have_the_names_of_their_blocks() -> None:
     builder.add("Scope", Scope(), both)
     diagram = builder.build()
     (figure,) = view_figures(diagram, ab.simulate(diagram))
-    said = {mark.text for mark in text_marks(figure.picture)}
-    assert {"wanted", "pair[0]", "pair[1]"} <= said
+    message = {mark.text for mark in text_marks(figure.picture)}
+    assert {"wanted", "pair[0]", "pair[1]"} <= message

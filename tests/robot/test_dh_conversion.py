@@ -45,12 +45,12 @@ def test_conversion_keeps_kinematics_and_dynamics(robot: Robot) -> None:
     assert converted(modified, MODIFIED) is modified
     back = converted(modified, STANDARD)
     for q, qd, qdd in random_states(robot):
-        for told in (modified, back):
+        for message in (modified, back):
             for name, inputs in (("fkine", (q,)), ("jacob0", (q,)), ("rne", (q, qd, qdd))):
                 expected = evaluate(robot, name, *inputs)
                 scale = max(1.0, float(np.abs(expected).max()))
                 # Frames are products of the same rotations in another order: some tens of rounding errors.
-                assert_allclose(evaluate(told, name, *inputs), expected, rtol=0, atol=2e-13 * scale)
+                assert_allclose(evaluate(message, name, *inputs), expected, rtol=0, atol=2e-13 * scale)
     for link, again in zip(robot.links, back.links):
         # The first conversion moves a constant transform to the tool; the second one leaves it there.
         if link is not robot.links[-1]:
@@ -60,10 +60,10 @@ def test_conversion_keeps_kinematics_and_dynamics(robot: Robot) -> None:
 
 def test_conversion_keeps_the_world_poses_of_shapes() -> None:
     boxed = load_robot("kr180").with_link("link3", geometry=(Box(size=(1.0, 1.0, 1.0)),))
-    told = converted(boxed, MODIFIED)
+    message = converted(boxed, MODIFIED)
     q = [0.1, 0.2, 0.3, 0.4]
-    poses = [evaluate(robot, "link_poses", q)[3] for robot in (boxed, told)]
-    shapes = [robot.link("link3").geometry for robot in (boxed, told)]
+    poses = [evaluate(robot, "link_poses", q)[3] for robot in (boxed, message)]
+    shapes = [robot.link("link3").geometry for robot in (boxed, message)]
     assert shapes[0] and shapes[1]
     assert_allclose(
         poses[1] @ np.array(shapes[1][0].pose), poses[0] @ np.array(shapes[0][0].pose), atol=1e-13

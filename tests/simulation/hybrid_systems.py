@@ -70,13 +70,6 @@ def hybrid(
         fired = ca.sum1(ca.fabs(e)) > 0
         return tuple(ca.if_else(fired, new, old) for new, old in zip(reset(t, x, z, w, p, e), (x, z)))  # pyright: ignore
 
-    def fired_reset(t: SX, x: SX, z: SX, w: SX, p: SX, e: SX) -> tuple[SX, SX]:
-        new_x, new_z = reset(t, x, z, w, p, e)
-        if not guards:
-            return new_x, new_z
-        quiet = ca.dot(e, e) == 0.0
-        return ca.if_else(quiet, x, new_x), ca.if_else(quiet, z, new_z)
-
     flat = {letter: (size,) for letter, size in sizes.items()}
     constant = lambda numbers: lambda p: column(*map(SX, numbers))  # noqa: E731
     return HybridSystem(

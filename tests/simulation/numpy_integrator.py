@@ -44,10 +44,10 @@ def error_norm(tableau: Tableau, K: np.ndarray, h: float, scale: np.ndarray) -> 
     if isinstance(tableau, RosenbrockTableau):
         return rms(h * (np.array(tableau.error) @ K[1 : tableau.stages + 1]) / scale)
     e = np.array(tableau.error) @ K[: tableau.stages + 1]
-    if tableau.stretched_error is None:
+    if tableau.second_error is None:
         return rms(h * e / scale)
     e5 = np.sum((e / scale) ** 2)
-    e3 = np.sum((np.array(tableau.stretched_error) @ K[: tableau.stages + 1] / scale) ** 2)
+    e3 = np.sum((np.array(tableau.second_error) @ K[: tableau.stages + 1] / scale) ** 2)
     return 0.0 if e5 == e3 == 0 else float(h * e5 / np.sqrt((e5 + 0.01 * e3) * scale.size))
 
 

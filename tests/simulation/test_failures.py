@@ -52,7 +52,7 @@ def test_the_state_with_the_largest_error_is_named() -> None:
         outputs=lambda t, x, p: x[0],
         initial=(1.0, 1.0, 1.0),
     )
-    with pytest.raises(SimulationError, match=r"over what is allowed: 'b/x' \("):
+    with pytest.raises(SimulationError, match=r"relative to the tolerance: 'b/x' \("):
         simulate(compile_system(quiet), SimulationOptions(stop_time=2.0))
 
 
@@ -160,7 +160,7 @@ def test_the_message_suggests_a_stiff_solver_only_for_a_stiff_system() -> None:
         ({"sample_time": -1.0}, r"sample_time is -1\.0"),
         (
             {"sample_time": 1e-9},
-            r"records 1e\+10 instants of 5 numbers\. Allowed: at most 100000000 instants",
+            r"records 1e\+10 samples of 5 numbers\. Allowed: at most 100000000 samples",
         ),
         ({"max_step": 0.0}, r"max_step is 0\.0"),
         ({"max_step": float("nan")}, r"max_step is nan"),
@@ -252,6 +252,6 @@ def test_unbounded_growth_raises_no_numpy_warning() -> None:
 
 def test_too_many_fixed_steps_are_refused() -> None:
     with pytest.raises(
-        InputError, match=r"step is 1e-12 s, and the stop time 1 s: 1e\+12 steps.*is it in seconds"
+        InputError, match=r"step is 1e-12 s, and the stop time 1 s: 1e\+12 steps.*check that it is in seconds"
     ):
         simulate(OSCILLATOR, SimulationOptions(stop_time=1.0, solver="rk4", step=1e-12))

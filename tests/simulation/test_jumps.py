@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 import armblocks as ab
 from armblocks import Diagram, DiagramBuilder, SimulationResult
 from armblocks.blocks import (
+    CalledPythonFunction,
     Constant,
     FromFile,
     Gain,
@@ -237,6 +238,83 @@ def test_a_change_of_parameters_is_a_jump(change: float, states: bool) -> None:
     rows = result.with_jumps()
     t = np.array([0.99, 1.01, 1.05, 1.3]) + changed - 1.0
     assert np.interp(t, rows.time, rows["gain"]).tolist() == [6.0, 10.0, 10.0, 10.0]
+
+
+def tuned(seed: int, *, states: bool, hybrid: bool, log: Path | None = None) -> tuple[ab.Simulation, Jumped]:
+    """A run whose gain is tuned three times, and the jumps that its live samples had."""
+    random = np.random.default_rng(seed)
+    b = DiagramBuilder("tuned")
+    source = b.add("source", Step(time=float(random.uniform(0.2, 2.5)), initial=1.0, final=2.0))
+    if hybrid:
+        clock = b.add("clock", SineWave(frequency=3.0))
+        b.add("hold", ZeroOrderHold(sample_time=0.11), clock)
+    gain = b.add("gain", Gain(gain=1.0), source)
+    if states:
+        b.add("integral", Integrator(), gain)
+    live = ab.begin(b.build(), stop_time=3.0, sample_time=0.07, max_step=0.03, log=log)
+    seen = Jumped()
+    for k, time in enumerate(np.sort(random.uniform(0.1, 2.9, 3)).tolist()):
+        seen.advance(live, time, exactly=bool(random.integers(2)))
+        live.set("gain.gain", float(k + 2))
+    seen.advance(live, np.inf)
+    return live, seen
+
+
+class Jumped:
+    """The times of the jumps in live samples, s."""
+
+    def __init__(self) -> None:
+        self.times: list[float] = []
+
+    def advance(self, live: ab.Simulation, time: float, *, exactly: bool = False) -> None:
+        """Advance in two pieces, and read the samples after each."""
+        for until in (0.5 * (live.time + min(time, 3.0)), min(time, 3.0)):
+            before = live.recorded
+            live.advance(until, exactly=exactly)
+            self.times += live.samples(before).jumps.time.tolist()
+
+
+@pytest.mark.parametrize("hybrid", [False, True])
+@pytest.mark.parametrize("states", [False, True])
+@pytest.mark.parametrize("seed", SEEDS[:5])
+def test_a_tuned_run_has_the_same_jumps_live_and_in_its_log(
+    seed: int, states: bool, hybrid: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    live, seen = tuned(seed, states=states, hybrid=hybrid)
+    whole = live.result()
+    assert seen.times == whole.jumps.time.tolist()
+    assert whole.jumps["gain"][0].size == 4
+    assert np.all(np.diff(whole.with_jumps().time) >= 0.0)
+    monkeypatch.setattr("armblocks.simulation.run_log.window_rows", lambda width: 7)
+    logged, _ = tuned(seed, states=states, hybrid=hybrid, log=tmp_path / "log.csv")
+    whole.save(tmp_path / "saved.csv")
+    logged.result()
+    assert (tmp_path / "log.csv").read_bytes() == (tmp_path / "saved.csv").read_bytes()
+
+
+@pytest.mark.parametrize("windows", [False, True])
+@pytest.mark.parametrize("sample_time", [0.07, 0.3])
+def test_results_of_python_functions_jump_at_their_ticks(
+    windows: bool, sample_time: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The function doubles the sine at its ticks."""
+    monkeypatch.setattr("armblocks.simulation.run_log.window_rows", lambda width: 7)
+    b = DiagramBuilder("called")
+    sine = b.add("sine", SineWave(frequency=2.0))
+    called = b.add("called", CalledPythonFunction(function=lambda u: 2.0 * u, sample_time=0.1), sine)
+    b.add("integral", Integrator(), called)
+    log = tmp_path / "log.csv" if windows else None
+    result = ab.simulate(b.build(), stop_time=2.0, sample_time=sample_time, log=log)
+    if log is None:
+        assert result.jumps["called"][0] == pytest.approx(np.arange(1, 21) * 0.1)
+        rows = result.with_jumps()
+        time, values = rows.time, rows["called"]
+    else:
+        time, *columns = np.loadtxt(log, delimiter=",", skiprows=1).T
+        values = columns[log.read_text().splitlines()[0].split(",").index("called/y") - 1]
+    t = np.arange(0.0, 1.99, 0.013) + 0.0004
+    held = 2.0 * np.sin(2.0 * np.floor(t / 0.1) * 0.1)
+    assert np.interp(t, time, values) == pytest.approx(held, abs=1e-9)
 
 
 def test_states_that_are_reset_have_both_sides() -> None:

@@ -205,7 +205,7 @@ def test_files_have_ordinary_permissions(result: SimulationResult, tmp_path: Pat
 
 def test_the_text_representation_lists_run_and_signals(result: SimulationResult) -> None:
     text = repr(result)
-    assert "arm: 21 instants to 2 s, 4 signals, no solver needed" in text
+    assert "arm: 21 samples to 2 s, 4 signals, no solver needed" in text
     assert re.search(r"rne/tau +2 +N m", text)
     assert "INCOMPLETE" not in text
     assert "INCOMPLETE" in repr(incomplete(result))
@@ -259,4 +259,4 @@ def test_the_notebook_view_of_constant_wide_and_empty_signals() -> None:
     assert "8 of 12 drawn" in wide._repr_html_()
     empty = dataclasses.replace(named("a/y"), time=np.empty(0), signals=np.empty((1, 0)))
     assert drawings(empty._repr_html_())
-    assert "0 instants" in repr(empty)
+    assert "0 samples" in repr(empty)

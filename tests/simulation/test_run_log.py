@@ -100,9 +100,9 @@ def test_a_log_has_the_chosen_signals_and_the_run_report(tmp_path: Path) -> None
     result = logged(SYSTEMS["van_der_pol"], path, SimulationOptions(stop_time=2.0), ("pid/u", "position"))
     names, _ = read(path)
     assert names == ["time", "pid/u", "position/y"]
-    told = json.loads(pq.read_metadata(str(path)).metadata[b"armblocks"])  # pyright: ignore
-    assert told["run"]["steps"] == result.run.steps and told["run"]["complete"]
-    assert "all 1001 instants in" in repr(result)
+    message = json.loads(pq.read_metadata(str(path)).metadata[b"armblocks"])  # pyright: ignore
+    assert message["run"]["steps"] == result.run.steps and message["run"]["complete"]
+    assert "all 1001 rows in" in repr(result)
 
 
 @pytest.mark.usefixtures("small_windows")
@@ -145,7 +145,7 @@ def test_an_interrupted_logged_run_can_continue_without_lost_samples(
         return call
 
     run = Simulation(SYSTEMS["relay"], options, log=LogRequest(path=tmp_path / "log.parquet"))
-    monkeypatch.setattr(Integration, "back_to", interrupting(Integration.back_to))
+    monkeypatch.setattr(Integration, "restore", interrupting(Integration.restore))
     interruptions = 0
     while not run.finished:
         try:
@@ -212,6 +212,6 @@ def test_a_full_disk_ends_the_logged_run_with_an_error(
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("armblocks.simulation.export._CsvLog._append", full)
-    with pytest.raises(FormatError, match=r"the log cannot be written any more \(No space left"):
+    with pytest.raises(FormatError, match=r"writing to the log failed \(No space left"):
         logged(SYSTEMS["relay"], tmp_path / "log.csv", SimulationOptions(stop_time=4.0))
     assert list(tmp_path.iterdir()) == []

@@ -10,17 +10,22 @@ import pytest
 from hybrid_systems import bouncing_ball, loop_of_cosine, relay_oscillator, sampled_loop, stick_slip
 from small_systems import oscillator, van_der_pol_pid
 
+import armblocks as ab
 from armblocks.blocks import (
     Constant,
     EnabledSubsystem,
+    Integrator,
     Outport,
     SecondOrderIntegrator,
+    SineWave,
+    TransportDelay,
     ZeroOrderHold,
 )
 from armblocks.diagram import Diagram, DiagramBuilder, trace_diagram
 from armblocks.equations import SimulationOptions
 from armblocks.errors import FormatError, InputError
 from armblocks.integration.system import CompiledSystem, compile_system
+from armblocks.integration.workspace import Count
 from armblocks.simulation import RunState, simulate
 
 
@@ -125,11 +130,52 @@ def test_the_values_of_a_state_can_be_changed() -> None:
 
 
 def test_a_state_of_another_diagram_or_with_nan_is_refused() -> None:
-    with pytest.raises(InputError, match="does not fit: 'hold/y' is only in one of them"):
+    with pytest.raises(InputError, match="belongs to another system: 'hold/y' is only in one of them"):
         simulate(SYSTEMS["relay"], SimulationOptions(stop_time=2.0), initial_state=first_second())
     bad = dataclasses.replace(first_second(), states=np.array([np.nan]))
-    with pytest.raises(InputError, match="is not all finite numbers"):
+    with pytest.raises(InputError, match="has values that are not finite"):
         simulate(SYSTEMS["sampled"], SimulationOptions(stop_time=2.0), initial_state=bad)
+
+
+def delayed_sine() -> ab.Diagram:
+    """An integrated sine, delayed by 0.3 s."""
+    builder = DiagramBuilder("delayed")
+    delayed = builder.add("delayed", TransportDelay(delay=0.3), builder.add("sine", SineWave()))
+    builder.add("integral", Integrator(), delayed)
+    return builder.build()
+
+
+@pytest.mark.parametrize(
+    "damage", ["rows", "first row", "last row", "stage", "reals", "counts", "method", "past", "order"]
+)
+def test_a_state_with_damaged_arrays_is_refused(damage: str, tmp_path: Path) -> None:
+    diagram = delayed_sine()
+    state = ab.simulate(diagram, stop_time=1.0).final_state
+    assert state.checkpoint is not None
+    counts, reals, method = state.checkpoint.counts.copy(), state.checkpoint.reals, state.checkpoint.method
+    match damage:
+        case "rows":
+            counts[Count.HISTORY_ROWS] = 10**9
+        case "first row":
+            counts[-2] = 10**9
+        case "last row":
+            counts[-1] = 10**9
+        case "stage":
+            counts[Count.STAGE] = 7
+        case "reals":
+            reals = reals[:40]
+        case "counts":
+            counts = counts[:10]
+        case "method":
+            method = "rodas5p"
+        case "past":
+            state = dataclasses.replace(state, past=state.past[:-1])
+        case _:
+            state = dataclasses.replace(state, past=state.past.reshape(-1, 4)[::-1].ravel())
+    checkpoint = dataclasses.replace(state.checkpoint, counts=counts, reals=reals, method=method)
+    dataclasses.replace(state, checkpoint=checkpoint).save(tmp_path / "state.npz")
+    with pytest.raises(InputError, match="the state of 'delayed' at 1 s is damaged"):
+        ab.simulate(diagram, stop_time=2.0, initial_state=RunState.load(tmp_path / "state.npz"))
 
 
 def test_a_stop_time_before_the_time_of_the_state_is_refused() -> None:

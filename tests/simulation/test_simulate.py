@@ -162,10 +162,10 @@ def test_the_run_report_has_the_solver_and_the_reason_of_its_choice() -> None:
     stepped = simulate(OSCILLATOR, SimulationOptions(stop_time=1.0, step=0.01)).run
     assert (stepped.solver, stepped.steps) == ("rk4", 100)
     assert "step was given" in stepped.reason
-    asked = simulate(OSCILLATOR, SimulationOptions(stop_time=1.0, solver="ODE23")).run
-    assert asked.solver == "rk23"
-    assert "asked for" in asked.reason
-    assert asked.real_time_factor == pytest.approx(1.0 / asked.wall_time)
+    requested = simulate(OSCILLATOR, SimulationOptions(stop_time=1.0, solver="ODE23")).run
+    assert requested.solver == "rk23"
+    assert "requested" in requested.reason
+    assert requested.real_time_factor == pytest.approx(1.0 / requested.wall_time)
 
 
 def test_stop_time_zero_gives_one_sample() -> None:
@@ -192,18 +192,18 @@ def test_parameters_change_a_run_and_are_part_of_the_result() -> None:
 
 
 def test_progress_is_reported_until_the_end() -> None:
-    told: list[tuple[float, float, float]] = []
+    reported: list[tuple[float, float, float]] = []
     result = simulate(
         OSCILLATOR,
         SimulationOptions(stop_time=50.0, solver="rk4", step=5e-5),
-        progress=lambda *values: told.append(values),
+        progress=lambda *values: reported.append(values),
     )
-    times, fractions, factors = np.array(told).T
+    times, fractions, factors = np.array(reported).T
     assert times[-1] == 50.0
     assert fractions[-1] == 1.0
     assert np.all(np.diff(times) >= 0)
     assert np.all(factors > 0)
-    assert len(told) <= 2 + result.run.wall_time * 17
+    assert len(reported) <= 2 + result.run.wall_time * 17
 
 
 def test_ctrl_c_returns_the_computed_samples_marked_as_incomplete() -> None:

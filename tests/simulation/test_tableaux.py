@@ -44,7 +44,7 @@ def fixed_step_errors(tableau: Tableau, steps: int) -> tuple[float, float]:
     if tableau.adaptive:  # the same tableau without its error estimate
         fixed = replace(tableau, error=None, error_order=0)
         if isinstance(fixed, ButcherTableau):
-            fixed = replace(fixed, stretched_error=None)
+            fixed = replace(fixed, second_error=None)
     h = STOP / steps
     samples = np.sort(
         np.concatenate([np.arange(steps + 1) * h, *((np.arange(steps) + f) * h for f in (0.2, 0.5, 0.9))])

@@ -192,7 +192,10 @@ def test_a_loop_whose_solution_ceases_to_exist_is_reported_at_that_time() -> Non
     x = builder.add("x", bl.Integrator(), builder.add("one", bl.Constant(value=1.0)))
     fold = builder.add("fold", bl.Expression(formula="0.5*u1 - u1^2 + 1 - u2", inputs=2), u2=x)
     builder.connect(fold, fold["u1"])
-    with pytest.raises(ab.errors.SimulationError, match="loop through 'fold' have no solution") as error:
+    with pytest.raises(
+        ab.errors.SimulationError,
+        match="found no solution of the implicit equations of the loop through 'fold'",
+    ) as error:
         ab.simulate(builder.build(), stop_time=2.0)
     assert len(str(error.value)) < 400
     assert error.value.partial.time[-1] == pytest.approx(1.0625, abs=0.01)

@@ -346,7 +346,7 @@ def test_a_triggered_subsystem_with_states_or_clocks_is_refused() -> None:
         builder.build()
     named = DiagramBuilder("named")
     named.add("enable", Clock())
-    with pytest.raises(DiagramError, match="an inner block is named 'enable', like an input of"):
+    with pytest.raises(DiagramError, match="an inner block or signal is named 'enable', like an input of"):
         EnabledSubsystem(diagram=named.build())
 
 

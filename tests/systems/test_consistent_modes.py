@@ -331,7 +331,9 @@ def test_a_contradictory_formula_in_a_loop_is_reported(formula: str) -> None:
     builder = DiagramBuilder("loop")
     block = builder.add("formula", Expression(formula=formula))
     builder.connect(block, block["u"])
-    with pytest.raises(SimulationError, match="loop through 'formula' have no solution"):
+    with pytest.raises(
+        SimulationError, match="no solution of the implicit equations of the loop through 'formula'"
+    ):
         ab.simulate(builder.build(), stop_time=1.0)
 
 

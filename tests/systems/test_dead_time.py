@@ -38,7 +38,7 @@ from armblocks.blocks import (
 from armblocks.diagram import Diagram, DiagramBuilder, trace_diagram
 from armblocks.equations import SimulationOptions
 from armblocks.errors import DiagramError, SimulationError
-from armblocks.integration.native_integrator import FIRST_ROOM
+from armblocks.integration.native_integrator import INITIAL_CAPACITY
 from armblocks.integration.system import compile_system
 from armblocks.simulation import RunState, SimulationResult, simulate
 from compiled_diagrams import compiled
@@ -264,7 +264,9 @@ def test_a_transit_time_that_is_not_positive_ends_the_run(start: float) -> None:
 def test_a_long_run_discards_history_older_than_the_delay() -> None:
     result = native(solver="rk4", step=0.01)(decay(0.5), 200.0)
     assert result.final_state is not None
-    assert result.final_state.past.size < FIRST_ROOM * 4  # numbers per row; 20 000 steps add 40 000 rows
+    assert (
+        result.final_state.past.size < INITIAL_CAPACITY * 4
+    )  # numbers per row; 20 000 steps add 40 000 rows
     # it decays with the real part of the root of s + exp(-s / 2) = 0
     s = complex(-1.0, 1.0)
     for _ in range(50):

@@ -10,7 +10,19 @@ import numpy as np
 import pytest
 
 import armblocks as ab
-from armblocks.blocks import Clock, Constant, Gain, Integrator, MatrixGain, Saturation, Sum, ZeroOrderHold
+from armblocks.blocks import (
+    Clock,
+    Constant,
+    DeadZone,
+    Gain,
+    Hypot,
+    Integrator,
+    MatrixGain,
+    Saturation,
+    SineWave,
+    Sum,
+    ZeroOrderHold,
+)
 from armblocks.compiler.from_casadi import tape_from
 from armblocks.compiler.interpret import interpret
 from armblocks.diagram import DiagramBuilder, trace_diagram
@@ -126,9 +138,9 @@ def test_a_loop_of_high_gain_has_an_accurate_error_signal() -> None:
 def test_an_ill_conditioned_loop_is_reported_at_the_end_of_the_run() -> None:
     message = ab.simulate(loop(np.eye(8) - hilbert(8), np.ones(8)), stop_time=0.0).run.message
     assert re.search(
-        r"the loop of 's/y\[0\]', .* and 5 more signals has the condition 2e\+10 at 0 s", message
+        r"the loop of 's/y\[0\]', .* and 5 more signals has the condition number 2e\+10 at 0 s", message
     )
-    assert "about 6 right digits" in message
+    assert "about 6 correct digits" in message
     assert not ab.simulate(loop(np.eye(6) - hilbert(6), np.ones(6)), stop_time=0.0).run.message
 
 
@@ -213,3 +225,16 @@ def test_linearisation_and_sensitivity_of_a_loop_of_vectors() -> None:
     np.testing.assert_allclose(found["x", "g.gain"], (runs[0] - runs[1]) / 2e-5, rtol=1e-6, atol=1e-8)
     stiff = ab.simulate(diagram, **(settings | {"solver": "rodas", "rtol": 1e-9, "atol": 1e-12}))
     np.testing.assert_allclose(stiff["x"], sum(runs) / 2.0, rtol=1e-6)
+
+
+def test_a_loop_through_the_corner_of_a_norm_is_solved() -> None:
+    """y = sqrt(u^2 + 0.09 y^2): at u = 0 the solution is 0, where the norm has no derivative."""
+    builder = ab.DiagramBuilder("norm")
+    sine = builder.add("sine", SineWave(amplitude=2.0, frequency=np.pi))
+    held = builder.add("held", ZeroOrderHold(sample_time=0.5), sine)
+    level = builder.add("level", DeadZone(start=-1.0, end=1.0), held)
+    norm = builder.add("norm", Hypot(), level)
+    builder.connect(builder.add("share", Gain(gain=0.3), norm), norm["v"])
+    found = ab.simulate(builder.build(), stop_time=4.0)
+    assert set(np.round(found["level"], 12).tolist()) == {-1.0, 0.0, 1.0}
+    assert found["norm"] == pytest.approx(np.abs(found["level"]) / np.sqrt(0.91), abs=1e-12)

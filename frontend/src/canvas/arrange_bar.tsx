@@ -9,14 +9,16 @@ import {
   IconLayoutAlignTop,
   IconLayoutDistributeHorizontal,
   IconLayoutDistributeVertical,
+  IconPlugX,
   IconRotateClockwise,
 } from '@tabler/icons-react'
 import { useStudio } from '../store'
-import { align, distribute, flip, rotate } from './arranging'
+import { align, distribute, flip, ground, rotate } from './arranging'
 
 const TURNS = [
   { label: 'Rotate (Ctrl+R)', icon: IconRotateClockwise, run: rotate },
   { label: 'Flip (Ctrl+I)', icon: IconFlipVertical, run: flip },
+  { label: 'Ground and terminate unconnected ports', icon: IconPlugX, run: ground },
 ]
 const ALIGNS = [
   { label: 'Align left edges', icon: IconLayoutAlignLeft, run: () => align('left') },

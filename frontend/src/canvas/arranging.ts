@@ -1,5 +1,5 @@
 import type { Place, SheetBlock } from '../protocol'
-import { change, freeName, useStudio } from '../store'
+import { change, freeName, takenNames, useStudio } from '../store'
 
 /** Commands on all selected blocks: each is one undo step. */
 
@@ -64,11 +64,25 @@ export function distribute(axis: 'x' | 'y'): void {
   place(({ name }) => ({ [axis]: at.get(name) }))
 }
 
+/** Comment the selected blocks out or through; if all of them are so already, remove their comments. */
+export function comment(how: 'out' | 'through'): void {
+  const chosen = chosenBlocks()
+  if (!chosen.length) return
+  const already = chosen.every((block) => block.comment === how)
+  const blocks = chosen.map(({ name }) => name)
+  void change({ kind: 'comment', blocks, comment: already ? '' : how })
+}
+
+/** Add Ground and Terminator blocks at the unconnected ports of the selected blocks, else of the sheet. */
+export function ground(): void {
+  void change({ kind: 'ground', blocks: chosenBlocks().map(({ name }) => name) })
+}
+
 /** Move the selected blocks into a new subsystem. */
 export function group(): void {
   const { document, select } = useStudio.getState()
   const chosen = chosenBlocks()
   if (!document || !chosen.length) return
-  const name = freeName('Subsystem', Object.keys(document.blocks))
+  const name = freeName('Subsystem', takenNames())
   void change({ kind: 'group', blocks: chosen.map((block) => block.name), name }).then(() => select([name]))
 }

@@ -1,13 +1,20 @@
 import { Tooltip } from '@mantine/core'
 import { IconAlertCircleFilled, IconLink } from '@tabler/icons-react'
 import { Handle, type Node, type NodeProps } from '@xyflow/react'
-import { memo, useState } from 'react'
+import { memo } from 'react'
+import { create } from 'zustand'
 import type { Finding, PortSpot, SheetBlock } from '../protocol'
 import { change } from '../store'
 import { ResizeHandles } from './resize_handles'
 import { nameSide, nameWidth, PORT, side, WIDEST_NAME } from './sheet_layout'
 
 export type BlockNodeType = Node<{ block: SheetBlock; findings: Finding[] }, 'block'>
+
+/** The block whose name is being edited. */
+const useRenaming = create<{ name: string | null }>(() => ({ name: null }))
+
+/** Edit the name of a block in place. */
+export const rename = (name: string): void => useRenaming.setState({ name })
 
 /** A block: its drawing from the server, its ports, its name, and its errors. */
 export const BlockNode = memo(function BlockNode({
@@ -95,9 +102,10 @@ function Port({ spot, output, finding }: PortProps) {
 
 /** The block's name; a double click edits it in place. */
 function Name({ block }: { block: SheetBlock }) {
-  const [editing, setEditing] = useState(false)
+  const editing = useRenaming((s) => s.name === block.name)
+  const close = () => useRenaming.setState({ name: null })
   const done = (name: string) => {
-    setEditing(false)
+    close()
     if (name && name !== block.name) void change({ kind: 'rename', block: block.name, name })
   }
   if (!editing)
@@ -106,7 +114,7 @@ function Name({ block }: { block: SheetBlock }) {
         className={`name ${nameSide(block)}${nameWidth(block.name) < WIDEST_NAME ? '' : ' long'}`}
         onDoubleClick={(event) => {
           event.stopPropagation()
-          setEditing(true)
+          rename(block.name)
         }}
       >
         {block.name}
@@ -123,7 +131,7 @@ function Name({ block }: { block: SheetBlock }) {
       onKeyDown={(event) => {
         event.stopPropagation()
         if (event.key === 'Enter') event.currentTarget.blur()
-        if (event.key === 'Escape') setEditing(false)
+        if (event.key === 'Escape') close()
       }}
     />
   )

@@ -20,9 +20,11 @@ import { ask, change, look, useStudio } from '../store'
 import { ArrangeBar } from './arrange_bar'
 import { BlockNode } from './block_node'
 import { connectedTo } from './connecting'
+import { DragPreview, useCopies } from './copying'
 import { GRID } from './insert'
 import { NoteNode } from './note_node'
 import { Overview } from './overview'
+import { useRightButton } from './right_button'
 import { openBlock } from './sheet_actions'
 import { dragHandlers, dropHandlers, useSheetDrag, type SheetDrag } from './sheet_drag'
 import { useSheetDrawing } from './sheet_drawing'
@@ -30,6 +32,7 @@ import type { SheetGraph, SheetNode } from './sheet_graph'
 import { useSheetKeys } from './sheet_keys'
 import { FIT } from './sheet_layout'
 import { useFitted, useNameScale, useSheetView, useSought } from './sheet_view'
+import { SignalNames } from './signal_names'
 import { useSteady } from './steady'
 import { Welcome } from './welcome'
 import { WireEdge, type WireEdgeType } from './wire_edge'
@@ -101,13 +104,12 @@ function Sheet() {
   const blocks = useStudio((s) => s.document!.blocks)
   const wires = useStudio((s) => s.document!.wires)
   const notes = useStudio((s) => s.document!.notes)
-  const level = useStudio((s) => s.document!.inside.length)
   const scheme = useComputedColorScheme('light')
   const flow = useReactFlow<SheetNode, WireEdgeType>()
   const sheet = useRef<HTMLDivElement>(null)
   const [chosenWires, setChosenWires] = useState<ReadonlySet<string>>(new Set())
   const mouse = useSheetDrag(blocks, notes)
-  const { graph, nodes, edges } = useSheetDrawing(mouse, chosenWires)
+  const { graph, nodes, edges, lines } = useSheetDrawing(mouse, chosenWires)
   useSought(sheet, flow, blocks)
   useSheetKeys(sheet, chosenWires, setChosenWires)
   useSheetView(sheet, flow)
@@ -116,7 +118,7 @@ function Sheet() {
   const handlers = useSteady({
     onNodesChange: (changes: NodeChange<SheetNode>[]) => nodesChanged(changes, graph, mouse),
     onEdgesChange: (changes: EdgeChange<WireEdgeType>[]) => setChosenWires(chosenAfter(changes, chosenWires)),
-    ...dragHandlers(mouse, blocks, notes, wires, edges),
+    ...dragHandlers(mouse, blocks, notes, wires, edges, flow.getZoom),
     onNodeClick: (event: React.MouseEvent, node: SheetNode) => {
       if (!chooseAlone(event, node.id)) return
       setChosenWires(new Set())
@@ -125,6 +127,7 @@ function Sheet() {
     onConnect: connect,
     onConnectEnd: connectedTo,
   })
+  const right = useRightButton(flow, edges, setChosenWires)
   const chosenEdge = chosenWires.size === 1 ? edges.find(({ selected }) => selected) : undefined
   const empty = Object.keys(blocks).length === 0 && Object.keys(notes).length === 0
   // An empty sheet would be fitted to the first block that is dropped on it, which would then jump.
@@ -135,6 +138,7 @@ function Sheet() {
       ref={sheet}
       onFocus={selectFocused}
       {...dropHandlers(mouse.setInto, flow, wires, edges)}
+      {...right}
     >
       <WireHead />
       <ReactFlow<SheetNode, WireEdgeType>
@@ -166,16 +170,22 @@ function Sheet() {
       >
         <Background variant={BackgroundVariant.Dots} gap={20} size={1} />
         {!empty && <Controls showInteractive={false} fitViewOptions={FIT} />}
+        <DragPreview />
         <WireValues chosen={chosenEdge} />
+        <SignalNames lines={lines} />
         {Object.keys(blocks).length > 40 && <Overview blocks={blocks} />}
       </ReactFlow>
       <ArrangeBar />
-      {empty && level === 0 && <Welcome />}
-      {empty && level > 0 && (
-        <p className="empty over">Nothing is inside yet: type to add a block, such as In and Out.</p>
-      )}
+      {empty && <EmptySheet />}
     </div>
   )
+}
+
+/** The first steps on an empty sheet. */
+function EmptySheet() {
+  const level = useStudio((s) => s.document!.inside.length)
+  if (level === 0) return <Welcome />
+  return <p className="empty over">Nothing is inside yet: type to add a block, such as In and Out.</p>
 }
 
 /** Moving through the blocks with Tab selects the focused one. */
@@ -209,7 +219,21 @@ function connect({ source, sourceHandle, target, targetHandle }: Connection): vo
     })
 }
 
-function nodesChanged(changes: NodeChange<SheetNode>[], graph: SheetGraph, { setDrag }: SheetDrag): void {
+/** Show the copies of dragged blocks at their positions; the blocks themselves remain. */
+function showCopies(places: Places): void {
+  const { document } = useStudio.getState()
+  const [first] = Object.keys(places)
+  const from = document?.blocks[first!]?.place ?? document?.notes[first!]
+  if (!from) return
+  const { x, y } = places[first!]!
+  useCopies.setState({ names: Object.keys(places), shift: [x - from.x, y - from.y] })
+}
+
+function nodesChanged(
+  changes: NodeChange<SheetNode>[],
+  graph: SheetGraph,
+  { setDrag, held }: SheetDrag,
+): void {
   const places: Places = {}
   let chosen: Set<string> | null = null
   for (const one of changes) {
@@ -220,7 +244,9 @@ function nodesChanged(changes: NodeChange<SheetNode>[], graph: SheetGraph, { set
       else chosen.delete(one.id)
     } else if (one.type === 'dimensions' && one.dimensions) graph.measured.set(one.id, one.dimensions)
   }
-  if (Object.keys(places).length) setDrag((now) => ({ ...now, ...places }))
+  const names = Object.keys(places)
+  if (names.length && held.current.copies) showCopies(places)
+  else if (names.length) setDrag((now) => ({ ...now, ...places }))
   if (chosen) useStudio.getState().select(chosen)
 }
 

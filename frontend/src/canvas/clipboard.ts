@@ -1,4 +1,5 @@
-import { ask, change, freeName, useStudio } from '../store'
+import { ask, change, freeName, takenNames, useStudio } from '../store'
+import { GRID } from './insert'
 
 const SHIFT = 30
 
@@ -25,7 +26,7 @@ async function add(text: string, shift: number | [number, number] = SHIFT): Prom
   if (!document) return
   const { blocks = {}, layout = {} } = JSON.parse(text) as { blocks?: object; layout?: object }
   const names: Record<string, string> = {}
-  const taken = new Set(Object.keys(document.blocks))
+  const taken = new Set(takenNames())
   for (const name of Object.keys(blocks)) taken.add((names[name] = freeName(name, taken)))
   let note = Math.max(0, ...Object.keys(document.notes).map((id) => Number(id.slice(1)) || 0))
   for (const id of Object.keys(layout)) if (id.startsWith('/')) names[id] = `/${++note}`
@@ -62,6 +63,30 @@ export async function cut(): Promise<void> {
 export async function paste(): Promise<void> {
   const text = await navigator.clipboard.readText()
   if (isDiagram(text)) await add(text)
+}
+
+/** Paste with the top left corner of all blocks and notes at a point of the sheet. */
+export async function pasteAt({ x, y }: { x: number; y: number }): Promise<void> {
+  const text = await navigator.clipboard.readText()
+  if (!isDiagram(text)) return
+  const { layout = {} } = JSON.parse(text) as { layout?: Record<string, { x?: number; y?: number }> }
+  const spots = Object.values(layout).filter((one) => one.x !== undefined && one.y !== undefined)
+  const onGrid = (wanted: number, from: number[]) => GRID * Math.round((wanted - Math.min(...from)) / GRID)
+  await add(
+    text,
+    spots.length
+      ? [
+          onGrid(
+            x,
+            spots.map((one) => one.x!),
+          ),
+          onGrid(
+            y,
+            spots.map((one) => one.y!),
+          ),
+        ]
+      : SHIFT,
+  )
 }
 
 /** Whether a text is a diagram; other clipboard contents are not pasted on the sheet. */

@@ -22,6 +22,7 @@ export function ConnectDialog() {
   const blocks = useStudio((s) => s.document?.blocks)
   const wires = useStudio((s) => s.document?.wires)
   const selection = useStudio((s) => s.selection)
+  const end = useDialogs((s) => s.end)
   const [source, setSource] = useState<string | null>(null)
   const [target, setTarget] = useState<string | null>(null)
   const close = () => show(null)
@@ -42,8 +43,8 @@ export function ConnectDialog() {
     if (!opened) return
     const of = (ports: string[]) =>
       ports.find((port) => [...selection].some((name) => port.startsWith(`${name}/`))) ?? null
-    setSource(of(sources))
-    setTarget(selection.size > 1 ? of(targets) : null)
+    setSource(end?.isOutput ? end.port : end ? null : of(sources))
+    setTarget(end && !end.isOutput ? end.port : !end && selection.size > 1 ? of(targets) : null)
     // The suggestion is computed once, when the dialog opens.
     // eslint-disable-next-line react-hooks/exhaustive-deps
   }, [opened])

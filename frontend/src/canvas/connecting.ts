@@ -3,21 +3,28 @@ import { show } from '../dialogs'
 import { freePort } from '../model/free_port'
 import { change, useStudio } from '../store'
 
-/**
- * The end of a drag from a port. On the body of a block the wire takes its first free port. On the empty
- * sheet the list of blocks opens, and the chosen block is connected.
- */
+/** The end of a drag from a port, unless it ends at another port. */
 export function connectedTo(event: MouseEvent | TouchEvent, state: FinalConnectionState): void {
   const { fromHandle, fromNode, toHandle, isValid } = state
+  if (toHandle || isValid || !fromHandle?.id || !fromNode || !('clientX' in event)) return
+  endAt(
+    { x: event.clientX, y: event.clientY },
+    `${fromNode.id}/${fromHandle.id}`,
+    fromHandle.type === 'source',
+  )
+}
+
+/**
+ * The end of a new line at a point of the window. On the body of a block the line takes its first free port.
+ * On the empty sheet the list of blocks opens, and the chosen block is connected.
+ */
+export function endAt(at: { x: number; y: number }, port: string, isOutput: boolean): void {
   const { document } = useStudio.getState()
-  if (toHandle || isValid || !fromHandle?.id || !fromNode || !document || !('clientX' in event)) return
-  const isOutput = fromHandle.type === 'source'
-  const port = `${fromNode.id}/${fromHandle.id}`
-  const at = { x: event.clientX, y: event.clientY }
+  if (!document) return
   const under = window.document.elementFromPoint(at.x, at.y)
   const node = under?.closest('.react-flow__node')?.getAttribute('data-id')
   if (node) {
-    const block = node === fromNode.id ? undefined : document.blocks[node]
+    const block = port.startsWith(`${node}/`) ? undefined : document.blocks[node]
     const other = block && freePort(block, isOutput, document.wires)
     if (other)
       void change({

@@ -1,6 +1,6 @@
 import { freeBelow, freeInView, type Rectangle } from '../model/free_place'
 import type { BlockType, Place, Wire } from '../protocol'
-import { change, freeName, useStudio } from '../store'
+import { change, freeName, takenNames, useStudio } from '../store'
 import { sheetView } from './sheet_actions'
 
 /** Drag data from the library: a block type. */
@@ -33,7 +33,7 @@ export async function insertBlock(
   const { document, library, select } = useStudio.getState()
   const kind = library.get(type)
   if (!document || !kind) return undefined
-  const name = freeName((wish ?? kind.title).replace(/[/.]/g, ' '), Object.keys(document.blocks))
+  const name = freeName((wish ?? kind.title).replace(/[/.]/g, ' '), takenNames())
   const entry = level === undefined ? undefined : sideEntry(kind)
   const part = !end ? 0.5 : end.isOutput ? 0 : 1
   const place: Place = {

@@ -33,14 +33,18 @@ export function addNote(): void {
 /** The kinds of views with a chart in the panel of the scopes. */
 const CHARTS = new Set(['traces', 'path'])
 
+/** Whether the run has a chart of a block. */
+export const chartOf = (path: string): boolean =>
+  useStudio.getState().run?.views.some((view) => view.block === path && CHARTS.has(view.kind)) ?? false
+
 /**
  * Handle a double click: show the chart of a scope after a run, open a subsystem without a mask, otherwise
  * the parameters of the block.
  */
 export function openBlock(block: SheetBlock): void {
-  const { document, run, edit } = useStudio.getState()
+  const { document, edit } = useStudio.getState()
   const path = [...(document?.inside ?? []), block.name].join('/')
-  if (run?.views.some((view) => view.block === path && CHARTS.has(view.kind))) showScope(path)
+  if (chartOf(path)) showScope(path)
   else if (block.opens && !block.mask.length && document) look([...document.inside, block.name])
   else edit(block.name)
 }

@@ -5,6 +5,8 @@ import { wireKey, type Places } from '../model/wires'
 import type { SheetBlock, SheetNote, Wire } from '../protocol'
 import { useStudio } from '../store'
 import { duplicateAt } from './clipboard'
+import { noCopies } from './copying'
+import { alignment, useGuides } from './guides'
 import { BLOCK_TYPE, insertBlock } from './insert'
 import { move } from './sheet_actions'
 import type { SheetNode } from './sheet_graph'
@@ -48,6 +50,7 @@ export function dragHandlers(
   notes: Record<string, SheetNote>,
   wires: Wire[],
   edges: WireEdgeType[],
+  zoom: () => number,
 ) {
   const takeHold = (event: MouseEvent | TouchEvent | React.MouseEvent, _: SheetNode, nodes: SheetNode[]) => {
     const taken = present(
@@ -64,12 +67,20 @@ export function dragHandlers(
     if (freed.length || alone)
       setHeld((held.current = { freed, loose: alone ? one.name : null, copies: false }))
   }
-  const carry = (_: unknown, node: SheetNode) => {
+  /** Align the dragged blocks, unless Alt is pressed or the drag duplicates them. */
+  const aligned = (event: MouseEvent | TouchEvent | React.MouseEvent, nodes: SheetNode[]) =>
+    event.altKey || held.current.copies ? NOT_ALIGNED : alignment(nodes, blocks, zoom())
+  const carry = (event: MouseEvent | TouchEvent | React.MouseEvent, node: SheetNode, nodes: SheetNode[]) => {
+    const { dx, dy, guides } = aligned(event, nodes)
+    useGuides.setState({ guides })
+    if (dx || dy) setDrag((now) => ({ ...now, ...shifted(nodes, dx, dy) }))
     const block = node.id === held.current.loose ? blocks[node.id] : undefined
     if (block) setInto(keyOf(wireAt(middleOf(block, node.position), edges, wires)?.wire))
   }
-  const letGo = (_: unknown, node: SheetNode, moved: SheetNode[]) => {
-    const to: Places = Object.fromEntries(moved.map(({ id, position }) => [id, position]))
+  const letGo = (event: MouseEvent | TouchEvent | React.MouseEvent, node: SheetNode, moved: SheetNode[]) => {
+    const { dx, dy } = aligned(event, moved)
+    useGuides.setState({ guides: [] })
+    const to = shifted(moved, dx, dy)
     const { freed, loose, copies } = held.current
     held.current = NOTHING_HELD
     if (copies) {
@@ -78,6 +89,7 @@ export function dragHandlers(
       const from = blocks[node.id]?.place ?? notes[node.id]
       const shift = from && ([node.position.x - from.x, node.position.y - from.y] as [number, number])
       const chosen = moved.map(({ id }) => id)
+      noCopies()
       if (shift && (shift[0] || shift[1])) void duplicateAt(chosen, shift)
       return
     }
@@ -94,6 +106,12 @@ export function dragHandlers(
   }
   return { onNodeDragStart: takeHold, onNodeDrag: carry, onNodeDragStop: letGo }
 }
+
+const NOT_ALIGNED = { dx: 0, dy: 0, guides: [] }
+
+/** The positions of dragged blocks and notes after a displacement. */
+const shifted = (nodes: SheetNode[], dx: number, dy: number): Places =>
+  Object.fromEntries(nodes.map(({ id, position }) => [id, { x: position.x + dx, y: position.y + dy }]))
 
 /** The handlers of a drag of a block type from the library to the sheet. */
 export function dropHandlers(

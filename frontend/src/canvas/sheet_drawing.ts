@@ -61,5 +61,5 @@ export function useSheetDrawing({ drag, freed, loose, into }: SheetDrag, chosenW
       }),
     [graph, blocks, shown, moved, lines, late, kinds, level, chosenWires, into],
   )
-  return { graph, nodes, edges }
+  return { graph, nodes, edges, lines }
 }

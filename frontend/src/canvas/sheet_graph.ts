@@ -10,6 +10,7 @@ import type { WireEdgeType, WireTag } from './wire_edge'
 
 export type SheetNode = BlockNodeType | NoteNodeType
 
+const COMMENTED = { out: 'commented out', through: 'commented through', '': '' }
 const NO_FINDINGS: Finding[] = []
 const NO_POINTS: Point[] = []
 const NO_TAGS: WireTag[] = []
@@ -91,7 +92,7 @@ export class SheetGraph {
             ...block.inputs.map((spot) => port(spot, false)),
             ...block.outputs.map((spot) => port(spot, true)),
           ],
-          ariaLabel: `${name}, ${block.title}`,
+          ariaLabel: [name, block.title, COMMENTED[block.comment ?? '']].filter(Boolean).join(', '),
           data: { block, findings: own },
         }),
       )

@@ -3,6 +3,7 @@ import { commandOf } from '../commands'
 import { show, useDialogs } from '../dialogs'
 import { change, look, useStudio } from '../store'
 import { chosenBlocks } from './arranging'
+import { rename } from './block_node'
 import { editNote } from './note_node'
 import { addNote, move, openBlock, sheetView, ZOOM_STEP } from './sheet_actions'
 import { wireKey, type Places } from '../model/wires'
@@ -24,7 +25,7 @@ const isButton = (element: Element | null): boolean =>
   !element.closest('[role="tablist"], [role="radiogroup"], [role="listbox"], .timeline, .stage')
 
 /** Delete the selected blocks, notes and wires. */
-function removeChosen(chosenWires: ReadonlySet<string>): void {
+export function removeChosen(chosenWires: ReadonlySet<string>): void {
   const { document, selection, select } = useStudio.getState()
   const wires = (document?.wires ?? []).filter((wire) => chosenWires.has(wireKey(wire)))
   const blocks = [...selection].filter((name) => document?.blocks[name])
@@ -57,6 +58,8 @@ export function useSheetKeys(
     const arrow = arrows[event.key]
     const [first] = selection
     if (event.key === 'Delete' || event.key === 'Backspace') remove()
+    else if (event.key === 'F2' && first && document.notes[first]) editNote(first)
+    else if (event.key === 'F2' && first) rename(first)
     else if (event.key === 'Enter' && first && document.notes[first]) editNote(first)
     else if (event.key === 'Enter' && chosenBlocks()[0]) openBlock(chosenBlocks()[0]!)
     else if (arrow && selection.size) {

@@ -4,7 +4,9 @@ import { create } from 'zustand'
 import type { Wire } from '../protocol'
 import { change } from '../store'
 import { dragged } from '../model/bends'
+import { drawBranch } from './branching'
 import { GRID } from './insert'
+import { nameSignal } from './signal_names'
 import { isFlat, svgPath, type Point, type PortPlace } from '../model/wire_lines'
 
 export type WireEdgeType = Edge<
@@ -47,7 +49,7 @@ export const WireEdge = memo(function WireEdge({ id, data, selected }: EdgeProps
   const named = ['wire', selected && 'selected', data.pending && 'pending'].filter(Boolean).join(' ')
   if (!path.length)
     return (
-      <g className={named}>
+      <g className={named} onDoubleClick={() => nameSignal(id.slice(0, id.indexOf(' -> ')))}>
         {data.tags.map((tag) => (
           <Tag key={`${tag.x} ${tag.y}`} tag={tag} selected={Boolean(selected)} />
         ))}
@@ -55,7 +57,7 @@ export const WireEdge = memo(function WireEdge({ id, data, selected }: EdgeProps
       </g>
     )
   return (
-    <g className={named}>
+    <g className={named} onDoubleClick={() => nameSignal(id.slice(0, id.indexOf(' -> ')))}>
       <BaseEdge
         id={id}
         path={line}
@@ -116,6 +118,10 @@ function Piece({
   const flat = isFlat(path, piece)
   const take = (event: React.PointerEvent<SVGLineElement>) => {
     if (event.button !== 0) return
+    if (event.ctrlKey || event.metaKey) {
+      drawBranch(flow, id.slice(0, id.indexOf(' -> ')), path, event)
+      return
+    }
     const whole = way()
     const index = whole.length - path.length + piece
     if (index < 0 || index > whole.length - 2) return

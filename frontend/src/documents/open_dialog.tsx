@@ -10,29 +10,29 @@ export function OpenDialog() {
   const times = useDialogs((s) => s.times)
   return (
     <Modal opened={opened} onClose={() => show(null)} title="Open" size="lg">
-      <Choice key={times} />
+      <OpenList key={times} />
     </Modal>
   )
 }
 
-function Choice() {
+function OpenList() {
   const documents = useStudio((s) => s.documents)
-  const here = useStudio((s) => s.document?.state.document)
+  const current = useStudio((s) => s.document?.state.document)
   const [found, setFound] = useState<{ files: string[]; recent: string[] } | null>(null)
-  const [typed, setTyped] = useState('')
+  const [query, setQuery] = useState('')
   useEffect(() => void projectFiles().then(setFound), [])
-  const fits = (name: string) => name.toLowerCase().includes(typed.trim().toLowerCase())
-  const go = (open: () => Promise<unknown>) => {
+  const matches = (name: string) => name.toLowerCase().includes(query.trim().toLowerCase())
+  const closeAnd = (open: () => Promise<unknown>) => {
     show(null)
     void open()
   }
-  const open = documents.filter((entry) => entry.document !== here && fits(entry.path ?? entry.title))
-  const recent = found?.recent.filter(fits) ?? []
-  const files = found?.files.filter((file) => fits(file) && !recent.includes(file)) ?? []
+  const open = documents.filter((entry) => entry.document !== current && matches(entry.path ?? entry.title))
+  const recent = found?.recent.filter(matches) ?? []
+  const files = found?.files.filter((file) => matches(file) && !recent.includes(file)) ?? []
   const openFirst = () => {
     const path = recent[0] ?? files[0]
-    if (open[0]) go(() => bringToFront(open[0]!))
-    else if (path !== undefined) go(() => ask({ kind: 'open', path }))
+    if (open[0]) closeAnd(() => bringToFront(open[0]!))
+    else if (path !== undefined) closeAnd(() => ask({ kind: 'open', path }))
   }
 
   return (
@@ -41,14 +41,14 @@ function Choice() {
         aria-label="Search the files"
         placeholder="Search the files"
         data-autofocus
-        value={typed}
-        onChange={(event) => setTyped(event.currentTarget.value)}
+        value={query}
+        onChange={(event) => setQuery(event.currentTarget.value)}
         onKeyDown={(event) => {
           if (event.key === 'Enter') openFirst()
         }}
       />
       <div className="files">
-        <Part title="Open now">
+        <Section title="Open documents">
           {open.map((entry) => (
             <NavLink
               key={entry.document}
@@ -62,25 +62,25 @@ function Choice() {
                   </Badge>
                 )
               }
-              onClick={() => go(() => bringToFront(entry))}
+              onClick={() => closeAnd(() => bringToFront(entry))}
             />
           ))}
-        </Part>
-        <Part title="Used last">
+        </Section>
+        <Section title="Recent files">
           {recent.map((path) => (
-            <FileLink key={path} icon={IconHistory} path={path} go={go} />
+            <FileLink key={path} icon={IconHistory} path={path} closeAnd={closeAnd} />
           ))}
-        </Part>
-        <Part title="Files of this folder">
+        </Section>
+        <Section title="Files of this folder">
           {files.map((path) => (
-            <FileLink key={path} icon={IconFile} path={path} go={go} />
+            <FileLink key={path} icon={IconFile} path={path} closeAnd={closeAnd} />
           ))}
-        </Part>
+        </Section>
         {found && !open.length && !recent.length && !files.length && (
           <p className="empty">
-            {typed
+            {query
               ? 'No file matches.'
-              : 'This folder has no models yet: save one, or begin with an example.'}
+              : 'This folder has no models yet: save one, or start from an example.'}
           </p>
         )}
       </div>
@@ -91,23 +91,23 @@ function Choice() {
 function FileLink({
   icon: Icon,
   path,
-  go,
+  closeAnd,
 }: {
   icon: typeof IconFile
   path: string
-  go: (open: () => Promise<unknown>) => void
+  closeAnd: (open: () => Promise<unknown>) => void
 }) {
   return (
     <NavLink
       component="button"
       leftSection={<Icon size={15} />}
       label={path}
-      onClick={() => go(() => ask({ kind: 'open', path }))}
+      onClick={() => closeAnd(() => ask({ kind: 'open', path }))}
     />
   )
 }
 
-function Part({ title, children }: { title: string; children: React.ReactNode[] }) {
+function Section({ title, children }: { title: string; children: React.ReactNode[] }) {
   if (!children.length) return null
   return (
     <section>

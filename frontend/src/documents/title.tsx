@@ -10,13 +10,18 @@ export function DocumentTitle() {
   useEffect(() => {
     window.document.title = state ? `${state.dirty ? '• ' : ''}${title} – armblocks` : 'armblocks'
   }, [state, title])
-  const kept = state?.dirty
+  const saveState = state?.dirty
     ? 'Not saved. The journal keeps your changes even if you close the page.'
     : state?.path
       ? `Saved in ${state.path}`
       : 'No changes to save.'
   return (
-    <Tooltip multiline maw={340} openDelay={400} label={description ? `${description} – ${kept}` : kept}>
+    <Tooltip
+      multiline
+      maw={340}
+      openDelay={400}
+      label={description ? `${description} – ${saveState}` : saveState}
+    >
       <Text fw={600} className="title" tabIndex={-1}>
         {title}
         {state?.dirty && <span aria-label="not saved"> •</span>}

@@ -20,7 +20,8 @@ const STOPS: Stop[] = [
     title: 'The sheet',
     text:
       'Blocks and wires of the model. Drag from port to port to wire, or to the empty sheet to add a ' +
-      'connected block; double-click a block to open it; drag with Ctrl to duplicate it.',
+      'connected block; double-click a block to open it; drag with the right button to duplicate ' +
+      'it. A right click lists the commands, Ctrl+Shift+X comments blocks out.',
   },
   {
     at: '.palette',

@@ -146,7 +146,7 @@ function Trust({ source, onTrust, onReload }: TrustProps) {
         </Text>
         {buttons}
         <Button size="compact-sm" variant="subtle" color="red" onClick={() => onTrust(false)}>
-          Stop trusting it
+          Revoke trust
         </Button>
       </Group>
     )
@@ -184,11 +184,11 @@ function Source({ file, source, block, line: shown }: SourceProps) {
   const findings = useStudio((s) => s.document?.findings)
   const inside = useStudio((s) => s.document?.inside)
   const path = [...(inside ?? []), block.name].join('/')
-  const own = source.trusted
+  const blockFindings = source.trusted
     ? (findings?.filter((finding) => finding.block === path && !finding.port) ?? [])
     : []
-  const words = own.map(({ what }) => what)
-  const faulty = new Set([...words, source.fault?.what ?? ''].flatMap(linesIn))
+  const messages = blockFindings.map(({ what }) => what)
+  const faulty = new Set([...messages, source.fault?.what ?? ''].flatMap(linesIn))
   const first = [...faulty][0] ?? (source.trusted ? shown : 1)
   const box = useRef<HTMLPreElement>(null)
   useEffect(() => {
@@ -197,7 +197,7 @@ function Source({ file, source, block, line: shown }: SourceProps) {
   }, [first, source])
   return (
     <>
-      {words.map((what) => (
+      {messages.map((what) => (
         <Text key={what} size="sm" c="red" role="alert">
           {what}
         </Text>

@@ -14,7 +14,7 @@ const known = new Map<string, Difference>()
 const MOST_KNOWN = 256
 
 /**
- * `compared - baseline` at the instants of the baseline, where both have values, on both sides of its jumps.
+ * `compared - baseline` at the times of the baseline, where both have values, on both sides of its jumps.
  * The compared run is interpolated linearly between its samples.
  */
 export function difference(

@@ -97,7 +97,7 @@ function crossing(time: Float64Array, values: Float64Array, level: number, way: 
   return NaN
 }
 
-/** The part of a trace between two instants; its ends are interpolated. */
+/** The part of a trace between two times; its ends are interpolated. */
 function cut(trace: { time: Float64Array; values: Float64Array }, from: number, to: number) {
   const { time, values } = trace
   const begin = Math.max(from, time[0] ?? Infinity)

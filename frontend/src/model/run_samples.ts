@@ -8,7 +8,7 @@ interface Columns {
   channel: Channel
 }
 
-/** One recorded signal: its channel, the instants (s), and one typed array for each of its elements. */
+/** One recorded signal: its channel, the sample times (s), and one typed array for each of its elements. */
 export interface Signal {
   channel: Channel
   time: Float64Array
@@ -82,8 +82,10 @@ export class RunSamples {
     this.data = this.data.map((column) => column.slice(0, this.count))
   }
 
-  /** The display name of a signal: its block, if the block has no other output. */
+  /** The display name of a signal: the name given by the user, or its block if that has no other output. */
   title(name: string): string {
+    const given = this.columns.get(name)?.channel.title
+    if (given) return given
     const block = name.slice(0, name.lastIndexOf('/'))
     return this.aliases[block] === name ? block : name
   }

@@ -57,7 +57,7 @@ export function tracesOf(samples: RunSamples, paths: { path: string; label: stri
     .slice(0, MOST_TRACES)
 }
 
-/** The columns of a plot: common instants, and the values of each trace. */
+/** The columns of a plot: common times, and the values of each trace. */
 export type Drawn = [Float64Array, ...(Float64Array | (number | null | undefined)[])[]]
 
 /** The extremes of traces in the intervals of a window, as far as they are computed. */
@@ -140,7 +140,7 @@ export function within(
   return { time: time.subarray(begin, end), values: values.subarray(begin, end) }
 }
 
-/** The left limit at an instant, linearly interpolated; NaN outside the samples. */
+/** The left limit at a time, linearly interpolated; NaN outside the samples. */
 export function valueBefore(trace: { time: Float64Array; values: Float64Array }, at: number): number {
   const first = firstNotBefore(trace.time, at)
   return trace.time[first] === at ? trace.values[first]! : valueAt(trace, at)
@@ -174,7 +174,7 @@ export function joined(traces: { time: Float64Array; values: Float64Array }[]): 
   return [Float64Array.from(times), ...columns]
 }
 
-/** The linearly interpolated value at an instant, after a jump there; NaN outside the samples. */
+/** The linearly interpolated value at a time, after a jump there; NaN outside the samples. */
 export function valueAt({ time, values }: { time: Float64Array; values: Float64Array }, at: number): number {
   const after = firstAfter(time, at)
   if (after === 0 || (after === time.length && time[after - 1] !== at)) return NaN

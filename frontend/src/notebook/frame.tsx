@@ -6,6 +6,7 @@ import './frame.css'
 import { MantineProvider } from '@mantine/core'
 import { StrictMode } from 'react'
 import { createRoot } from 'react-dom/client'
+import { ContextMenu } from '../context_menu'
 import type { Channel, ViewOf } from '../protocol'
 import { RunArm } from '../robot/run_arm'
 import { listed, type RobotScene } from '../robot/scene'
@@ -80,6 +81,7 @@ function draw(): void {
           </div>
           {run && <Timeline />}
         </main>
+        <ContextMenu />
       </MantineProvider>
     </StrictMode>,
   )

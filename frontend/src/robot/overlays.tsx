@@ -5,7 +5,7 @@ import { DoubleSide, Matrix4, type Group } from 'three'
 import { matrixAt, matrixOf, type Poses, type RobotScene, type SceneJoint } from './scene'
 
 const AXES = ['#d9362b', '#2f9e44', '#2b6fd6'] as const
-const MOST_ARC = 2 * Math.PI
+const FULL_TURN = 2 * Math.PI
 
 interface OverlayProps {
   scene: RobotScene
@@ -13,8 +13,8 @@ interface OverlayProps {
   dark: boolean
 }
 
-/** An object that moves with one row of the poses. */
-function Riding({
+/** Objects in the frame of one row of the poses. */
+function PoseGroup({
   row,
   poses,
   children,
@@ -54,7 +54,7 @@ export function Frames({ scene, poses }: OverlayProps) {
   return Array.from({ length: scene.rows }, (_, row) => {
     const size = (row === 0 || row === scene.rows - 1 ? 0.16 : 0.11) * scene.reach
     return (
-      <Riding key={row} row={row} poses={poses}>
+      <PoseGroup key={row} row={row} poses={poses}>
         {AXES.map((color, axis) => (
           <Line
             toneMapped={false}
@@ -66,7 +66,7 @@ export function Frames({ scene, poses }: OverlayProps) {
             renderOrder={4}
           />
         ))}
-      </Riding>
+      </PoseGroup>
     )
   })
 }
@@ -76,7 +76,7 @@ export function JointAxes({ scene, poses, dark }: OverlayProps) {
   return scene.joints.map((joint) => {
     const half = Math.max(3.2 * joint.radius, 0.1 * scene.reach)
     return (
-      <Riding key={joint.name} row={joint.carrier} poses={poses}>
+      <PoseGroup key={joint.name} row={joint.carrier} poses={poses}>
         <Fixed at={joint.frame}>
           <Line
             toneMapped={false}
@@ -93,7 +93,7 @@ export function JointAxes({ scene, poses, dark }: OverlayProps) {
             renderOrder={3}
           />
         </Fixed>
-      </Riding>
+      </PoseGroup>
     )
   })
 }
@@ -119,7 +119,7 @@ function Range({ joint, poses, dark, reach }: RangeProps) {
     poses,
     reach,
     colour: dark ? '#3d9fdc' : '#0072b2',
-    hand: dark ? '#ff9a4d' : '#b04a00',
+    pointer: dark ? '#ff9a4d' : '#b04a00',
     inner: 1.3 * joint.radius,
     outer: 1.95 * joint.radius,
     low: joint.limits[0] + joint.offset,
@@ -130,17 +130,17 @@ function Range({ joint, poses, dark, reach }: RangeProps) {
 
 interface ShownRange extends Omit<RangeProps, 'dark'> {
   colour: string
-  hand: string
+  pointer: string
   inner: number
   outer: number
   low: number
   high: number
 }
 
-function Bar({ joint, poses, colour, hand, inner, outer, low, high }: ShownRange) {
+function Bar({ joint, poses, colour, pointer, inner, outer, low, high }: ShownRange) {
   return (
     <>
-      <Riding row={joint.carrier} poses={poses}>
+      <PoseGroup row={joint.carrier} poses={poses}>
         <Fixed at={joint.frame}>
           <Line
             toneMapped={false}
@@ -152,8 +152,8 @@ function Bar({ joint, poses, colour, hand, inner, outer, low, high }: ShownRange
             lineWidth={5}
           />
         </Fixed>
-      </Riding>
-      <Riding row={joint.row} poses={poses}>
+      </PoseGroup>
+      <PoseGroup row={joint.row} poses={poses}>
         <Fixed at={joint.moving}>
           <Line
             toneMapped={false}
@@ -161,22 +161,22 @@ function Bar({ joint, poses, colour, hand, inner, outer, low, high }: ShownRange
               [inner, 0, 0],
               [1.2 * outer, 0, 0],
             ]}
-            color={hand}
+            color={pointer}
             lineWidth={3}
           />
         </Fixed>
-      </Riding>
+      </PoseGroup>
     </>
   )
 }
 
-function Arc({ joint, poses, reach, colour, hand, inner, outer, low, high }: ShownRange) {
+function Arc({ joint, poses, reach, colour, pointer, inner, outer, low, high }: ShownRange) {
   return (
     <>
-      <Riding row={joint.carrier} poses={poses}>
+      <PoseGroup row={joint.carrier} poses={poses}>
         <Fixed at={joint.frame}>
           <mesh renderOrder={3}>
-            <ringGeometry args={[inner, outer, 64, 1, low, Math.min(high - low, MOST_ARC)]} />
+            <ringGeometry args={[inner, outer, 64, 1, low, Math.min(high - low, FULL_TURN)]} />
             <meshBasicMaterial
               toneMapped={false}
               color={colour}
@@ -199,8 +199,8 @@ function Arc({ joint, poses, reach, colour, hand, inner, outer, low, high }: Sho
             />
           ))}
         </Fixed>
-      </Riding>
-      <Riding row={joint.row} poses={poses}>
+      </PoseGroup>
+      <PoseGroup row={joint.row} poses={poses}>
         <Fixed at={joint.moving}>
           <Line
             toneMapped={false}
@@ -208,11 +208,11 @@ function Arc({ joint, poses, reach, colour, hand, inner, outer, low, high }: Sho
               [inner, 0, 0.002 * reach],
               [1.08 * outer, 0, 0.002 * reach],
             ]}
-            color={hand}
+            color={pointer}
             lineWidth={3}
           />
         </Fixed>
-      </Riding>
+      </PoseGroup>
     </>
   )
 }

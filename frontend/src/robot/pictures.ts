@@ -1,13 +1,18 @@
 import type { WebGLRenderer } from 'three'
 
 /** The renderer of a view and the function that draws one frame. */
-export interface Shot {
+export interface Rendering {
   gl: WebGLRenderer
   draw: () => void
 }
 
 const FRAMES_PER_SECOND = 30
-const FILMS = ['video/mp4;codecs=avc1', 'video/webm;codecs=vp9', 'video/webm;codecs=vp8', 'video/webm']
+const VIDEO_FORMATS = [
+  'video/mp4;codecs=avc1',
+  'video/webm;codecs=vp9',
+  'video/webm;codecs=vp8',
+  'video/webm',
+]
 
 function download(data: Blob, name: string): void {
   const link = document.createElement('a')
@@ -18,7 +23,7 @@ function download(data: Blob, name: string): void {
 }
 
 /** Save the view as a PNG with at least two pixels per CSS px. */
-export function takePicture(shot: React.RefObject<Shot | null>, name: string): void {
+export function savePicture(shot: React.RefObject<Rendering | null>, name: string): void {
   const now = shot.current
   if (!now) return
   const before = now.gl.getPixelRatio()
@@ -32,20 +37,20 @@ export function takePicture(shot: React.RefObject<Shot | null>, name: string): v
 }
 
 /** A video format that this browser can record; undefined if there is none. */
-export function filmKind(): string | undefined {
+export function videoFormat(): string | undefined {
   return typeof MediaRecorder === 'undefined'
     ? undefined
-    : FILMS.find((kind) => MediaRecorder.isTypeSupported(kind))
+    : VIDEO_FORMATS.find((kind) => MediaRecorder.isTypeSupported(kind))
 }
 
 /** Record a video of the view during a playback; the returned function ends it early. */
-export function takeFilm(
-  shot: React.RefObject<Shot | null>,
+export function recordVideo(
+  shot: React.RefObject<Rendering | null>,
   name: string,
   play: () => Promise<void>,
   ended: () => void,
 ): () => void {
-  const kind = filmKind()
+  const kind = videoFormat()
   const canvas = shot.current?.gl.domElement
   if (!kind || !canvas) {
     ended()

@@ -1,4 +1,5 @@
 import { useCallback, useMemo, useRef } from 'react'
+import type { Entries } from '../context_menu_state'
 import { play, shownTime, useCursor } from '../run/cursor'
 import { samples } from '../samples'
 import { useStudio } from '../store'
@@ -14,12 +15,14 @@ interface RunArmProps {
   rest: Poses
   /** The drawing for browsers without WebGL. */
   drawing: () => Promise<string | undefined>
+  /** Additional entries of the context menu, before the others. */
+  entries?: () => Entries
   /** Additional buttons, before the others. */
   children?: React.ReactNode
 }
 
 /** The arm in the pose of the run at the time cursor. */
-export function RunArm({ path, scene, rest, drawing, children }: RunArmProps) {
+export function RunArm({ path, scene, rest, drawing, children, entries }: RunArmProps) {
   const whole = useStudio((s) => (s.run?.state === 'done' ? s.run.run : ''))
   const has = useStudio((s) =>
     Boolean(s.run?.views.some((view) => view.kind === 'robot' && view.block === path)),
@@ -69,6 +72,7 @@ export function RunArm({ path, scene, rest, drawing, children }: RunArmProps) {
       whole={whole}
       drawing={drawing}
       {...(has ? { film: playOnce } : {})}
+      {...(entries ? { entries } : {})}
     >
       {children}
     </Stage>

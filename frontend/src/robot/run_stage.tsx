@@ -31,13 +31,17 @@ export default function RunStage({ document, inside, block, scene, rest, q }: Ru
       }),
     [document, inside, block, q],
   )
+  const edit = () => void ask({ kind: 'robot_of_block', document, inside, block })
+  const entries = () => [{ title: 'Edit this robot', run: edit }, null]
   return (
-    <RunArm path={[...inside, block].join('/')} scene={scene} rest={poses} drawing={drawing}>
-      <Button
-        label="Edit this robot"
-        icon={IconEdit}
-        onClick={() => void ask({ kind: 'robot_of_block', document, inside, block })}
-      />
+    <RunArm
+      path={[...inside, block].join('/')}
+      scene={scene}
+      rest={poses}
+      drawing={drawing}
+      entries={entries}
+    >
+      <Button label="Edit this robot" icon={IconEdit} onClick={edit} />
     </RunArm>
   )
 }

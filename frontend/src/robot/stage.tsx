@@ -2,16 +2,17 @@ import { useComputedColorScheme } from '@mantine/core'
 import { Environment, Grid, Lightformer } from '@react-three/drei'
 import { Canvas, useFrame, useThree } from '@react-three/fiber'
 import { memo, useEffect, useRef, useState } from 'react'
+import { useMenuHandlers, openMenu, type Entries } from '../context_menu_state'
 import { watch } from '../frames'
 import { Arm, MATERIALS, useBodies } from './arm'
 import { ViewCamera, type CameraHandle } from './camera'
 import { Frames, JointAxes, Limits } from './overlays'
-import { takePicture, type Shot } from './pictures'
+import { savePicture, type Rendering } from './pictures'
 import type { Poses, RobotScene } from './scene'
 import { StaticArm } from './static_arm'
 import { ToolPath, type Way } from './tool_path'
 import { toggle, useViewOptions } from './view_options'
-import { ViewTools } from './view_tools'
+import { armEntries, ViewTools } from './view_tools'
 
 const KEYS_IN_WORDS =
   'Arrow keys turn the view, plus and minus bring it nearer or farther, space shows all of the arm.'
@@ -62,6 +63,8 @@ interface StageProps {
    * Plays the run from its start and resolves at its end, for a video; without it no video can be recorded.
    */
   film?: () => Promise<void>
+  /** Additional entries of the context menu, before the others. */
+  entries?: () => Entries
   /** Additional buttons, before the others. */
   children?: React.ReactNode
 }
@@ -71,11 +74,20 @@ const once = () => ''
 
 /** An arm on a floor, with light, shadow, camera and view tools. */
 export function Stage(props: StageProps) {
-  const { scene, poses, state, drawing, drawn, film, children } = props
+  const { scene, poses, state, drawing, drawn, film, children, entries } = props
   const scheme = useComputedColorScheme('light')
   const camera = useRef<CameraHandle>(null)
-  const shot = useRef<Shot | null>(null)
+  const shot = useRef<Rendering | null>(null)
   const [works] = useState(hasWebGl)
+  const tools = {
+    onPicture: () => savePicture(shot, scene.name),
+    hasPath: Boolean(props.way),
+    hasGhosts: Boolean(props.ghosts),
+    onToggle: toggle,
+  }
+  const menus = useMenuHandlers((at) =>
+    openMenu(scene.name, at, [...(entries?.() ?? []), ...armEntries(camera.current, tools)]),
+  )
   if (!works)
     return (
       <StaticArm name={scene.name} drawing={drawing} state={drawn ?? once}>
@@ -109,6 +121,7 @@ export function Stage(props: StageProps) {
         aria-label={`The robot ${scene.name}. ${KEYS_IN_WORDS}`}
         tabIndex={0}
         onKeyDown={onKeyDown}
+        {...menus}
       >
         <Canvas
           shadows="percentage"
@@ -126,16 +139,7 @@ export function Stage(props: StageProps) {
           <Inside {...props} scheme={scheme} camera={camera} shot={shot} />
         </Canvas>
       </div>
-      <ViewTools
-        camera={camera}
-        onPicture={() => takePicture(shot, scene.name)}
-        film={film && (() => film())}
-        shot={shot}
-        name={scene.name}
-        hasPath={Boolean(props.way)}
-        hasGhosts={Boolean(props.ghosts)}
-        onToggle={toggle}
-      >
+      <ViewTools camera={camera} film={film && (() => film())} shot={shot} name={scene.name} {...tools}>
         {children}
       </ViewTools>
       <Instant poses={poses} rows={scene.rows} state={state} />
@@ -146,7 +150,7 @@ export function Stage(props: StageProps) {
 interface InsideProps extends StageProps {
   scheme: 'light' | 'dark'
   camera: React.RefObject<CameraHandle | null>
-  shot: React.RefObject<Shot | null>
+  shot: React.RefObject<Rendering | null>
 }
 
 function Inside({ scene, poses, state, way, ghosts, extent, whole, scheme, camera, shot }: InsideProps) {

@@ -1,6 +1,6 @@
 import { useEffect, useState } from 'react'
 
-const LOOK_MS = 300
+const CHECK_MS = 300
 
 interface StaticArmProps {
   name: string
@@ -13,18 +13,18 @@ interface StaticArmProps {
 export function StaticArm({ name, drawing, state, children }: StaticArmProps) {
   const [svg, setSvg] = useState<string>()
   useEffect(() => {
-    let current = true
+    let mounted = true
     let drawn: string | undefined
-    const look = () => {
-      const now = state()
-      if (now === drawn) return
-      drawn = now
-      void drawing().then((found) => current && setSvg(found))
+    const redrawIfChanged = () => {
+      const present = state()
+      if (present === drawn) return
+      drawn = present
+      void drawing().then((found) => mounted && setSvg(found))
     }
-    look()
-    const timer = setInterval(look, LOOK_MS)
+    redrawIfChanged()
+    const timer = setInterval(redrawIfChanged, CHECK_MS)
     return () => {
-      current = false
+      mounted = false
       clearInterval(timer)
     }
   }, [drawing, state])

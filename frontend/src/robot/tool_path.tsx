@@ -17,7 +17,7 @@ export interface Way {
   point: (k: number) => [number, number, number]
 }
 
-/** The path of the tool up to the displayed instant; older parts fade. */
+/** The path of the tool up to the displayed time; older parts fade. */
 export function ToolPath({
   way,
   dark,

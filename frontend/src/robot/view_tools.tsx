@@ -8,8 +8,9 @@ import {
   IconViewfinder,
 } from '@tabler/icons-react'
 import { useRef, useState } from 'react'
+import type { Entries } from '../context_menu_state'
 import type { CameraHandle, Preset } from './camera'
-import { filmKind, takeFilm, type Shot } from './pictures'
+import { videoFormat, recordVideo, type Rendering } from './pictures'
 import { useViewOptions, type ViewOptions } from './view_options'
 
 const PRESET_LABELS: [Preset, string][] = [
@@ -31,7 +32,7 @@ const OPTION_LABELS: [keyof ViewOptions, string][] = [
 
 interface ViewToolsProps {
   camera: React.RefObject<CameraHandle | null>
-  shot: React.RefObject<Shot | null>
+  shot: React.RefObject<Rendering | null>
   name: string
   onPicture: () => void
   film: (() => Promise<void>) | undefined
@@ -40,6 +41,37 @@ interface ViewToolsProps {
   onToggle: (option: keyof ViewOptions) => void
   children?: React.ReactNode
 }
+
+/** The commands of an arm as a context menu. */
+export function armEntries(
+  camera: CameraHandle | null,
+  {
+    hasPath,
+    hasGhosts,
+    onToggle,
+    onPicture,
+  }: Pick<ViewToolsProps, 'hasPath' | 'hasGhosts' | 'onToggle' | 'onPicture'>,
+): Entries {
+  const options = useViewOptions.getState()
+  return [
+    { title: 'Show all of the arm', keys: 'Space', run: () => camera?.fit() },
+    {
+      title: 'Camera',
+      within: PRESET_LABELS.map(([preset, title]) => ({ title, run: () => camera?.look(preset) })),
+    },
+    null,
+    ...offered(hasPath, hasGhosts).map(([option, title]) => ({
+      title,
+      checked: options[option],
+      run: () => onToggle(option),
+    })),
+    null,
+    { title: 'Save a picture (PNG)', run: onPicture },
+  ]
+}
+
+const offered = (hasPath: boolean, hasGhosts: boolean) =>
+  OPTION_LABELS.filter(([option]) => (option !== 'path' || hasPath) && (option !== 'ghosts' || hasGhosts))
 
 /** The buttons over an arm: camera, display options, picture and video. */
 export function ViewTools({
@@ -56,9 +88,6 @@ export function ViewTools({
   const options = useViewOptions()
   const [filming, setFilming] = useState(false)
   const stop = useRef<() => void>(() => {})
-  const offered = OPTION_LABELS.filter(
-    ([option]) => (option !== 'path' || hasPath) && (option !== 'ghosts' || hasGhosts),
-  )
   return (
     <div className="view-tools" role="toolbar" aria-label="Robot view">
       {children}
@@ -75,7 +104,7 @@ export function ViewTools({
         </Menu.Dropdown>
       </Menu>
       <Button
-        label="Show all of the arm (Space)"
+        label="Show the whole arm (Space)"
         icon={IconArrowsMaximize}
         onClick={() => camera.current?.fit()}
       />
@@ -84,7 +113,7 @@ export function ViewTools({
           <Button label="Display options" icon={IconEye} />
         </Menu.Target>
         <Menu.Dropdown>
-          {offered.map(([option, label]) => (
+          {offered(hasPath, hasGhosts).map(([option, label]) => (
             <Menu.CheckboxItem key={option} checked={options[option]} onChange={() => onToggle(option)}>
               {label}
             </Menu.CheckboxItem>
@@ -92,7 +121,7 @@ export function ViewTools({
         </Menu.Dropdown>
       </Menu>
       <Button label="Save a picture (PNG)" icon={IconCamera} onClick={onPicture} />
-      {film && filmKind() && (
+      {film && videoFormat() && (
         <Button
           label={filming ? 'Stop the video' : 'Record a video of the run'}
           icon={filming ? IconPlayerStopFilled : IconVideo}
@@ -102,7 +131,7 @@ export function ViewTools({
               return
             }
             setFilming(true)
-            stop.current = takeFilm(shot, name, film, () => setFilming(false))
+            stop.current = recordVideo(shot, name, film, () => setFilming(false))
           }}
         />
       )}

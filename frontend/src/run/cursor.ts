@@ -24,7 +24,7 @@ export function shownTime(): number {
 /** The frame (ms) in which the playback was last advanced; null without playback. */
 let last: number | null = null
 
-/** Advance the playback. It runs before all views, so that they draw the new instant in the same frame. */
+/** Advance the playback. It runs before all views, so that they draw the new time in the same frame. */
 function move(now: number): void {
   const { playing, loop, time, rate } = useCursor.getState()
   if (playing && time !== null && last !== null) {
@@ -50,7 +50,7 @@ export function hold(): void {
   useCursor.setState({ playing: false })
 }
 
-/** Show an earlier or later recorded instant. */
+/** Show an earlier or later sample. */
 export function stepCursor(by: number): void {
   const shown = shownTime()
   let index = Math.min(Math.max(samples.indexAt(shown) + by, 0), samples.count - 1)

@@ -19,7 +19,7 @@ export interface KeptRun {
   name: string
   began: Date
   stopTime: number
-  /** Number of recorded instants that are reduced to their extremes; 1: no reduction. */
+  /** Number of samples that are reduced to their extremes; 1: no reduction. */
   stride: number
   state: string
   solver: string
@@ -106,7 +106,7 @@ export function tuned({ run, time, parameter, value }: EventOf<'run_tuned'>): vo
 export function rewound({ run, time, count }: EventOf<'run_rewound'>): void {
   if (samples.run === run) samples.truncate(count)
   changed()
-  // Values tuned later apply from the instant to which the run has returned.
+  // Values tuned later apply from the time to which the run has returned.
   update(run, ({ tunings }) => ({
     tunings: tunings.map((one) => ({ ...one, time: Math.min(one.time, time) })),
   }))

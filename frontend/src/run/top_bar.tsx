@@ -18,6 +18,7 @@ import { openConfiguration, save, show } from '../dialogs'
 import { FileMenu } from '../documents/file_menu'
 import { DocumentTitle } from '../documents/title'
 import { alter, ask, change, useStudio } from '../store'
+import { ThemeSwitch } from '../theme_switch'
 import { useRuns } from './runs'
 import { control, startOrResume } from './start'
 
@@ -69,6 +70,7 @@ export function TopBar() {
         onClick={openConfiguration}
       />
       <RunState />
+      <ThemeSwitch />
       <RunProgress />
     </header>
   )

@@ -28,7 +28,8 @@ function useTunables(): Map<string, Tunable> {
   const ofRun = useStudio((s) => s.run?.tunables)
   return useMemo(() => {
     const found = new Map((ofRun ?? []).map((one) => [one.path, one]))
-    for (const block of Object.values(blocks ?? {}))
+    for (const block of Object.values(blocks ?? {})) {
+      if (block.comment) continue
       for (const rule of library.get(block.type)?.parameters ?? []) {
         if (!rule.tunable || !NUMERIC.includes(rule.kind)) continue
         const path = `${level}${block.name}.${rule.name}`
@@ -42,6 +43,7 @@ function useTunables(): Map<string, Tunable> {
           high: known?.high ?? null,
         })
       }
+    }
     return found
   }, [blocks, library, level, ofRun])
 }

@@ -1,11 +1,12 @@
 import { ActionIcon, Tooltip } from '@mantine/core'
-import { IconAntennaBars5, IconPinned, IconPinnedOff, IconRoute } from '@tabler/icons-react'
+import { IconAntennaBars5, IconPinned, IconPinnedOff, IconRoute, IconTag } from '@tabler/icons-react'
 import { useStore } from '@xyflow/react'
 import { useEffect, useMemo, useRef, useState } from 'react'
 import { createPortal } from 'react-dom'
 import { create } from 'zustand'
 import type { Point } from '../model/wire_lines'
 import type { WireEdgeType } from '../canvas/wire_edge'
+import { nameSignal } from '../canvas/signal_names'
 import { nameSide, nameWidth } from '../canvas/sheet_layout'
 import { changed, watch } from '../frames'
 import type { Rectangle } from '../model/free_place'
@@ -29,7 +30,7 @@ export const useValues = create<Shown>(() => ({ all: false, pinned: new Set() })
 const MOST_ELEMENTS = 4
 
 /** The display text of a signal's value at a time. */
-export function valueAtInstant(path: string, time: number): string {
+export function valueAtTime(path: string, time: number): string {
   const found = samples.signal(path)
   const index = samples.indexAt(time)
   if (!found || index < 0) return ''
@@ -65,7 +66,7 @@ export function WireValues({ chosen }: { chosen: WireEdgeType | undefined }) {
   const zoom = useStore((s) => s.transform[2])
   const layer = useRef<HTMLDivElement>(null)
   const hovered = useHovered(flow)
-  useWriting(layer)
+  useValueTexts(layer)
   const found = outputs(blocks)
   const shown = ran ? found.filter(({ ref }) => all || ref === hovered || pinned.has(level + ref)) : []
   const displays = (views ?? []).filter(
@@ -125,7 +126,7 @@ export function WireValues({ chosen }: { chosen: WireEdgeType | undefined }) {
 
 /** Height of a label, px. */
 const LABEL = 14
-const LEAST_LABEL = 24
+const SMALLEST_LABEL = 24
 
 /** Position and greatest width of the value at an output. */
 function labelStyle(
@@ -143,7 +144,7 @@ function labelStyle(
   )
   const shift = `translate(${direction < 0 ? '-100%' : '0'}, ${below ? '0' : '-100%'})`
   return {
-    maxWidth: Math.max(width / scale, LEAST_LABEL),
+    maxWidth: Math.max(width / scale, SMALLEST_LABEL),
     transform: `${legible(x, below ? y + OFF_WIRE : y - OFF_WIRE)} ${shift}`,
   }
 }
@@ -167,7 +168,7 @@ function drawnBoxes(blocks: Record<string, SheetBlock>): Rectangle[] {
 }
 
 /** Write the displayed values into their elements, in the frame after a change and without React. */
-function useWriting(layer: React.RefObject<HTMLDivElement | null>): void {
+function useValueTexts(layer: React.RefObject<HTMLDivElement | null>): void {
   useEffect(changed) // the elements may have changed
   useEffect(
     () =>
@@ -175,9 +176,9 @@ function useWriting(layer: React.RefObject<HTMLDivElement | null>): void {
         const time = shownTime()
         layer.current?.querySelectorAll<HTMLElement>('[data-path]').forEach((place) => {
           const now = `${samples.version} ${time} ${place.dataset['path']} ${useUnits.getState().radians}`
-          if (place.dataset['seen'] === now) return
-          place.dataset['seen'] = now
-          place.textContent = valueAtInstant(place.dataset['path'] ?? '', time)
+          if (place.dataset['written'] === now) return
+          place.dataset['written'] = now
+          place.textContent = valueAtTime(place.dataset['path'] ?? '', time)
         })
       }),
     [layer],
@@ -241,6 +242,7 @@ function WireTools({
           {isPinned ? <IconPinnedOff size={15} /> : <IconPinned size={15} />}
         </ActionIcon>
       </Tooltip>
+      <NameTool port={ref} />
       {edge.data?.bent && (
         <Tooltip label="Reset to automatic routing">
           <ActionIcon
@@ -260,6 +262,22 @@ function WireTools({
         </Tooltip>
       )}
     </div>
+  )
+}
+
+function NameTool({ port }: { port: string }) {
+  return (
+    <Tooltip label="Name the signal (double click on the wire)">
+      <ActionIcon
+        size="sm"
+        variant="subtle"
+        color="gray"
+        aria-label="Name the signal"
+        onClick={() => nameSignal(port)}
+      >
+        <IconTag size={15} />
+      </ActionIcon>
+    </Tooltip>
   )
 }
 

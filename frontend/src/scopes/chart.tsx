@@ -1,13 +1,17 @@
 import { ActionIcon, Menu } from '@mantine/core'
 import { IconArrowsVertical, IconDownload } from '@tabler/icons-react'
 import { useRef, useState } from 'react'
+import { useMenuHandlers, openMenu, type Entries } from '../context_menu_state'
 import { useRuns } from '../run/runs'
+import { showBlock, useStudio } from '../store'
 import { saveCsv, savePng, saveSvg } from './export'
+import type { Figure } from './figure'
 import { MeasureTable } from './measure_table'
 import { Plot, type PlotHandle } from './plot'
 import type { Values } from './plot_gestures'
+import { useUnits } from './quantity'
 import type { Trace } from '../model/trace'
-import { useWindow } from './window'
+import { toggleCursors, useWindow } from './window'
 import { XyPlot } from './xy_plot'
 
 /** Number of letters of a name that the legend always shows. */
@@ -39,8 +43,17 @@ export function Chart({
       if (!next.delete(key)) next.add(key)
       return next
     })
+  const menus = useMenuHandlers((at) =>
+    openMenu(title, at, [
+      { title: 'Show all values', possible: values !== null, run: () => setValues(null) },
+      ...(path ? [] : [...plotEntries(), ...traceEntries(traces, hidden, toggle)]),
+      ...(view ? blockEntry(view) : []),
+      null,
+      ...exportEntries(title, traces, () => handle.current?.figure()),
+    ]),
+  )
   return (
-    <figure className={measured ? 'chart measured' : 'chart'} data-view={view}>
+    <figure className={measured ? 'chart measured' : 'chart'} data-view={view} {...menus}>
       <figcaption>
         <b>{title}</b>
         <span className="legend">
@@ -56,19 +69,7 @@ export function Chart({
               />
             ))}
         </span>
-        {values && (
-          <ActionIcon
-            className="all-values"
-            variant="light"
-            color="accent"
-            size="xs"
-            aria-label={`Show all values of ${title}`}
-            title="Show all values"
-            onClick={() => setValues(null)}
-          >
-            <IconArrowsVertical size={13} />
-          </ActionIcon>
-        )}
+        {values && <AllValues title={title} show={() => setValues(null)} />}
         <Exports title={title} traces={traces} figure={() => handle.current?.figure()} />
       </figcaption>
       <div className="with-measures">
@@ -88,6 +89,23 @@ export function Chart({
         {measured && <MeasureTable traces={traces.filter(({ key }) => !hidden.has(key))} />}
       </div>
     </figure>
+  )
+}
+
+/** The button that shows all values after a zoom of the value axis. */
+function AllValues({ title, show }: { title: string; show: () => void }) {
+  return (
+    <ActionIcon
+      className="all-values"
+      variant="light"
+      color="accent"
+      size="xs"
+      aria-label={`Show all values of ${title}`}
+      title="Show all values"
+      onClick={show}
+    >
+      <IconArrowsVertical size={13} />
+    </ActionIcon>
   )
 }
 
@@ -132,7 +150,6 @@ interface ExportsProps {
 }
 
 function Exports({ title, traces, figure }: ExportsProps) {
-  const stride = useRuns((s) => s.runs.at(-1)?.stride ?? 1)
   return (
     <Menu position="bottom-end" shadow="md">
       <Menu.Target>
@@ -141,14 +158,75 @@ function Exports({ title, traces, figure }: ExportsProps) {
         </ActionIcon>
       </Menu.Target>
       <Menu.Dropdown>
-        <Menu.Item onClick={() => saveCsv(title, traces)}>
-          {stride > 1 ? `Extremes of every ${stride} samples as CSV` : 'Samples as CSV'}
-        </Menu.Item>
-        <Menu.Item onClick={() => figure() && void savePng(figure()!)}>Picture as PNG</Menu.Item>
-        <Menu.Item onClick={() => figure() && saveSvg(figure()!)}>Picture as SVG</Menu.Item>
+        {exportEntries(title, traces, figure).map(({ title: words, run }) => (
+          <Menu.Item key={words} onClick={run}>
+            {words}
+          </Menu.Item>
+        ))}
       </Menu.Dropdown>
     </Menu>
   )
+}
+
+/** The ways to save a chart. */
+function exportEntries(title: string, traces: Trace[], figure: ExportsProps['figure']) {
+  const stride = useRuns.getState().runs.at(-1)?.stride ?? 1
+  const drawn = (save: (figure: Figure) => void) => () => {
+    const now = figure()
+    if (now) save(now)
+  }
+  return [
+    {
+      title: stride > 1 ? `Extremes of every ${stride} samples as CSV` : 'Samples as CSV',
+      run: () => saveCsv(title, traces),
+    },
+    { title: 'Picture as PNG', run: drawn((now) => void savePng(now)) },
+    { title: 'Picture as SVG', run: drawn(saveSvg) },
+  ]
+}
+
+/** The commands of all time plots. */
+function plotEntries(): Entries {
+  const { range, cursors, measuring } = useWindow.getState()
+  const { radians } = useUnits.getState()
+  return [
+    {
+      title: 'Show the whole run',
+      possible: range !== null,
+      run: () => useWindow.setState({ range: null }),
+    },
+    { title: 'Measuring cursors', checked: cursors !== null, run: toggleCursors },
+    {
+      title: 'Measures of the visible range',
+      checked: measuring,
+      run: () => useWindow.setState({ measuring: !measuring }),
+    },
+    {
+      title: 'Angles in radians',
+      checked: radians,
+      run: () => useUnits.setState({ radians: !radians }),
+    },
+  ]
+}
+
+/** A submenu with the traces of a plot. */
+function traceEntries(traces: Trace[], hidden: ReadonlySet<string>, toggle: (key: string) => void): Entries {
+  if (traces.length < 2) return []
+  const within = traces.map(({ key, label }) => ({
+    title: label,
+    checked: !hidden.has(key),
+    run: () => toggle(key),
+  }))
+  return [{ title: 'Traces', within }]
+}
+
+/** The entry that shows the block at a path; a notebook has no sheet. */
+function blockEntry(path: string): Entries {
+  if (!useStudio.getState().document) return []
+  const names = path.split('/')
+  return [
+    { title: 'Show the block on the sheet', run: () => void showBlock(names.slice(0, -1), names.at(-1)!) },
+  ]
 }
 
 /** The names of entries without the name of their common signal. */

@@ -20,7 +20,7 @@ interface Props extends SeenValues {
   band?: number
 }
 
-/** Traces over time. All time plots share zoom, measuring cursors and the displayed instant. */
+/** Traces over time. All time plots share zoom, measuring cursors and the displayed time. */
 export function Plot({ traces, hidden, title, handle, band, values, onValues }: Props) {
   const box = useRef<HTMLDivElement>(null)
   const held = useRef({ values, onValues })

@@ -16,7 +16,7 @@ export function gripOf(plot: uPlot, event: MouseEvent): 0 | 1 | null {
   return far[nearest]! <= GRIP_PX ? nearest : null
 }
 
-/** The wheel zooms, Shift or the middle button pans, a click selects an instant, cursors are dragged. */
+/** The wheel zooms, Shift or the middle button pans, a click selects a time, cursors are dragged. */
 export function listen(plot: uPlot): () => void {
   const { over } = plot
   const timeOf = (event: MouseEvent) => plot.posToVal(event.clientX - over.getBoundingClientRect().left, 'x')
@@ -27,6 +27,7 @@ export function listen(plot: uPlot): () => void {
     else zoomBy(event.deltaY > 0 ? 1.25 : 0.8, timeOf(event))
   }
   const down = (event: PointerEvent) => {
+    if (event.button === 2) return
     const grip = gripOf(plot, event)
     const panning = event.button === 1 || event.shiftKey
     const from = event.clientX

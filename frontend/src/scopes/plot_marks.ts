@@ -19,7 +19,7 @@ export function drawBand(plot: uPlot, tolerance: number): void {
 }
 
 /**
- * Vertical lines: the displayed instant, the measuring cursors, and the instants of parameter changes.
+ * Vertical lines: the displayed time, the measuring cursors, and the times of parameter changes.
  */
 export function drawLines(plot: uPlot): void {
   const { ctx, bbox } = plot

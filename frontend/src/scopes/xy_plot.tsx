@@ -12,7 +12,7 @@ import type { Trace } from '../model/trace'
 
 const MOST_POINTS = 20_000
 
-/** The second trace over the first, with a mark at the displayed instant. */
+/** The second trace over the first, with a mark at the displayed time. */
 function figureOf([across, up]: Trace[], title: string, width: number, height: number): Figure {
   const x = across?.read()?.values ?? new Float64Array(0)
   const y = up?.read()?.values ?? new Float64Array(0)

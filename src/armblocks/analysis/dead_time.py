@@ -79,7 +79,7 @@ def dead_time(
     their inputs."""
     system = evaluated.system
     assert system.delays is not None
-    places = np.array([*system.delays.values, *system.delays.slopes], dtype=np.intp)
+    places = np.array([*system.delays.values, *system.delays.derivatives], dtype=np.intp)
     names = [name for slot in system.discrete for name in slot.elements]
     delays = np.tile(evaluated.delay_times(point), 2)
     read = np.any([reader.z[:, places].any(axis=0) for reader in readers], axis=0)

@@ -151,7 +151,9 @@ class _Search:
         self.whole = EvaluatedSystem(system)
         self.sampled = self.evaluated.sampled
         delays = system.delays
-        self.delayed: Places = np.array([*delays.values, *delays.slopes] if delays else [], dtype=np.intp)
+        self.delayed: Places = np.array(
+            [*delays.values, *delays.derivatives] if delays else [], dtype=np.intp
+        )
         self.ticked: Places = np.flatnonzero(self.sampled)
         self.moved: Places = np.concatenate([self.ticked, self.delayed])
         moved: list[int] = self.moved.tolist()

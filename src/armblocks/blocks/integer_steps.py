@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from casadi import SX, ceil, fabs, floor, fmax, fmin, if_else, sign
 
-from armblocks.blocks.switching import JUST, beyond, cell_of
+from armblocks.blocks.switching import THRESHOLD_OFFSET, beyond, cell_of
 from armblocks.diagram import Block, Guard, Shapes, Signals, State
 
 
@@ -76,8 +76,8 @@ class IntegerSteps:
         integer, value = x[self.mode], u[self.signal]
         edge, owned = rounding_edges(self.function, integer)
         below, below_owned = rounding_edges(self.function, -integer, mirrored=True)
-        up = value - edge + if_else(owned, JUST, -JUST)
-        down = value + below - if_else(below_owned, JUST, -JUST)
+        up = value - edge + if_else(owned, THRESHOLD_OFFSET, -THRESHOLD_OFFSET)
+        down = value + below - if_else(below_owned, THRESHOLD_OFFSET, -THRESHOLD_OFFSET)
         if self.count is not None:
             up = if_else(integer >= self.count - 1.0, -1.0, up)
             down = if_else(integer <= 0.0, 1.0, down)

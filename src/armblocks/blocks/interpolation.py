@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 from casadi import SX, fmax, fmin, if_else, logic_and, logic_not
 
-from armblocks.blocks.splines import spline_slopes
+from armblocks.blocks.splines import spline_derivatives
 from armblocks.equations import Shape, flatten
 
 METHODS = ("linear", "nearest", "flat", "cubic")
@@ -56,9 +56,9 @@ def weights(
     fixed = [float(point) for point in points]  # splines need constant break points
     weighted = _cubic_weights(inside, fixed)
     if extrapolation == "linear":
-        slopes = spline_slopes(fixed, np.eye(len(fixed)))
+        derivatives = spline_derivatives(fixed, np.eye(len(fixed)))
         for k in range(len(points)):
-            rate = if_else(u < points[0], float(slopes[0, k]), float(slopes[-1, k]))
+            rate = if_else(u < points[0], float(derivatives[0, k]), float(derivatives[-1, k]))
             weighted[k] = weighted[k] + rate * (u - inside)
     return weighted
 
@@ -113,17 +113,17 @@ def contract(table: SX, shape: Shape, weights_by_axis: Sequence[Sequence[SX]]) -
 def _cubic_weights(u: SX, points: Sequence[float]) -> list[SX]:
     """The cubic Hermite interpolant on each interval, from values and derivatives at its ends."""
     values = [SX(0.0) for _ in points]
-    slopes = [SX(0.0) for _ in points]
+    derivatives = [SX(0.0) for _ in points]
     for k, inside in enumerate(cells(u, points[1:-1])):
         h = points[k + 1] - points[k]
         s = (u - points[k]) / h
         r = 1.0 - s
         values[k] = values[k] + if_else(inside, r * r * (1.0 + 2.0 * s), 0.0)
         values[k + 1] = values[k + 1] + if_else(inside, s * s * (1.0 + 2.0 * r), 0.0)
-        slopes[k] = slopes[k] + if_else(inside, h * s * r * r, 0.0)
-        slopes[k + 1] = slopes[k + 1] - if_else(inside, h * s * s * r, 0.0)
-    matrix = spline_slopes(points, np.eye(len(points)))
+        derivatives[k] = derivatives[k] + if_else(inside, h * s * r * r, 0.0)
+        derivatives[k + 1] = derivatives[k + 1] - if_else(inside, h * s * s * r, 0.0)
+    matrix = spline_derivatives(points, np.eye(len(points)))
     return [
-        values[k] + sum((slopes[i] * float(matrix[i, k]) for i in range(len(points))), SX(0.0))
+        values[k] + sum((derivatives[i] * float(matrix[i, k]) for i in range(len(points))), SX(0.0))
         for k in range(len(points))
     ]

@@ -38,7 +38,8 @@ _FILTER_TYPES = ("low_pass", "high_pass", "band_pass", "band_stop")
 class LinearBlock(Block):
     """A linear system: the state's derivative or next value is A x + B u, the output C x + D u.
 
-    D is not tunable: where D is zero the output has no feedthrough, and the block may close a loop.
+    D is not tunable: where D is zero the output has no feedthrough, and the block may be part of a feedback
+    loop.
     """
 
     A: ArrayLike = parameter(((0.5,),), dimensions=(2,), doc="the system matrix (n, n)")
@@ -195,7 +196,7 @@ class FilterByBand(Block):
     """
 
     design: str = parameter("butterworth", choices=_FILTER_DESIGNS, doc="the design of the filter")
-    filter_type: str = parameter("low_pass", choices=_FILTER_TYPES, doc="what passes")
+    filter_type: str = parameter("low_pass", choices=_FILTER_TYPES, doc="the frequencies that pass")
     order: int = parameter(2, minimum=1, maximum=20, doc="order of the low-pass prototype")
     edge: float = parameter(1.0, above=0.0, tunable=False, doc="edge frequency; of a band, the lower one")
     upper_edge: float = parameter(2.0, above=0.0, tunable=False, doc="upper edge frequency of a band")

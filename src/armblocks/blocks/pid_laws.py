@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 from casadi import SX, fmax, fmin, if_else, logic_and, logic_or
 
-from armblocks.blocks.switching import JUST, zone, zone_after
+from armblocks.blocks.switching import THRESHOLD_OFFSET, zone, zone_after
 from armblocks.diagram import Guard, Signals, State
 from armblocks.equations import Shape
 
@@ -123,9 +123,9 @@ class ContinuousPid:
             free = self._free(x, e, p)
             found |= {"upper": free - p["upper"], "lower": free - p["lower"]}
         if self.clamps:
-            found["drive"] = self._rate(x, e, p, tracked) - JUST
+            found["drive"] = self._rate(x, e, p, tracked) - THRESHOLD_OFFSET
         if trigger is not None:
-            found["reset"] = trigger - JUST
+            found["reset"] = trigger - THRESHOLD_OFFSET
         return found
 
     def mode_values(self, x: Signals, e: Errors, p: Signals, tracked: SX | None) -> Signals:

@@ -46,7 +46,7 @@ def upper_limit_parameter(doc: str = "upper limit of the output") -> Any:
 
 def limit_output_parameter() -> Any:
     """Whether the output is limited."""
-    return parameter(False, doc="whether the output is held between lower and upper")
+    return parameter(False, doc="whether the output is limited to the range from lower to upper")
 
 
 def form_parameter() -> Any:
@@ -96,7 +96,7 @@ def pid_example(kind: str, **parameters: Any) -> WorkedExample:
         else {"u": made("Sum", signs="+-").by(u1=step, u2=plant.by(u="y"))}
     )
     return WorkedExample(
-        shows="The plant follows a step of the reference; the controller acts most at the step.",
+        shows="The plant follows a step of the reference; the control action is largest at the step.",
         parameters=parameters,
         inputs=feeds,
         shown=(step, "plant/y", "y"),

@@ -23,15 +23,15 @@ from armblocks.equations import read_entry
 Array = NDArray[np.float64]
 
 
-def spline_slopes(points: Sequence[float], values: Array) -> Array:
+def spline_derivatives(points: Sequence[float], values: Array) -> Array:
     """The derivatives at n >= 2 points, from values ``(n, …)``; same shape."""
     x, y = np.asarray(points, dtype=np.float64), np.asarray(values, dtype=np.float64)
     h = np.diff(x)
-    chords = np.diff(y, axis=0) / h.reshape(-1, *[1] * (y.ndim - 1))
+    quotients = np.diff(y, axis=0) / h.reshape(-1, *[1] * (y.ndim - 1))
     if len(x) == 2:
-        return np.concatenate([chords, chords])
+        return np.concatenate([quotients, quotients])
     lower, diagonal, upper = _diagonals(h)
-    found = _right_side(h, chords)
+    found = _right_side(h, quotients)
     for k in range(1, len(x)):
         factor = lower[k - 1] / diagonal[k - 1]
         diagonal[k] -= factor * upper[k - 1]
@@ -43,20 +43,21 @@ def spline_slopes(points: Sequence[float], values: Array) -> Array:
 
 
 @lru_cache(maxsize=16)
-def with_slopes(axes: tuple[tuple[float, ...], ...], table: object) -> Array:
+def with_derivatives(axes: tuple[tuple[float, ...], ...], table: object) -> Array:
     """The table of a long spline: values and derivatives alternate along each of the given axes."""
     found = np.asarray(table, dtype=np.float64)
     for k, points in enumerate(axes):
         values = np.moveaxis(found, k, 0)
-        pairs = np.stack([values, spline_slopes(points, values)], axis=1)
+        pairs = np.stack([values, spline_derivatives(points, values)], axis=1)
         found = np.moveaxis(pairs.reshape(2 * len(points), *values.shape[1:]), 0, k)
     return np.ascontiguousarray(found)
 
 
 def spline_corners(u: SX, points: SX, cell: SX | None, *, straight: bool) -> list[tuple[SX, SX]]:
-    """Indices and weights of the entries of :func:`with_slopes` at position u: the cubic Hermite interpolant.
+    """Indices and weights of the entries of :func:`with_derivatives` at position u: the cubic Hermite
+    interpolant.
 
-    ``cell``: 0 below the first point, 2 from the last on; beyond them the curve is held, or extrapolated
+    ``cell``: 0 below the first point, 2 from the last on; outside the curve is constant, or extrapolated
     linearly (``straight``).
     """
     n = points.numel()
@@ -97,16 +98,16 @@ def _diagonals(h: Array) -> tuple[Array, Array, Array]:
     return lower, diagonal, upper
 
 
-def _right_side(h: Array, chords: Array) -> Array:
-    """The right side ``(n, …)`` of that system, from the slopes of the chords ``(n - 1, …)``."""
+def _right_side(h: Array, quotients: Array) -> Array:
+    """The right side ``(n, …)`` of that system, from the difference quotients ``(n - 1, …)``."""
     n = len(h) + 1
-    found = np.empty((n, *chords.shape[1:]))
-    before, after = (part.reshape(-1, *[1] * (chords.ndim - 1)) for part in (h[:-1], h[1:]))
-    found[1:-1] = 3.0 * (after * chords[:-1] + before * chords[1:])
+    found = np.empty((n, *quotients.shape[1:]))
+    before, after = (part.reshape(-1, *[1] * (quotients.ndim - 1)) for part in (h[:-1], h[1:]))
+    found[1:-1] = 3.0 * (after * quotients[:-1] + before * quotients[1:])
     if n == 3:
-        found[0], found[2] = 2.0 * chords[0], 2.0 * chords[1]
+        found[0], found[2] = 2.0 * quotients[0], 2.0 * quotients[1]
         return found
     first, last = h[0] + h[1], h[-1] + h[-2]
-    found[0] = ((h[0] + 2.0 * first) * h[1] * chords[0] + h[0] * h[0] * chords[1]) / first
-    found[-1] = ((h[-1] + 2.0 * last) * h[-2] * chords[-1] + h[-1] * h[-1] * chords[-2]) / last
+    found[0] = ((h[0] + 2.0 * first) * h[1] * quotients[0] + h[0] * h[0] * quotients[1]) / first
+    found[-1] = ((h[-1] + 2.0 * last) * h[-2] * quotients[-1] + h[-1] * h[-1] * quotients[-2]) / last
     return found

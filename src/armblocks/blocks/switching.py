@@ -18,7 +18,7 @@ from armblocks.diagram import (
 )
 from armblocks.errors import InputError
 
-JUST = 1e-300
+THRESHOLD_OFFSET = 1e-300
 """An offset below the resolution of any signal, which assigns the threshold itself to one side."""
 
 
@@ -36,7 +36,7 @@ def since(t: SX, instant: SX) -> SX:
     A computed time, such as 5 times 0.2 s, may differ by rounding from a recorded time or a tick at the same
     time. The guard is therefore already positive two units in the last place earlier.
     """
-    return t * _HALF_LATER - instant + JUST
+    return t * _HALF_LATER - instant + THRESHOLD_OFFSET
 
 
 def same_instant(t: SX, instant: SX) -> SX:

@@ -20,8 +20,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from armblocks.blocks.interpolation import borders, contract, weights
 from armblocks.blocks.long_tables import inputs_with, is_spline
-from armblocks.blocks.splines import spline_corners, with_slopes
-from armblocks.blocks.switching import JUST, beyond, cell_of
+from armblocks.blocks.splines import spline_corners, with_derivatives
+from armblocks.blocks.switching import THRESHOLD_OFFSET, beyond, cell_of
 from armblocks.diagram import Block, Guard, Parameter, Shapes, Signals, State, shape_of
 from armblocks.equations import Shape, flatten, last_at_or_below, read_entry
 from armblocks.errors import InputError
@@ -29,7 +29,7 @@ from armblocks.errors import InputError
 Array = NDArray[np.float64]
 
 
-def rising(where: str, name: str, points: ArrayLike, count: int) -> list[float]:
+def ascending_positions(where: str, name: str, points: ArrayLike, count: int) -> list[float]:
     """Break points as floats; raises ``InputError`` unless they are ascending and fit the table."""
     values = [float(value) for value in np.ravel(cast("Any", points))]
     if len(values) < 2 or any(right <= left for left, right in pairwise(values)):
@@ -54,7 +54,7 @@ def numbers_of(block: Block, name: str) -> list[float]:
     return [float(value) for value in np.ravel(cast("Any", block.parameter_value(name)))]
 
 
-def by_element(inputs: Sequence[SX], function: Callable[..., SX]) -> SX:
+def elementwise(inputs: Sequence[SX], function: Callable[..., SX]) -> SX:
     """A function of scalars applied to all elements; scalars are broadcast."""
     largest = max(inputs, key=lambda value: value.numel())
     size = largest.numel()
@@ -71,14 +71,14 @@ class Axis(Protocol):
         ...
 
     def cell(self, u: SX) -> SX:
-        """The number of borders at or below u."""
+        """The number of cell boundaries at or below u."""
         ...
 
-    def to_next(self, u: SX, cell: SX) -> SX:
+    def above_upper_boundary(self, u: SX, cell: SX) -> SX:
         """The distance of u beyond the upper border of its cell; -inf without an upper border."""
         ...
 
-    def to_last(self, u: SX, cell: SX) -> SX:
+    def above_lower_boundary(self, u: SX, cell: SX) -> SX:
         """The distance of u beyond the lower border of its cell; inf without a lower border."""
         ...
 
@@ -107,10 +107,10 @@ class ShortAxis:
         """The weight of every point."""
         return weights(u, self.points, self.method, self.extrapolation, cell)
 
-    def to_next(self, u: SX, cell: SX) -> SX:
+    def above_upper_boundary(self, u: SX, cell: SX) -> SX:
         return _beyond([*self.borders, math.inf], u, cell)
 
-    def to_last(self, u: SX, cell: SX) -> SX:
+    def above_lower_boundary(self, u: SX, cell: SX) -> SX:
         return _beyond([-math.inf, *self.borders], u, cell)
 
 
@@ -127,26 +127,26 @@ class LongAxis:
         return True
 
     @property
-    def _held(self) -> bool:
+    def _constant_outside(self) -> bool:
         return self.method == "linear" and self.extrapolation == "clip"
 
     @property
     def _count(self) -> int:
         """The number of borders."""
         n = self.points.numel()
-        return n if self._held else n - 2 if self.method == "linear" else n - 1
+        return n if self._constant_outside else n - 2 if self.method == "linear" else n - 1
 
     def cell(self, u: SX) -> SX:
         last = last_at_or_below(self.points, u)
         if self.method == "nearest":
             here = fmin(fmax(last, 0.0), self._count - 1.0)
             return if_else(last >= self._count, float(self._count), here + (u >= self._border(here)))
-        return fmin(fmax(last + (1.0 if self._held else 0.0), 0.0), float(self._count))
+        return fmin(fmax(last + (1.0 if self._constant_outside else 0.0), 0.0), float(self._count))
 
-    def to_next(self, u: SX, cell: SX) -> SX:
+    def above_upper_boundary(self, u: SX, cell: SX) -> SX:
         return if_else(cell < float(self._count), u - self._border(cell), -math.inf)
 
-    def to_last(self, u: SX, cell: SX) -> SX:
+    def above_lower_boundary(self, u: SX, cell: SX) -> SX:
         return if_else(cell > 0.0, u - self._border(cell - 1.0), math.inf)
 
     def corners(self, u: SX, cell: SX) -> list[tuple[SX, SX]]:
@@ -154,9 +154,9 @@ class LongAxis:
         if self.method != "linear":
             return [(cell, SX(1.0))]
         n = self.points.numel()
-        interval = fmin(fmax(cell, 1.0), n - 1.0) - 1.0 if self._held else cell
+        interval = fmin(fmax(cell, 1.0), n - 1.0) - 1.0 if self._constant_outside else cell
         begin, end = read_entry(self.points, interval), read_entry(self.points, interval + 1.0)
-        if self._held:
+        if self._constant_outside:
             u = if_else(cell == 0.0, self.points[0], if_else(cell == float(n), self.points[n - 1], u))
         share = (u - begin) / (end - begin)
         return [(interval, 1.0 - share), (interval + 1.0, share)]
@@ -166,7 +166,7 @@ class LongAxis:
         k = fmin(fmax(number, 0.0), self._count - 1.0)
         if self.method == "nearest":
             return (read_entry(self.points, k) + read_entry(self.points, k + 1.0)) / 2.0
-        return read_entry(self.points, k if self._held else k + 1.0)
+        return read_entry(self.points, k if self._constant_outside else k + 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,10 +183,10 @@ class SplineAxis:
     def cell(self, u: SX) -> SX:
         return (u >= self._ends[0]) + (u >= self._ends[1])
 
-    def to_next(self, u: SX, cell: SX) -> SX:
+    def above_upper_boundary(self, u: SX, cell: SX) -> SX:
         return _beyond([*self._ends, math.inf], u, cell)
 
-    def to_last(self, u: SX, cell: SX) -> SX:
+    def above_lower_boundary(self, u: SX, cell: SX) -> SX:
         return _beyond([-math.inf, *self._ends], u, cell)
 
     def corners(self, u: SX, cell: SX) -> list[tuple[SX, SX]]:
@@ -214,62 +214,66 @@ class Axes:
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
         """The cells."""
-        doc = "number of borders at or below"
-        return tuple(State(f"cell{k}", inputs[port], f"{doc} {port}") for port, k, _ in self._moving())
+        doc = "number of cell boundaries at or below"
+        return tuple(
+            State(f"cell{k}", inputs[port], f"{doc} {port}") for port, k, _ in self._axes_with_modes()
+        )
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         """The guards at both ends of each cell."""
         return tuple(
             guard
-            for port, k, _ in self._moving()
+            for port, k, _ in self._axes_with_modes()
             for guard in (
-                Guard(f"up{k}", inputs[port], f"{port} reaches the next border", 1),
-                Guard(f"down{k}", inputs[port], f"{port} falls below the border", -1),
+                Guard(f"up{k}", inputs[port], f"{port} reaches the next cell boundary", 1),
+                Guard(f"down{k}", inputs[port], f"{port} falls below the lower cell boundary", -1),
             )
         )
 
     def guard_values(self, x: Signals, u: Signals) -> Signals:
         """The distances of the inputs beyond both ends of their cells."""
         found = dict[str, SX]()
-        for port, k, axis in self._moving():
+        for port, k, axis in self._axes_with_modes():
             place = [u[port], x[f"cell{k}"]]
-            found[f"up{k}"] = by_element(place, axis.to_next) + JUST
-            found[f"down{k}"] = by_element(place, axis.to_last) + JUST
+            found[f"up{k}"] = elementwise(place, axis.above_upper_boundary) + THRESHOLD_OFFSET
+            found[f"down{k}"] = elementwise(place, axis.above_lower_boundary) + THRESHOLD_OFFSET
         return found
 
     def mode_values(self, x: Signals, u: Signals) -> Signals:
         """The cells that follow from the present values."""
         guards = self.guard_values(x, u)
         return {
-            f"cell{k}": cell_of(by_element([u[port]], axis.cell), x[f"cell{k}"], guards, f"up{k}", f"down{k}")
-            for port, k, axis in self._moving()
+            f"cell{k}": cell_of(
+                elementwise([u[port]], axis.cell), x[f"cell{k}"], guards, f"up{k}", f"down{k}"
+            )
+            for port, k, axis in self._axes_with_modes()
         }
 
     def contradictions(self, x: Signals, u: Signals) -> Signals:
         """Whether a position is outside its cell."""
         guards = self.guard_values(x, u)
-        return {f"cell{k}": beyond(guards, f"up{k}", f"down{k}") for _, k, _ in self._moving()}
+        return {f"cell{k}": beyond(guards, f"up{k}", f"down{k}") for _, k, _ in self._axes_with_modes()}
 
     def cell(self, port: str, x: Signals, u: Signals) -> SX:
         """The cell along one axis: the mode, or computed from the present values."""
-        modes = {moving: x[f"cell{k}"] for moving, k, _ in self._moving()}
-        return modes[port] if port in modes else by_element([u[port]], self.axes[port].cell)
+        modes = {moving: x[f"cell{k}"] for moving, k, _ in self._axes_with_modes()}
+        return modes[port] if port in modes else elementwise([u[port]], self.axes[port].cell)
 
     def resets(self, x: Signals, u: Signals, e: Signals) -> Signals:
         """The cells after events: the next cell, or the cell to which u has jumped."""
         found = dict[str, SX]()
-        for port, k, axis in self._moving():
-            here, cell = by_element([u[port]], axis.cell), x[f"cell{k}"]
+        for port, k, axis in self._axes_with_modes():
+            here, cell = elementwise([u[port]], axis.cell), x[f"cell{k}"]
             down = if_else(e[f"down{k}"] < 0.0, fmin(here, cell - 1.0), cell)
             found[f"cell{k}"] = if_else(e[f"up{k}"] > 0.0, fmax(here, cell + 1.0), down)
         return found
 
     def value(self, table: SX, shape: Shape, x: Signals, u: Signals) -> SX:
         """The output of a table of this shape, element by element."""
-        cells = {port: x[f"cell{k}"] for port, k, _ in self._moving()}
+        cells = {port: x[f"cell{k}"] for port, k, _ in self._axes_with_modes()}
         for port, axis in self.axes.items():
             if not isinstance(axis, ShortAxis) and port not in cells:
-                cells[port] = by_element([u[port]], axis.cell)
+                cells[port] = elementwise([u[port]], axis.cell)
         entries = flatten(table, shape)
 
         def at(*places: SX) -> SX:
@@ -283,9 +287,9 @@ class Axes:
                     weights_by_axis.append(axis.weights(positions[port], known.get(port)))
             return read(entries, shape, corners) if corners else contract(table, shape, weights_by_axis)
 
-        return by_element([*(u[port] for port in self.axes), *cells.values()], at)
+        return elementwise([*(u[port] for port in self.axes), *cells.values()], at)
 
-    def _moving(self) -> list[tuple[str, str, Axis]]:
+    def _axes_with_modes(self) -> list[tuple[str, str, Axis]]:
         """Port, name suffix and axis, for axes whose cells are modes."""
         many = len(self.axes) > 1
         numbered = (
@@ -314,7 +318,7 @@ def read(entries: SX, shape: Shape, corners: Sequence[Sequence[tuple[SX, SX]]]) 
 
 @dataclass(frozen=True, kw_only=True)
 class BlockWithAxes(Block):
-    """A block that looks up its inputs along axes. Borders are its events, cells are its modes."""
+    """A block with a lookup table. The cells are its modes, and a change of the cell is an event."""
 
     memoryless: ClassVar[bool] = True
 
@@ -345,24 +349,24 @@ class BlockWithAxes(Block):
     @property
     def knots(self) -> Array:
         """The positions of a long cubic spline, axis after axis."""
-        return np.concatenate([np.asarray(points) for points in self._along().values()])
+        return np.concatenate([np.asarray(points) for points in self._positions_by_input().values()])
 
     @property
     def spline(self) -> Array:
-        """The values and derivatives of a long cubic spline, see :func:`.splines.with_slopes`."""
-        axes = tuple(tuple(points) for points in self._along().values())
-        return with_slopes(axes, self.parameter_value("table"))
+        """The values and derivatives of a long cubic spline, see :func:`.splines.with_derivatives`."""
+        axes = tuple(tuple(points) for points in self._positions_by_input().values())
+        return with_derivatives(axes, self.parameter_value("table"))
 
     @classmethod
     def _positions(cls) -> tuple[str, ...]:
         """The parameters that contain positions."""
         return tuple(rule.name for rule in cls.parameters() if rule.name.startswith("positions"))
 
-    def _along(self) -> Mapping[str, list[float]]:
+    def _positions_by_input(self) -> Mapping[str, list[float]]:
         """The positions along the axis of each input."""
         raise NotImplementedError
 
-    def _read_along(self, p: Signals) -> Mapping[str, SX]:
+    def _run_positions(self, p: Signals) -> Mapping[str, SX]:
         """The positions as run inputs."""
         raise NotImplementedError
 
@@ -380,11 +384,11 @@ class BlockWithAxes(Block):
         found = dict[str, Axis]()
         if p and is_spline(self, self._is_long()):
             first = 0
-            for port, points in self._along().items():
+            for port, points in self._positions_by_input().items():
                 found[port] = SplineAxis(p["knots"][first : first + len(points)], extrapolation)
                 first += len(points)
         else:
-            along = self._read_along(p) if p and self._is_long() else self._along()
+            along = self._run_positions(p) if p and self._is_long() else self._positions_by_input()
             found = {port: axis(points, self._method, extrapolation) for port, points in along.items()}
         return Axes(found, bool(self.parameter_value("zero_crossing")))
 

@@ -65,14 +65,23 @@ def print_difference(found: DiagramDifference, before: str, after: str, console:
     removed = [f"{entry.path}: {_block_text(entry.block)}" for entry in found.removed]
     renamed = [f"{entry.before} -> {entry.after} ({entry.block.type_name()})" for entry in found.renamed]
     types = [f"{entry.path}: {entry.before} -> {entry.after}" for entry in found.types]
-    settings, about, parameters, masks = (
+    settings, about, parameters, masks, comments, signals = (
         [_change_text(entry, "." if entry.path else "") for entry in entries]
-        for entries in (found.settings, found.descriptions, found.parameters, found.masks)
+        for entries in (
+            found.settings,
+            found.descriptions,
+            found.parameters,
+            found.masks,
+            found.comments,
+            found.signal_names,
+        )
     )
     notes = [_change_text(entry, "") for entry in found.notes]
     _print_group("Blocks", (("-", removed), ("+", added), ("~", [*renamed, *types])), console)
     _print_group("Parameters", (("~", parameters),), console)
     _print_group("Masks", (("~", masks),), console)
+    _print_group("Comments", (("~", comments),), console)
+    _print_group("Signal names", (("~", signals),), console)
     wires = (("-", _wires(found.wires_removed)), ("+", _wires(found.wires_added)))
     _print_group("Wires", wires, console)
     logged = (("-", _ports(found.logged_removed)), ("+", _ports(found.logged_added)))
@@ -216,6 +225,8 @@ def difference_document(found: DiagramDifference) -> dict[str, object]:
         "types": [_change(entry) for entry in found.types],
         "parameters": [_change(entry) for entry in found.parameters],
         "masks": [_change(entry) for entry in found.masks],
+        "comments": [_change(entry) for entry in found.comments],
+        "signal_names": [_change(entry) for entry in found.signal_names],
         "wires_added": [{"path": entry.path, "wire": str(entry.wire)} for entry in found.wires_added],
         "wires_removed": [{"path": entry.path, "wire": str(entry.wire)} for entry in found.wires_removed],
         "logged_added": [{"path": entry.path, "port": str(entry.port)} for entry in found.logged_added],

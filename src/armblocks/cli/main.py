@@ -75,8 +75,8 @@ app.command("bench")(bench.bench)
 app.command("studio")(studio.studio)
 
 
-def _say_version(asked: bool) -> None:
-    if asked:
+def _say_version(requested: bool) -> None:
+    if requested:
         from importlib.metadata import version
 
         typer.echo(f"armblocks {version('armblocks')}")

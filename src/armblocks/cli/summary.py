@@ -35,7 +35,7 @@ def print_run(result: SimulationResult, console: Console) -> None:
     text = Text.assemble(
         (f"{result.name}: ", STRONG),
         f"{end} in {' '.join(wall_time(run.wall_time))}, {factor_text(run.real_time_factor)} x real time; ",
-        f"{how} {result.time.size:,} instants",
+        f"{how} {result.time.size:,} samples",
     )
     console.print(text)
     if not run.complete:
@@ -74,15 +74,15 @@ def print_motions(diagram: Diagram, result: SimulationResult, console: Console) 
         whole = shown_summary(
             summarise(motion.robot, motion.time, motion.q, motion.qd, motion.qdd, motion.tau, motion.tool)
         )
-        broken = {(finding.joint, finding.kind) for finding in whole.findings}
+        exceeded = {(finding.joint, finding.kind) for finding in whole.findings}
         console.print()
         console.print(Text(motion.robot.name, STRONG))
-        console.print(_joint_table(whole.joints, broken))
+        console.print(_joint_table(whole.joints, exceeded))
         for finding in whole.findings:
             console.print(Text.assemble((f"{BEYOND} ", ERROR), finding.text))
 
 
-def _joint_table(joints: Sequence[JointSummary], broken: set[tuple[str, LimitKind]]) -> Table:
+def _joint_table(joints: Sequence[JointSummary], exceeded: set[tuple[str, LimitKind]]) -> Table:
     units = {joint.unit for joint in joints}
     mixed = len(units) != 1
     limited = any(joint.torque_limit is not None for joint in joints)
@@ -105,21 +105,21 @@ def _joint_table(joints: Sequence[JointSummary], broken: set[tuple[str, LimitKin
         rows.add_row(
             joint.name,
             *((angle,) if mixed else ()),
-            _judged(
+            _limit_cell(
                 _span(joint.position_min * position, joint.position_max * position),
-                (joint.name, LimitKind.POSITION) in broken,
+                (joint.name, LimitKind.POSITION) in exceeded,
             ),
             "" if ends is None else _span(ends[0] * position, ends[1] * position),
-            _judged(_short(joint.speed_peak * speed), (joint.name, LimitKind.SPEED) in broken),
+            _limit_cell(_short(joint.speed_peak * speed), (joint.name, LimitKind.SPEED) in exceeded),
             _short(None if joint.speed_limit is None else joint.speed_limit * speed),
-            _judged(_short(joint.torque_peak), (joint.name, LimitKind.TORQUE) in broken),
+            _limit_cell(_short(joint.torque_peak), (joint.name, LimitKind.TORQUE) in exceeded),
             _short(joint.torque_rms),
             *((_short(joint.torque_limit),) if limited else ()),
         )
     return rows
 
 
-def _judged(text: str, beyond: bool) -> Text:
+def _limit_cell(text: str, beyond: bool) -> Text:
     """A cell; a value beyond a limit has a mark and a colour."""
     return Text(f"{BEYOND} {text}", ERROR) if beyond else Text(text)
 
@@ -139,7 +139,7 @@ def print_files(files: ReportFiles, console: Console) -> None:
         names.append(f"{len(files.figures)} figures in {files.figures[0].parent.name}")
     console.print()
     console.print(Text.assemble(("report: ", STRONG), str(files.page)), soft_wrap=True)
-    console.print(f"beside it: {', '.join(names)}", soft_wrap=True)
+    console.print(f"in the same folder: {', '.join(names)}", soft_wrap=True)
     absent = [
         (kind, extra)
         for kind, library, extra in (("PNG figures", "matplotlib", "figures"), ("Parquet", "pyarrow", "data"))

@@ -56,12 +56,12 @@ def allowed_effort() -> Effort:
 
     Raises ``InputError`` for another word.
     """
-    asked = os.environ.get("ARMBLOCKS_EFFORT") or Effort.FULL.name.lower()
+    requested = os.environ.get("ARMBLOCKS_EFFORT") or Effort.FULL.name.lower()
     for effort in Effort:
-        if effort.name.lower() == asked:
+        if effort.name.lower() == requested:
             return effort
     raise InputError(
-        f"'{asked}' is not a valid effort",
+        f"'{requested}' is not a valid effort",
         where="the environment variable ARMBLOCKS_EFFORT",
         allowed=", ".join(f"'{effort.name.lower()}'" for effort in Effort),
         fix="set one of these, or remove the variable for fast code",

@@ -5,6 +5,7 @@ from armblocks.diagram.block_equations import BlockEquations, block_equations
 from armblocks.diagram.builder import BlockHandle, DiagramBuilder
 from armblocks.diagram.bus import Bus, Carried
 from armblocks.diagram.check import check_diagram
+from armblocks.diagram.comments import Comment, check_comment, commented_paths, is_inside, open_inputs
 from armblocks.diagram.conditional import (
     ActionSubsystem,
     EnabledSubsystem,
@@ -56,7 +57,7 @@ from armblocks.diagram.time_table import TimeTable
 from armblocks.diagram.trace import trace_diagram
 from armblocks.diagram.units import infer_units, integral_unit, rate_unit
 from armblocks.diagram.user_function import UserFunction
-from armblocks.diagram.variation import with_parameters
+from armblocks.diagram.variation import with_comments, with_parameters
 from armblocks.diagram.virtual_wiring import BusAssignment, BusCreator, BusSelector, From, Goto
 from armblocks.diagram.worked_example import Fed, Feed, WorkedExample, made
 
@@ -73,6 +74,7 @@ __all__ = [
     "BusCreator",
     "BusSelector",
     "Carried",
+    "Comment",
     "Condition",
     "Connection",
     "DelayLine",
@@ -119,7 +121,9 @@ __all__ = [
     "broadcast",
     "check_block_count",
     "check_block_name",
+    "check_comment",
     "check_diagram",
+    "commented_paths",
     "content_key",
     "diagram_difference",
     "diagram_views",
@@ -129,14 +133,17 @@ __all__ = [
     "infer_shapes",
     "infer_units",
     "integral_unit",
+    "is_inside",
     "levels_of",
     "made",
     "mask_parameter",
+    "open_inputs",
     "parameter",
     "rate_unit",
     "sample_time_parameter",
     "sampling_of",
     "shape_of",
     "trace_diagram",
+    "with_comments",
     "with_parameters",
 ]

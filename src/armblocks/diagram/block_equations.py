@@ -172,7 +172,7 @@ def _trace(structure: _Structure) -> BlockEquations:
         own = conditional(own, structure.hidden, clocked=structure.clocked, ticking=structure.settled)
     # Conditions whose change is an event are modes; the others are evaluated directly.
     located = () if structure.settled else tuple(entry for entry in own.conditions if entry.located)
-    asked = tuple(entry for entry in own.conditions if entry not in located)
+    requested = tuple(entry for entry in own.conditions if entry not in located)
     features = with_modes_of_conditions(with_memory(own, clocked=structure.clocked), located)
     past = tuple(
         State(f"{line.name}{mark}", line.shape, line.doc) for mark in ("", "'") for line in features.delays
@@ -191,7 +191,7 @@ def _trace(structure: _Structure) -> BlockEquations:
     if structure.clocked:
         p["T"] = SX(structure.period)
     at = Arguments(t, {**x, **z}, u, p, e)
-    at = at.with_states(condition_answers(own, asked, at))
+    at = at.with_states(condition_answers(own, requested, at))
     consistent = at.with_states(own.equations[SlotKind.MODE](at)) if structure.settled else at
     found = {
         kind: features.equations[kind](at if kind is SlotKind.MODE else consistent)

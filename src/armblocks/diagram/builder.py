@@ -9,9 +9,10 @@ from typing import Any
 
 from armblocks.diagram.block import Block
 from armblocks.diagram.check import check_diagram
+from armblocks.diagram.comments import Comment, check_comment
 from armblocks.diagram.diagram import Connection, Diagram, Note, Placement, block_in_scope
 from armblocks.diagram.mask import ParameterFormula, checked_mask, formula, mask_parameter, values_of
-from armblocks.diagram.names import check_block_name, folded
+from armblocks.diagram.names import check_block_name, check_signal_names, folded
 from armblocks.diagram.parameter import Parameter, Value
 from armblocks.diagram.port import PortRef
 from armblocks.diagram.structure import (
@@ -97,6 +98,8 @@ class DiagramBuilder:
         self._bends: dict[Connection, tuple[float, ...]] = {}
         self._notes: dict[str, Note] = {}
         self._logged: dict[PortRef, None] = {}
+        self._commented: dict[str, Comment] = {}
+        self._signal_names: dict[PortRef, str] = {}
         self._mask: list[Parameter] = []
         self._mask_values: dict[str, Value] = {}
         self._outer: dict[str, ParameterFormula] = {}
@@ -237,6 +240,40 @@ class DiagramBuilder:
         ref = self._resolve(source, output=True)
         self._logged[ref] = None
 
+    def name_signal(self, source: Source, name: str) -> None:
+        """Name the signal at an output: ``result["name"]``, data files, legends and drawings show the name.
+
+        Raises ``UnknownNameError``, and ``DiagramError`` for a name that another signal or a block has.
+        """
+        ref = self._resolve(source, output=True)
+        check_signal_names(self._blocks, {**self._signal_names, ref: name}, f"diagram '{self.name}'")
+        self._signal_names[ref] = name
+
+    def comment_out(self, block: BlockHandle | str) -> None:
+        """Comment a block out: it takes no part in the model, and its outputs are zeros of the same shapes.
+
+        Raises ``UnknownNameError``, and ``DiagramError`` for In and Out blocks.
+        """
+        self.comment(self._commentable(block, "out"), "out")
+
+    def comment_through(self, block: BlockHandle | str) -> None:
+        """Comment a block through: each output equals the input of the same index, as if it were a wire.
+
+        ``build`` checks that their shapes agree. Raises ``UnknownNameError``, and ``DiagramError`` for blocks
+        with fewer inputs than outputs, for those without outputs, and for In and Out blocks.
+        """
+        self.comment(self._commentable(block, "through"), "through")
+
+    def comment(self, name: str, comment: Comment) -> None:
+        """Comment a block out or through without a check; ``build`` checks it. For readers of files."""
+        self._known(name)
+        self._commented[name] = comment
+
+    def _commentable(self, block: BlockHandle | str, comment: Comment) -> str:
+        name = block if isinstance(block, str) else block.name
+        check_comment(name, self._known(name), comment)
+        return name
+
     def build(self) -> Diagram:
         """The frozen diagram, after all checks of :func:`armblocks.diagram.check.check_diagram`."""
         diagram = self.draft()
@@ -256,6 +293,8 @@ class DiagramBuilder:
             extras=self._extras,
             description=self.description,
             logged=tuple(self._logged),
+            commented=self._commented,
+            signal_names=self._signal_names,
             mask=tuple(self._mask),
             mask_values=self._mask_values,
         )

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from armblocks.diagram.comments import active_levels, check_connected
 from armblocks.diagram.diagram import Diagram
-from armblocks.diagram.levels import check_connected, levels_of
+from armblocks.diagram.levels import levels_of
 from armblocks.diagram.model import diagram_model
 from armblocks.diagram.structure import Inport, Outport, ends
 from armblocks.diagram.virtual_wiring import From, Goto
@@ -29,6 +30,11 @@ def _is_part(diagram: Diagram) -> bool:
         return True
     if not any(block.virtual for block in diagram.blocks.values()):
         return False
-    blocks = [block for level in levels_of(diagram).values() for block in level.blocks.values()]
+    blocks = [
+        block
+        for level in active_levels(levels_of(diagram)).values()
+        for name, block in level.blocks.items()
+        if name not in level.commented
+    ]
     sent = {block.tag for block in blocks if isinstance(block, Goto)}
     return any(isinstance(block, From) and block.tag not in sent for block in blocks)

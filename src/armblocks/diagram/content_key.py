@@ -2,8 +2,8 @@
 
 With it the disk cache finds a diagram that an earlier process compiled, so that it is not traced again. The
 key covers all blocks by class with the exact values of all parameters (tables, robots, inner diagrams and the
-code of Python functions by content), the connections, and the versions of the libraries. The cache adds the
-sources of this package. Layout, descriptions and run settings are not part of the key.
+code of Python functions by content), the connections, comments of blocks, and the versions of the libraries.
+The cache adds the sources of this package. Layout, descriptions and run settings are not part of the key.
 
 A diagram with unknown content (an external block class, a function that imports a user's module) has no key
 and is traced each time.
@@ -90,7 +90,9 @@ class _Content:
             (name, sorted((port, *_port(source)) for port, source in gate.items()))
             for name, gate in sorted(diagram.gates.items())
         ]
-        self.add(("diagram", diagram.name, diagram.blocks, wires, gates))
+        comments = sorted(diagram.commented.items())
+        names = [(*_port(ref), name) for ref, name in diagram.signal_names.items()]
+        self.add(("diagram", diagram.name, diagram.blocks, wires, gates, comments, names))
 
     def _add_object(self, value: object) -> None:
         """Digest an object (block, diagram, robot) once: several blocks may share a robot."""

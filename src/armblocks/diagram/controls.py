@@ -20,7 +20,7 @@ from armblocks.diagram.parameter import ParameterKind, parameter, shape_of
 from armblocks.diagram.port import Guard, Port, State
 from armblocks.diagram.shape_rules import broadcast
 
-JUST = 1e-300
+THRESHOLD_OFFSET = 1e-300
 """An offset below any signal resolution: it assigns zero itself to one side."""
 _STATES = ("held", "reset")
 _ANEW = Port("anew", "whether the enclosing subsystem is reset", "", ())
@@ -97,7 +97,7 @@ class EnableControl(Block):
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         changed = fabs(x["side"] * _outer(u) - x["seen"])
-        return {"side": u["u"] - JUST, "acts": if_else(x["seen"] < 0.0, 0.0, changed) - 0.5}
+        return {"side": u["u"] - THRESHOLD_OFFSET, "acts": if_else(x["seen"] < 0.0, 0.0, changed) - 0.5}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         side = _side(u["u"])
@@ -180,7 +180,7 @@ class TriggerControl(Block):
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         changed = logic_and(x["seen"] >= 0.0, x["side"] != x["seen"])
-        return {"side": u["u"] - JUST, "acts": if_else(changed, 0.5, -0.5)}
+        return {"side": u["u"] - THRESHOLD_OFFSET, "acts": if_else(changed, 0.5, -0.5)}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"side": _side(u["u"])}
@@ -216,7 +216,7 @@ class HeldOutput(Block):
 
     def input_ports(self) -> tuple[Port, ...]:
         return (
-            Port("u", "what leaves"),
+            Port("u", "the signal that leaves"),
             Port("works", "1 while or when the subsystem is active", "", ()),
             *((_ANEW,) * self.anew),
         )

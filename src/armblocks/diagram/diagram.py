@@ -11,6 +11,7 @@ from typing import Any, TypeVar, cast
 
 from armblocks.diagram.block import Block
 from armblocks.diagram.mask import Scope, checked_mask, values_of
+from armblocks.diagram.names import check_signal_names
 from armblocks.diagram.parameter import Parameter, Value
 from armblocks.diagram.port import PortRef
 from armblocks.equations import SimulationOptions
@@ -59,7 +60,7 @@ class Note:
 ROTATIONS = (0, 90, 180, 270)
 """Allowed rotations of a block, degrees."""
 
-_READ_ONLY = ("blocks", "layout", "bends", "notes", "extras", "mask_values")
+_READ_ONLY = ("blocks", "layout", "bends", "notes", "extras", "mask_values", "commented", "signal_names")
 """The fields of a diagram that are read-only mappings."""
 
 Gate = Mapping[str, PortRef]
@@ -112,6 +113,11 @@ class Diagram:
     mask: tuple[Parameter, ...] = ()
     mask_values: Mapping[str, Value] = field(default_factory=dict[str, Value])
     link: str = ""
+    commented: Mapping[str, str] = field(default_factory=dict[str, str])
+    """Blocks that take no part in the model, by name: ``"out"`` or ``"through"``, see
+    :mod:`armblocks.diagram.comments`."""
+    signal_names: Mapping[PortRef, str] = field(default_factory=dict[PortRef, str])
+    """Names of the signals at outputs, see :mod:`armblocks.diagram.signal_names`."""
     shares: Mapping[str, str] = field(default_factory=dict[str, str])
     """For a flat diagram: blocks that share the parameters of the block of the given name."""
     _kept: dict[str, object] = field(init=False, repr=False, compare=False, default_factory=dict[str, object])
@@ -129,6 +135,13 @@ class Diagram:
         if self.bends:  # drop the bends of removed connections
             kept = {wire: self.bends[wire] for wire in self.connections if self.bends.get(wire)}
             object.__setattr__(self, "bends", kept)
+        if self.commented:
+            present = {name: comment for name, comment in self.commented.items() if name in self.blocks}
+            object.__setattr__(self, "commented", present)
+        if self.signal_names:
+            named = {ref: name for ref, name in self.signal_names.items() if ref.block in self.blocks}
+            object.__setattr__(self, "signal_names", named)
+            check_signal_names(self.blocks, named, where)
         for name in _READ_ONLY:
             ordered = dict(sorted(getattr(self, name).items()))
             object.__setattr__(self, name, MappingProxyType(ordered))

@@ -74,8 +74,9 @@ class DiagramDifference:
 
     ``types`` are blocks of another type under the same name; their parameters are listed too, with ``None``
     where one type has no such parameter. A formula is compared as text. ``masks`` are changed mask
-    declarations of the diagram at ``path``. ``logged_*`` are outputs that are recorded without a Scope;
-    ``notes`` are annotations, without their positions.
+    declarations of the diagram at ``path``, ``comments`` changed comments of blocks, ``signal_names`` those
+    of signals. ``logged_*`` are outputs that are recorded without a Scope; ``notes`` are annotations, without
+    their positions.
     """
 
     added: tuple[PlacedBlock, ...] = ()
@@ -84,6 +85,8 @@ class DiagramDifference:
     types: tuple[ValueChange, ...] = ()
     parameters: tuple[ValueChange, ...] = ()
     masks: tuple[ValueChange, ...] = ()
+    comments: tuple[ValueChange, ...] = ()
+    signal_names: tuple[ValueChange, ...] = ()
     wires_added: tuple[PlacedWire, ...] = ()
     wires_removed: tuple[PlacedWire, ...] = ()
     logged_added: tuple[PlacedPort, ...] = ()
@@ -104,11 +107,11 @@ class DiagramDifference:
 def diagram_difference(before: Diagram, after: Diagram) -> DiagramDifference:
     """The changes that lead from ``before`` to ``after``.
 
-    Compared are blocks with their types and parameters, connections, logged outputs, settings, descriptions
-    and the text of annotations, including subsystems. Not compared are the layout, the name of the diagram (a
-    file without one is named after the file) and unknown keys of a file. A removed and an added block count
-    as one renamed block if type, parameters and all connections agree, even if blocks at the other ends are
-    renamed too.
+    Compared are blocks with their types, parameters and comments, connections, logged outputs, settings,
+    descriptions and the text of annotations, including subsystems. Not compared are the layout, the name of
+    the diagram (a file without one is named after the file) and unknown keys of a file. A removed and an
+    added block count as one renamed block if type, parameters and all connections agree, even if blocks at
+    the other ends are renamed too.
     """
     for diagram in (before, after):
         check_type(diagram, Diagram, "a Diagram", where="diagram_difference")
@@ -129,6 +132,8 @@ class _Findings:
     types: list[ValueChange] = field(default_factory=list[ValueChange])
     parameters: list[ValueChange] = field(default_factory=list[ValueChange])
     masks: list[ValueChange] = field(default_factory=list[ValueChange])
+    comments: list[ValueChange] = field(default_factory=list[ValueChange])
+    signal_names: list[ValueChange] = field(default_factory=list[ValueChange])
     wires_added: list[PlacedWire] = field(default_factory=list[PlacedWire])
     wires_removed: list[PlacedWire] = field(default_factory=list[PlacedWire])
     logged_added: list[PlacedPort] = field(default_factory=list[PlacedPort])
@@ -160,6 +165,16 @@ def _compare_levels(before: Diagram, after: Diagram, path: str, found: _Findings
     wires_after = set(after.connections)
     found.wires_added += (PlacedWire(path=path, wire=wire) for wire in sorted(wires_after - wires_before))
     found.wires_removed += (PlacedWire(path=path, wire=wire) for wire in sorted(wires_before - wires_after))
+    old_comments = {names.get(name, name): comment for name, comment in before.commented.items()}
+    for name in {**old_comments, **after.commented}:
+        if name in after.blocks and old_comments.get(name) != after.commented.get(name):
+            change = {"before": old_comments.get(name), "after": after.commented.get(name)}
+            found.comments.append(ValueChange(path=at(name), name="commented", **change))
+    old_names = {_renamed(ref, names): name for ref, name in before.signal_names.items()}
+    for ref in sorted({**old_names, **after.signal_names}):
+        given, now = old_names.get(ref), after.signal_names.get(ref)
+        if given != now:
+            found.signal_names.append(ValueChange(path=at(str(ref)), name="name", before=given, after=now))
     logged_before, logged_after = {_renamed(port, names) for port in before.logged}, set(after.logged)
     found.logged_added += (PlacedPort(path=path, port=port) for port in sorted(logged_after - logged_before))
     found.logged_removed += (
@@ -307,7 +322,9 @@ def _value_content(block: Block, rule: Parameter) -> object:
         return value
     inside = cast("Diagram", value)
     blocks = frozenset((name, _content(inner)) for name, inner in inside.blocks.items())
-    whole = (inside.settings, inside.description, inside.mask, inside.link, inside.logged)
+    comments = tuple(inside.commented.items())
+    signals = tuple(inside.signal_names.items())
+    whole = (inside.settings, inside.description, inside.mask, inside.link, inside.logged, comments, signals)
     return (blocks, inside.connections, *whole)
 
 

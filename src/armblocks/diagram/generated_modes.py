@@ -80,17 +80,17 @@ def with_modes_of_conditions(features: Features, located: Sequence[Condition]) -
     return dataclasses.replace(changed, modes=(*features.modes, *modes), guards=(*features.guards, *added))
 
 
-def condition_answers(features: Features, asked: Sequence[Condition], at: Arguments) -> Signals:
+def condition_answers(features: Features, requested: Sequence[Condition], at: Arguments) -> Signals:
     """The conditions at the present values, each substituted into those after it."""
-    if not asked:
+    if not requested:
         return {}
     unknown = {
         entry.name: unflatten(SX.sym(entry.name, Slot(entry.name, entry.shape).size), entry.shape)
-        for entry in asked
+        for entry in requested
     }
     quantities = features.equations[SlotKind.CONDITION](at.with_states(unknown))
     found: dict[str, SX] = {}
-    for entry in asked:
+    for entry in requested:
         quantity = SX(quantities[entry.name])
         for name, value in found.items():
             quantity = substitute(quantity, unknown[name], value)

@@ -24,21 +24,21 @@ def solve_affine(w: SX, residual: SX) -> tuple[SX, list[int], list[tuple[list[in
     not linear in its unknowns remains.
     """
     solution, remaining = SX(w), list[int]()
-    circles: list[tuple[list[int], SX]] = []
-    slopes = jacobian(residual, w)
+    loops: list[tuple[list[int], SX]] = []
+    derivatives = jacobian(residual, w)
     needs = _needs(residual, w)
-    for circle in strongly_connected(needs):
-        unknowns, slope = w[circle], slopes[circle, circle]
-        if depends_on(slope, unknowns) or steps_with(residual[circle], unknowns):
-            remaining.extend(circle)
+    for loop in strongly_connected(needs):
+        unknowns, derivative = w[loop], derivatives[loop, loop]
+        if depends_on(derivative, unknowns) or steps_with(residual[loop], unknowns):
+            remaining.extend(loop)
             continue
-        circles.append((circle, densify(slope)))
-        constant = substitute(residual[circle], unknowns, SX.zeros(len(circle)))
-        solved = -_divided(densify(constant), slope)
+        loops.append((loop, densify(derivative)))
+        constant = substitute(residual[loop], unknowns, SX.zeros(len(loop)))
+        solved = -_divided(densify(constant), derivative)
         # Earlier solutions are substituted last, into a small expression, so that the work grows linearly.
-        before = sorted({place for row in circle for place in needs[row]} - set(circle))
-        solution[circle] = substituted(solved, w[before], solution[before]) if before else solved
-    return solution, sorted(remaining), circles
+        before = sorted({place for row in loop for place in needs[row]} - set(loop))
+        solution[loop] = substituted(solved, w[before], solution[before]) if before else solved
+    return solution, sorted(remaining), loops
 
 
 def _divided(right: SX, matrix: SX) -> SX:
@@ -106,20 +106,20 @@ def check_solvable(
     ``loops[i]``: the signals around the loop of unknown ``i``. Only equations that depend on parameters alone
     are checked here; those that depend on states or time are checked during the run.
     """
-    slopes = jacobian(residual, w)
+    derivatives = jacobian(residual, w)
     parameters = _symbols_in(p)
-    for circle in strongly_connected(_needs(residual, w)):
-        unknowns, own, slope = w[circle], residual[circle], slopes[circle, circle]
-        if not _symbols_in(slope) <= parameters:
+    for loop in strongly_connected(_needs(residual, w)):
+        unknowns, own, derivative = w[loop], residual[loop], derivatives[loop, loop]
+        if not _symbols_in(derivative) <= parameters:
             continue
-        matrix = _number(slope, p, values)
+        matrix = _number(derivative, p, values)
         scale = np.abs(matrix).max(initial=0.0)
-        if not np.isfinite(scale) or np.linalg.matrix_rank(_equilibrated(matrix)) == len(circle):
+        if not np.isfinite(scale) or np.linalg.matrix_rank(_equilibrated(matrix)) == len(loop):
             continue
         others = _symbols_in(own) - _symbols_in(unknowns)
-        if not slope.nnz() and not others <= parameters:
+        if not derivative.nnz() and not others <= parameters:
             raise AlgebraicLoopError(
-                loops[circle[0]],
+                loops[loop[0]],
                 where=where,
                 why="with an equation that does not contain its unknown (its index is above 1)",
                 allowed="equations that contain their unknown",
@@ -128,12 +128,12 @@ def check_solvable(
             )
         why = "with no solution or infinitely many"
         if others <= parameters:
-            right = _number(substitute(own, unknowns, SX.zeros(len(circle))), p, values).ravel()
+            right = _number(substitute(own, unknowns, SX.zeros(len(loop))), p, values).ravel()
             widened = np.linalg.matrix_rank(np.column_stack([matrix, right]))
             solvable = widened == np.linalg.matrix_rank(matrix)
             why = "with infinitely many solutions" if solvable else "with no solution"
         raise AlgebraicLoopError(
-            loops[circle[0]],
+            loops[loop[0]],
             where=where,
             why=why,
             allowed="loops whose gain is not 1",

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from armblocks.diagram.diagram import Diagram
-from armblocks.diagram.port import PortRef
 from armblocks.diagram.structure import DiagramBlock
 from armblocks.errors import DiagramError
 
 DEEPEST = 100
 """Maximum nesting depth of subsystems."""
-MOST_LISTED = 20
-"""Maximum number of inputs that one message lists."""
 
 
 def joined(level: str, name: str) -> str:
@@ -51,24 +46,3 @@ def levels_of(diagram: Diagram) -> dict[str, Diagram]:
             if isinstance(block, DiagramBlock):
                 pending.append((joined(path, name), block.diagram, depth + 1))
     return levels
-
-
-def check_connected(levels: Mapping[str, Diagram]) -> None:
-    """Raise ``DiagramError`` that lists the inputs that nothing drives, of all diagrams of a hierarchy."""
-    open_inputs = [
-        f"{joined(level, name)}/{port.name}"
-        for level, diagram in levels.items()
-        for name, block in diagram.blocks.items()
-        for port in block.input_ports()
-        if PortRef(name, port.name) not in diagram.drivers
-    ]
-    if open_inputs:
-        shown = ", ".join(open_inputs[:MOST_LISTED])
-        rest = len(open_inputs) - MOST_LISTED
-        raise DiagramError(
-            f"{len(open_inputs)} unconnected input{'s' * (len(open_inputs) > 1)}: {shown}"
-            + (f" and {rest} more" if rest > 0 else ""),
-            where=f"diagram '{next(iter(levels.values())).name}'",
-            allowed="each input has a driver",
-            fix="connect an output or a Constant to each",
-        )

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from casadi import SX, evalf
 
 from armblocks.diagram.block import Block
+from armblocks.diagram.comments import active_levels
 from armblocks.diagram.diagram import Diagram
 from armblocks.diagram.hierarchy import flat_diagram
 from armblocks.diagram.levels import joined, levels_of
@@ -32,11 +33,11 @@ class Followers:
 
 
 def mask_parameters(diagram: Diagram) -> Mapping[str, tuple[Diagram, Parameter]]:
-    """All parameters of masks of a hierarchy by path, ``servo.kp`` or ``kp``, with the diagrams that declare
-    them."""
+    """The parameters of masks of a hierarchy by path, ``servo.kp`` or ``kp``, with the diagrams that declare
+    them; without those of commented subsystems."""
     return {
         f"{path}.{rule.name}" if path else rule.name: (level, rule)
-        for path, level in levels_of(diagram).items()
+        for path, level in active_levels(levels_of(diagram)).items()
         for rule in level.mask
     }
 
@@ -114,6 +115,8 @@ def _follow(path: str, level: Diagram, moved: Mapping[str, SX], found: Followers
         if (symbols := as_symbols(value)) is not None
     }
     for name, block in level.blocks.items():
+        if name in level.commented:
+            continue
         inner: dict[str, SX] = {}
         for parameter, text in block.formulas:
             if not parameters_read(text, moved):

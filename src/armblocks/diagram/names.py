@@ -1,33 +1,37 @@
-"""Block names: which names are legal, and which names count as equal."""
+"""Names of blocks and signals: which names are legal, and which names count as equal."""
 
 from __future__ import annotations
 
 import unicodedata
+from collections.abc import Iterable, Mapping
 
+from armblocks.diagram.port import PortRef
 from armblocks.errors import DiagramError
 
 LONGEST_NAME = 200
 """Characters."""
+NOT_SIGNALS = ("time", "run")
+"""Names that no signal has: data files have the times of the rows and the description of the run there."""
 
 
-def check_block_name(name: str, where: str) -> None:
+def check_block_name(name: str, where: str, thing: str = "block") -> None:
     """Raise ``DiagramError`` for a name unfit for a path, ``block/port`` or ``block.parameter``."""
     allowed = f"1 to {LONGEST_NAME} characters, without '/', '.' and control characters"
     shown = repr(name if len(name) <= 60 else name[:57] + "...")
     if not name.strip():
-        raise DiagramError("a block has an empty name", where=where, allowed=allowed, fix="name it")
+        raise DiagramError(f"a {thing} has an empty name", where=where, allowed=allowed, fix="name it")
     if len(name) > LONGEST_NAME:
         raise DiagramError(
-            f"the block name {shown} has {len(name)} characters",
+            f"the {thing} name {shown} has {len(name)} characters",
             where=where,
             allowed=allowed,
             fix="shorten it",
         )
     for character in name:
-        # Category C: control characters, and the invisible marks that turn the reading direction.
+        # Category C: control characters, and invisible marks that change the text direction.
         if character in "/." or unicodedata.category(character).startswith("C"):
             raise DiagramError(
-                f"the block name {shown} contains {character!r}",
+                f"the {thing} name {shown} contains {character!r}",
                 where=where,
                 allowed=allowed,
                 fix="rename it",
@@ -37,3 +41,28 @@ def check_block_name(name: str, where: str) -> None:
 def folded(name: str) -> str:
     """The form in which names are compared: ignores case and Unicode composition."""
     return unicodedata.normalize("NFC", unicodedata.normalize("NFKD", name).casefold())
+
+
+def check_signal_names(blocks: Iterable[str], names: Mapping[PortRef, str], where: str) -> None:
+    """Raise ``DiagramError`` for a name that another signal or a block of the sheet has, or that data files
+    do not allow: columns of a vector are named ``signal[0]``.
+    """
+    taken = {folded(name): f"the block '{name}'" for name in blocks}
+    for ref, name in sorted(names.items()):
+        check_block_name(name, f"{where}, signal '{ref}'", "signal")
+        if folded(name) in NOT_SIGNALS or not {"[", "]"}.isdisjoint(name):
+            raise DiagramError(
+                f"the signal '{ref}' is named '{name}', a name that data files use for other columns",
+                where=where,
+                allowed=f"names without brackets, other than {', '.join(NOT_SIGNALS)}",
+                fix="choose another name",
+            )
+        other = taken.get(folded(name))
+        if other is not None:
+            raise DiagramError(
+                f"the signal '{ref}' is named '{name}', like {other}",
+                where=where,
+                allowed="names that no other signal and no block of the sheet has",
+                fix="choose another name",
+            )
+        taken[folded(name)] = f"the signal '{ref}'"

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from armblocks.diagram.block import Block, Shapes
+from armblocks.diagram.block import Shapes
 from armblocks.diagram.diagram import Diagram
 from armblocks.diagram.hierarchy import FlatForm, flatten_hierarchy
 from armblocks.diagram.port import PortRef
+from armblocks.diagram.shape_inference import known_shapes
 from armblocks.diagram.shape_rules import shapes_agree
 from armblocks.equations import Shape
 from armblocks.errors import DiagramError, InputError
@@ -46,86 +46,8 @@ def infer_shapes(diagram: Diagram) -> DiagramShapes:
     Raises ``DiagramError`` where the two ends of a connection, or the inputs of a block, do not agree.
     """
     form = flatten_hierarchy(diagram)
-    diagram = form.diagram
-    known: dict[PortRef, Shape] = {}
-    consumers: dict[str, list[str]] = {name: [] for name in diagram.blocks}
-    for wire in diagram.connections:
-        consumers[wire.source.block].append(wire.target.block)
-    drivers = diagram.drivers
-    changes: dict[PortRef, int] = {}
-    queue: deque[str] = deque(diagram.blocks)
-    queued = set(queue)
-
-    def learn(ref: PortRef, shape: Shape) -> None:
-        if known.get(ref) == shape:
-            return
-        # Each assumption can be widened once; more changes would not terminate.
-        changes[ref] = changes.get(ref, -1) + 1
-        if changes[ref] > len(diagram.blocks):
-            raise DiagramError(
-                f"the shape of '{ref}' is inconsistent: it was {known[ref]} and becomes {shape}",
-                where=f"block '{ref.block}'",
-                allowed="loops with the same width at all signals",
-                fix="give the integrators of the loop initial values of the intended size",
-            )
-        known[ref] = shape
-        for consumer in consumers[ref.block]:
-            if consumer not in queued:
-                queued.add(consumer)
-                queue.append(consumer)
-
-    def spread() -> None:
-        while queue:
-            name = queue.popleft()
-            queued.discard(name)
-            block = diagram.blocks[name]
-            inputs = _input_shapes(name, block, drivers, known)
-            if inputs is None:
-                continue
-            try:
-                shapes = block.output_shapes(inputs)
-            except InputError:
-                continue  # raised at the end, if still true when all shapes are known
-            for port, shape in shapes.items():
-                learn(PortRef(name, port), shape)
-
-    for name, block in diagram.blocks.items():
-        for port in block.output_ports():
-            if port.shape is not None:
-                known[PortRef(name, port.name)] = port.shape
-    spread()
-    for name, block in diagram.blocks.items():
-        for port, shape in block.assumed_output_shapes().items():
-            if PortRef(name, port) not in known:
-                learn(PortRef(name, port), shape)
-    spread()
-    # The remaining signals are in loops without state, or depend on them: scalars are assumed one by one.
-    # Errors of blocks are raised first.
-    open_outputs = [
-        (name, PortRef(name, port.name))
-        for name, block in diagram.blocks.items()
-        for port in block.output_ports()
-        if PortRef(name, port.name) not in known
-    ]
-    if all(_input_shapes(name, diagram.blocks[name], drivers, known) is None for name, _ in open_outputs):
-        for _, ref in open_outputs:
-            if ref not in known:
-                learn(ref, ())
-                spread()
+    known = known_shapes(form.diagram)
     return _checked(form, known)
-
-
-def _input_shapes(
-    name: str, block: Block, drivers: Mapping[PortRef, PortRef], known: Mapping[PortRef, Shape]
-) -> Shapes | None:
-    """Shapes of all inputs, or ``None`` while one is unknown."""
-    shapes: dict[str, Shape] = {}
-    for port in block.input_ports():
-        shape = port.shape if port.shape is not None else known.get(drivers[PortRef(name, port.name)])
-        if shape is None:
-            return None
-        shapes[port.name] = shape
-    return shapes
 
 
 def _checked(form: FlatForm, known: Mapping[PortRef, Shape]) -> DiagramShapes:

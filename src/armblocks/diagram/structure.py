@@ -81,7 +81,7 @@ class Inport(Block):
         _check_dimensions(self)
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "what enters", self.unit, stated_shape(self)),)
+        return (Port("y", "the signal that enters", self.unit, stated_shape(self)),)
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
         stated = stated_shape(self)
@@ -129,7 +129,7 @@ class Outport(Block):
         _check_dimensions(self)
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "what leaves", self.unit, stated_shape(self)),)
+        return (Port("u", "the signal that leaves", self.unit, stated_shape(self)),)
 
 
 PASS_THROUGH = Diagram(
@@ -162,12 +162,12 @@ class DiagramBlock(Block):
         ends(self.diagram, Inport)
         ends(self.diagram, Outport)
         for port in self.control_ports():
-            if port.name in self.diagram.blocks:
+            if port.name in (*self.diagram.blocks, *self.diagram.signal_names.values()):
                 raise DiagramError(
-                    f"an inner block is named '{port.name}', like an input of the subsystem",
+                    f"an inner block or signal is named '{port.name}', like an input of the subsystem",
                     where=f"diagram '{self.diagram.name}'",
                     allowed="other names",
-                    fix="rename the block",
+                    fix="rename it",
                 )
         taken = {rule.name for rule in self.parameters()}
         twice = next((rule.name for rule in self.diagram.mask if rule.name in taken), None)

@@ -31,6 +31,7 @@ from armblocks.diagram.model import Model, diagram_model
 from armblocks.diagram.ordering import HELD, Network, Node, Value
 from armblocks.diagram.port import Guard, PortRef
 from armblocks.diagram.shapes import DiagramShapes
+from armblocks.diagram.signal_names import named_signals
 from armblocks.diagram.structure import Outport
 from armblocks.diagram.tracing import Implicit, Symbols, Tracing
 from armblocks.diagram.units import infer_units
@@ -328,7 +329,7 @@ def _delays(
     """The delayed signals and their delays. Raises ``DiagramError`` where a delay depends on itself."""
     places = signature(*symbols.discrete_slots).ranges
     values: list[int] = []
-    slopes: list[int] = []
+    derivatives: list[int] = []
     fixed: list[bool] = []
     columns: dict[str, list[SX]] = {"u": [], "du": [], "tau": [], "shortest": [], "longest": []}
     looked_up: list[SX] = [loops.w]
@@ -339,9 +340,9 @@ def _delays(
         for line in equations.delays:
             kinds = (SlotKind.DELAYED, SlotKind.DELAYED_RATE, SlotKind.DELAY)
             u, du, tau = (flow.value(_value(model.flow, name, kind, line.name)) for kind in kinds)
-            of_value, of_slope = places[f"{name}/{line.name}"], places[f"{name}/{line.name}'"]
+            of_value, of_derivative = places[f"{name}/{line.name}"], places[f"{name}/{line.name}'"]
             values += range(of_value.start, of_value.stop)
-            slopes += range(of_slope.start, of_slope.stop)
+            derivatives += range(of_derivative.start, of_derivative.stop)
             fixed += [line.name in equations.fixed_delays] * u.numel()
             each = SX.ones(u.numel())
             parts = (u, du, tau * each, *(bound * each for bound in bounds[line.name]))
@@ -366,7 +367,7 @@ def _delays(
 
     return Delays(
         values=tuple(values),
-        slopes=tuple(slopes),
+        derivatives=tuple(derivatives),
         fixed=tuple(fixed),
         inputs=function("delay_inputs", ends, "u", "du"),
         times=function("delay_times", ends, "tau"),
@@ -387,11 +388,11 @@ def _reset(model: Model, symbols: Symbols, flow: Tracing) -> dict[str, list[SX]]
         for mode in equations.modes:
             path = f"{name}/{mode.name}"
             settled = flow.value(_value(model.flow, name, SlotKind.MODE, mode.name))
-            asked = quiet
+            requested = quiet
             if mode.follows:  # its value needs no event
                 wrong = flow.value(_value(model.flow, name, SlotKind.CONTRADICTION, mode.name))
-                asked = logic_or(quiet, wrong)
-            discrete[path] = if_else(asked, settled, discrete[path])
+                requested = logic_or(quiet, wrong)
+            discrete[path] = if_else(requested, settled, discrete[path])
     return {"x": list(states.values()), "z": list(discrete.values())}
 
 
@@ -476,7 +477,8 @@ def _initial_discrete(model: Model, symbols: Symbols) -> list[SX]:
 
 
 def _aliases(form: FlatForm, layout: Signature) -> dict[str, str]:
-    """Other names of signals: a block's bare name, the input ports, and the ports of virtual blocks."""
+    """Other names of signals: names given by the user, a block's bare name, the input ports, and the ports of
+    virtual blocks."""
     aliases: dict[str, str] = {}
     taken = set(layout.names)
     for name, block in form.diagram.blocks.items():
@@ -489,4 +491,5 @@ def _aliases(form: FlatForm, layout: Signature) -> dict[str, str]:
         if isinstance(form.diagram.blocks[wire.target.block], Outport):
             aliases[wire.target.block] = str(wire.source)
     aliases.update({name: str(ref) for name, ref in form.aliases.items() if name not in taken})
+    aliases.update({name: str(ref) for name, ref in named_signals(form)})
     return aliases

@@ -1,4 +1,4 @@
-"""Copies of a diagram with other parameter values."""
+"""Copies of a diagram with other parameter values or comments."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TypeVar
 
 from armblocks.diagram.block import Block
 from armblocks.diagram.check import check_diagram
+from armblocks.diagram.comments import Comment, check_comment
 from armblocks.diagram.diagram import Diagram
 from armblocks.diagram.mask import formula_names
 from armblocks.diagram.structure import DiagramBlock
@@ -32,13 +33,36 @@ def with_parameters(diagram: Diagram, values: Mapping[str, object]) -> Diagram:
     return diagram
 
 
-def _with_value(diagram: Diagram, path: str, parameter: str, value: object) -> Diagram:
-    """A copy in which one parameter of the block at a path has another value."""
-    if not path:
-        if parameter not in diagram.mask_values:
-            known = [*diagram.mask_values, *(f"{name}.…" for name in diagram.blocks)]
-            raise UnknownNameError("parameter", parameter, known, where=f"diagram '{diagram.name}'")
-        return _located("", lambda: diagram.with_mask_values({parameter: value}))
+def with_comments(diagram: Diagram, comments: Mapping[str, Comment | None]) -> Diagram:
+    """A copy with other comments of blocks, ``{"filter": "through", "plant/drag": "out", "gain": None}``.
+
+    A block that is commented ``"out"`` takes no part in the model; its outputs are zeros of the same shapes.
+    One that is commented ``"through"`` is replaced by wires from its inputs to its outputs. ``None`` removes
+    a comment. Blocks inside subsystems are named by their paths. The copy is checked. Raises
+    ``UnknownNameError`` for an unknown block, ``DiagramError`` for a block that cannot be commented, or is
+    linked to a library, and for an inconsistent diagram.
+    """
+    for path, comment in comments.items():
+        outside, level, name = _found(diagram, path)
+        _check_unlinked(outside, path)
+        if comment is not None:
+            check_comment(path, level.block(name), comment)
+        others = {other: how for other, how in level.commented.items() if other != name}
+        commented = others if comment is None else {**others, name: comment}
+        diagram = _rebuilt(outside, dataclasses.replace(level, commented=commented))
+    check_diagram(diagram)
+    return diagram
+
+
+_Outside = Sequence[tuple[Diagram, str, DiagramBlock]]
+"""The enclosing subsystems of a level: their levels, names and blocks, outer ones first."""
+
+
+def _found(diagram: Diagram, path: str) -> tuple[_Outside, Diagram, str]:
+    """The enclosing subsystems, the level and the name of the block at a path.
+
+    Raises ``UnknownNameError`` for an unknown block.
+    """
     outside: list[tuple[Diagram, str, DiagramBlock]] = []
     name = path
     while name not in diagram.blocks and "/" in name:
@@ -48,6 +72,26 @@ def _with_value(diagram: Diagram, path: str, parameter: str, value: object) -> D
             break
         outside.append((diagram, first, block))
         diagram, name = block.diagram, rest
+    diagram.block(name)
+    return outside, diagram, name
+
+
+def _rebuilt(outside: _Outside, changed: Diagram) -> Diagram:
+    """The outermost diagram with another innermost level."""
+    for level, first, subsystem in reversed(outside):
+        inside = dataclasses.replace(subsystem, diagram=changed)
+        changed = dataclasses.replace(level, blocks={**level.blocks, first: inside})
+    return changed
+
+
+def _with_value(diagram: Diagram, path: str, parameter: str, value: object) -> Diagram:
+    """A copy in which one parameter of the block at a path has another value."""
+    if not path:
+        if parameter not in diagram.mask_values:
+            known = [*diagram.mask_values, *(f"{name}.…" for name in diagram.blocks)]
+            raise UnknownNameError("parameter", parameter, known, where=f"diagram '{diagram.name}'")
+        return _located("", lambda: diagram.with_mask_values({parameter: value}))
+    outside, diagram, name = _found(diagram, path)
     block = diagram.block(name)
     _check_free(outside, path, block, parameter)
     changed = dataclasses.replace(
@@ -57,27 +101,27 @@ def _with_value(diagram: Diagram, path: str, parameter: str, value: object) -> D
             name: _located(path, lambda: block.with_parameters(**{parameter: value})),
         },
     )
-    for level, first, subsystem in reversed(outside):
-        inside = dataclasses.replace(subsystem, diagram=changed)
-        changed = dataclasses.replace(level, blocks={**level.blocks, first: inside})
-    return changed
+    return _rebuilt(outside, changed)
 
 
-def _check_free(
-    outside: Sequence[tuple[Diagram, str, DiagramBlock]], path: str, block: Block, parameter: str
-) -> None:
-    """Raise ``DiagramError`` for a parameter that is set by a formula or a library."""
+def _check_unlinked(outside: _Outside, path: str) -> None:
+    """Raise ``DiagramError`` for a change inside a library block."""
     linked = next((place for place, (_, _, inside) in enumerate(outside) if inside.diagram.link), None)
     if linked is not None:
         subsystem = "/".join(name for _, name, _ in outside[: linked + 1])
         found = outside[linked][2].diagram
         own = ", ".join(f"{subsystem}.{rule.name}" for rule in found.mask)
         raise DiagramError(
-            f"'{path}.{parameter}' is inside the library block '{found.link}'",
+            f"'{path}' is inside the library block '{found.link}'",
             where=f"block '{subsystem}'",
             allowed=own or "nothing: the library block has no parameters",
             fix="change a parameter of its mask, or break the link",
         )
+
+
+def _check_free(outside: _Outside, path: str, block: Block, parameter: str) -> None:
+    """Raise ``DiagramError`` for a parameter that is set by a formula or a library."""
+    _check_unlinked(outside, f"{path}.{parameter}")
     text = dict(block.formulas).get(parameter)
     if text is not None:
         outer = "/".join(name for _, name, _ in outside)

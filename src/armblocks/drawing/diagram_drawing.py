@@ -30,12 +30,14 @@ from armblocks.drawing.block_boxes import (
     PortSpot,
     sized_box,
 )
+from armblocks.drawing.comment_marks import COMMENT_WORDS, commented_marks
 from armblocks.drawing.diagram_layout import boxes
 from armblocks.drawing.face_marks import Room
 from armblocks.drawing.rates import Rates
 from armblocks.drawing.sink_faces import Trend
 from armblocks.drawing.structure_faces import control_ports
 from armblocks.drawing.wire_marks import WireKind, arrow_head, label_marks, rounded, wire_marks
+from armblocks.drawing.wire_names import name_marks
 from armblocks.drawing.wire_routing import route
 from armblocks.drawing.wires import Net, Obstacle, RoutedNet, WireEnd
 from armblocks.errors import DiagramError, UnknownNameError
@@ -72,7 +74,8 @@ def diagram_picture(
     path = f"{sheet}/" if sheet else ""
     placed = boxes(level)
     nets, wires = wire_nets(level.connections, drawn_bends(level), placed)
-    routed = route([obstacle(box) for box in placed.values()], nets)
+    obstacles = [obstacle(box) for box in placed.values()]
+    routed = route(obstacles, nets)
     marks: list[Mark] = []
     for (source, _), net in zip(wires.items(), routed):
         kind = carried.kind(PortRef(path + source.block, source.port))
@@ -80,13 +83,15 @@ def diagram_picture(
         marks += wire_marks(net, kind, _wire_title(source, wires[source]), tone)
     for name, box in placed.items():
         trend = _trend(path + name, carried.views.get(path + name), result)
-        block = _block(box, trend)
+        comment = level.commented.get(name, "")
+        block = _block(box, trend, comment)
         if (mark := clocks.mark(path + name)) is not None:
             place = box.x + box.width, box.y - 4
             block.append(Text(*place, mark[0], NAME_SIZE - 1.5, mark[1], "end", bold=True))
-        marks.append(Group(tuple(block), title=_block_title(name, box)))
+        marks.append(Group(tuple(block), title=_block_title(name, box, comment)))
     for (source, _), wire_net, net in zip(wires.items(), nets, routed):
         marks += label_marks(wire_net, net, wire_label(level, source))
+        marks += name_marks(level.signal_names.get(source, ""), net.paths, obstacles)
     marks += _notes(level)
     left, top, right, bottom = _extent(placed, routed, level)
     picture = Picture(
@@ -172,7 +177,12 @@ def _end(spots: tuple[PortSpot, ...], port: str) -> WireEnd:
 
 
 def wire_label(diagram: Diagram, source: PortRef) -> str:
-    """The label at both ends of a wire without a line: the source block, with its port if it has several."""
+    """The label at both ends of a wire without a line.
+
+    It is the name of the signal, else the source block, with its port if it has several.
+    """
+    if source in diagram.signal_names:
+        return diagram.signal_names[source]
     return source.block if len(diagram.blocks[source.block].output_ports()) == 1 else str(source)
 
 
@@ -210,11 +220,16 @@ def _trend(path: str, view: View | None, result: SimulationResult | None) -> Tre
     )
 
 
-def block_marks(box: Box, trend: Trend | None = None) -> list[Mark]:
+def block_marks(box: Box, trend: Trend | None = None, comment: str = "") -> list[Mark]:
     """A block without its name: outline, port names and face, at the position of its box.
 
-    A rotated block has a rotated outline and an upright drawing.
+    A rotated block has a rotated outline and an upright drawing. A block with a ``comment`` is grey.
     """
+    marks = _plain_marks(box, trend)
+    return commented_marks(marks, box, comment) if comment else marks
+
+
+def _plain_marks(box: Box, trend: Trend | None) -> list[Mark]:
     shape, block = _shape(box), box.block
     marks: list[Mark] = [_outline(box)]
     room = Room(box.x, box.y, box.width, box.height)
@@ -251,8 +266,8 @@ def _outline(box: Box) -> Mark:
     return moved(drawn, box.x, box.y)
 
 
-def _block(box: Box, trend: Trend | None) -> list[Mark]:
-    marks = block_marks(box, trend)
+def _block(box: Box, trend: Trend | None, comment: str = "") -> list[Mark]:
+    marks = block_marks(box, trend, comment)
     lx, ly, lw, _ = _label(box)
     name = shorten(box.name, NAME_SIZE, lw + 1)
     if _name_above(box) or not box.upright:
@@ -375,8 +390,9 @@ def _wire_title(source: PortRef, targets: list[PortRef]) -> str:
     return f"{source} to {', '.join(str(target) for target in targets)}"
 
 
-def _block_title(name: str, box: Box) -> str:
-    return f"{name} ({box.block.title})"
+def _block_title(name: str, box: Box, comment: str) -> str:
+    kind = f"{box.block.title}, {COMMENT_WORDS[comment]}" if comment else box.block.title
+    return f"{name} ({kind})"
 
 
 def _text_alternative(diagram: Diagram) -> str:

@@ -36,11 +36,11 @@ class Rates:
     def add_legend(self, picture: Picture) -> None:
         """A line below the drawing for every clock."""
         for number, clock in enumerate(self.clocks):
-            said = f"D{number + 1}: {_period(clock.period)}"
+            text = f"D{number + 1}: {_period(clock.period)}"
             if clock.offset:
-                said += f", first at {_period(clock.offset)}"
-            picture.add(Text(22.0, picture.height + 4, said, SMALL_SIZE, trace_tone(number), bold=True))
-            picture.width = max(picture.width, 44.0 + text_width(said, SMALL_SIZE, bold=True))
+                text += f", first at {_period(clock.offset)}"
+            picture.add(Text(22.0, picture.height + 4, text, SMALL_SIZE, trace_tone(number), bold=True))
+            picture.width = max(picture.width, 44.0 + text_width(text, SMALL_SIZE, bold=True))
             picture.height += _ROW
 
 

@@ -53,7 +53,7 @@ def rnea(
     ground = BodyMotion(ZERO, ZERO, scale(-1.0, gravity), _rotation_accelerations(ZERO, ZERO))
     for i, (body, joint) in enumerate(zip(bodies, joints)):
         # 1. Outward: velocities and accelerations. Gravity is treated as an acceleration of the base.
-        motion = _carried(ground if body.parent == BASE else motions[body.parent], joint, qd, qdd)
+        motion = _body_motion(ground if body.parent == BASE else motions[body.parent], joint, qd, qdd)
         motions.append(motion)
         # 2. The net wrench on each body.
         wrench = inertial_wrench(body.inertia, motion)
@@ -67,14 +67,14 @@ def rnea(
         force, moment = wrenches[i]
         tau[body.joint] = body.turn * moment[2] + body.slide * force[2]
         if body.parent != BASE:
-            wrenches[body.parent] = _added(wrenches[body.parent], wrenches[i], joints[i])
+            wrenches[body.parent] = _with_child_wrench(wrenches[body.parent], wrenches[i], joints[i])
     return tau
 
 
-def _carried(
+def _body_motion(
     parent: BodyMotion, joint: JointMotion, qd: Sequence[Scalar], qdd: Sequence[Scalar]
 ) -> BodyMotion:
-    """The motion of a body from its parent's."""
+    """The motion of a body, from that of its parent."""
     body = joint.body
     j = body.joint
     w = joint.to_body(parent.omega)
@@ -132,7 +132,7 @@ def inertial_wrench(inertia: RigidInertia, motion: BodyMotion) -> Wrench:
     return Wrench(force, add(gyroscopic, cross(h, a)))
 
 
-def _added(parent: Wrench, child: Wrench, joint: JointMotion) -> Wrench:
+def _with_child_wrench(parent: Wrench, child: Wrench, joint: JointMotion) -> Wrench:
     """The parent's wrench plus that of a child, about the parent's origin."""
     force = joint.to_parent(child.force)
     moment = add(joint.to_parent(child.moment), cross(joint.p, force))

@@ -39,13 +39,13 @@ class Delays:
 
     ``inputs``: from ``t, x, z, w, p`` the delayed signals and their exact time derivatives, ``(2 nd,)``.
     ``times``: from the same arguments the delays, ``(nd,)`` s. ``bounds``: from ``p`` the lower and upper
-    limits of the delays, above 0, ``(2 nd,)`` s. ``values`` and ``slopes``: the indices in ``z`` of the
+    limits of the delays, above 0, ``(2 nd,)`` s. ``values`` and ``derivatives``: the indices in ``z`` of the
     values at ``t - tau``, and of their time derivatives for ``fixed`` delays. They are the only entries of
     ``z`` that change between instants. Before the start, a signal has its value in ``initial_discrete``.
     """
 
     values: tuple[int, ...]
-    slopes: tuple[int, ...]
+    derivatives: tuple[int, ...]
     fixed: tuple[bool, ...]
     inputs: TracedFunction
     times: TracedFunction

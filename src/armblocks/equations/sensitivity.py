@@ -194,7 +194,7 @@ class _Augmented:
         old, c, instants = self.old, self.columns, self.instants
         m = SX.sym("m", len(old.clocks))
         residual = self.residual()
-        slopes = densify(jacobian(residual.results[0], residual.arguments[3]))
+        derivatives = densify(jacobian(residual.results[0], residual.arguments[3]))
         y = c.value(old.signals)
         rates: list[SX] = []
         slots: list[Slot] = []
@@ -222,8 +222,8 @@ class _Augmented:
             residual_jacobian=dataclasses.replace(
                 residual,
                 name="residual_jacobian",
-                outputs=signature(("J", slopes.shape)),
-                results=(flatten(slopes, slopes.shape),),
+                outputs=signature(("J", derivatives.shape)),
+                results=(flatten(derivatives, derivatives.shape),),
             ),
             update=c.function("update", {"m": m}, z=update),
             guards=c.function("guards", {}, g=guards),

@@ -36,9 +36,9 @@ class DelayedSensitivities:
         self.tau_p = [self._along_parameter(self.tau, k) for k in range(len(columns.names))]
         self.values = [] if delays is None else list(delays.values)
         """The indices of the delayed values in z."""
-        self.slopes = [] if delays is None else list(delays.slopes)
-        self.reads_slopes = delays is not None and self._slopes_are_read()
-        self.curvature = columns.add("curvature", self.n if self.reads_slopes else 0)
+        self.derivatives = [] if delays is None else list(delays.derivatives)
+        self.reads_derivatives = delays is not None and self._derivatives_are_read()
+        self.curvature = columns.add("curvature", self.n if self.reads_derivatives else 0)
         """u'' at the delayed time, if derivatives of delayed signals are read."""
         self.Z = [self._corrected(k) for k in range(len(columns.names))]
         """Sensitivities of z: those of delayed values are computed from the history."""
@@ -51,17 +51,17 @@ class DelayedSensitivities:
         self.jumps = add("jumps", n, 1.0)
         self.arrived = add("arrived", n)
         self.before_jump = add("before jump", n, at_start)
-        self.left, self.left_slope = add("left limit", n), add("left slope", n)
+        self.left, self.left_derivative = add("left limit", n), add("left derivative", n)
         self.jump_p = [add(f"jump by {name}", n) for name in columns.names]
-        self.past_jumps = add("jumps then", n)
-        self.past_before = add("before jump then", n, at_start)
-        self.past_p = [add(f"jump by {name} then", n) for name in columns.names]
-        self.flat = add("slope of steps", n * (2 + count))
-        if self.reads_slopes:
-            self.slope_before_jump = add("slope before jump", n)
-            self.past_slope_before = add("slope before jump then", n)
-            self.flat_slope = add("slope of steps of the slope", n)
-            self.past_slope = add("slope then", n)
+        self.delayed_jumps = add("jumps (delayed)", n)
+        self.delayed_before = add("before jump (delayed)", n, at_start)
+        self.delayed_p = [add(f"jump by {name} (delayed)", n) for name in columns.names]
+        self.step_derivatives = add("derivative of steps", n * (2 + count))
+        if self.reads_derivatives:
+            self.derivative_before_jump = add("derivative before jump", n)
+            self.delayed_derivative_before = add("derivative before jump (delayed)", n)
+            self.step_derivative_of_derivative = add("derivative of steps of the derivative", n)
+            self.delayed_derivative = add("derivative (delayed)", n)
 
     def _along_parameter(self, expression: SX, k: int) -> SX:
         c = self.columns
@@ -70,25 +70,27 @@ class DelayedSensitivities:
     def _corrected(self, k: int) -> SX:
         """The sensitivities of z. At the index of a delayed value, Z stores only ``u_p(t - d)``."""
         corrected = SX(self.columns.Z[k])
-        for i, (value, slope) in enumerate(zip(self.values, self.slopes)):
-            corrected[value] = corrected[value] - self.columns.z[slope] * self.tau_p[k][i]
+        for i, (value, derivative) in enumerate(zip(self.values, self.derivatives)):
+            corrected[value] = corrected[value] - self.columns.z[derivative] * self.tau_p[k][i]
             if self.curvature.numel():
-                corrected[slope] = corrected[slope] - self.curvature[i] * self.tau_p[k][i]
+                corrected[derivative] = corrected[derivative] - self.curvature[i] * self.tau_p[k][i]
         return corrected
 
-    def _slopes_are_read(self) -> bool:
+    def _derivatives_are_read(self) -> bool:
         c, system = self.columns, self.columns.system
-        read = vertcat(*(c.z[place] for place in self.slopes), SX(0, 1))
+        read = vertcat(*(c.z[place] for place in self.derivatives), SX(0, 1))
         functions = (system.derivative, system.signals, system.guards, self._delays.inputs)
         values = [c.value(function) for function in functions]
         values.append(c.value(system.reset, SX.sym("e", len(system.guard_directions))))
         values.append(c.value(system.update, SX.sym("m", len(system.clocks))))
-        kept = {*self.slopes}
+        unchanged = {*self.derivatives}
         changed = [value[k] for value in values[:-2] for k in range(value.numel())]
         places = range(c.z.numel())
         n = c.x.numel()
-        changed += [values[-2][k] for k in range(n)] + [values[-2][n + k] for k in places if k not in kept]
-        changed += [values[-1][k] for k in places if k not in kept]
+        changed += [values[-2][k] for k in range(n)] + [
+            values[-2][n + k] for k in places if k not in unchanged
+        ]
+        changed += [values[-1][k] for k in places if k not in unchanged]
         return bool(read.numel() and depends_on(vertcat(*changed), read))
 
     def _before_start(self) -> SX:
@@ -107,10 +109,10 @@ class DelayedSensitivities:
         self.delay_rate = c.along(
             self.tau, t=1.0, x=flow, z=still, w=SX.zeros(c.w.numel()), p=SX.zeros(c.p.numel())
         )
-        for i, (value, slope) in enumerate(zip(self.values, self.slopes)):
-            self.rate_along[value] = c.z[slope] * (1.0 - self.delay_rate[i])
-            if self.reads_slopes:
-                self.rate_along[slope] = self.curvature[i]
+        for i, (value, derivative) in enumerate(zip(self.values, self.derivatives)):
+            self.rate_along[value] = c.z[derivative] * (1.0 - self.delay_rate[i])
+            if self.reads_derivatives:
+                self.rate_along[derivative] = self.curvature[i]
         self.ddu = c.along(
             self.du, t=1.0, x=flow, z=self.rate_along, w=SX.zeros(c.w.numel()), p=SX.zeros(c.p.numel())
         )
@@ -119,7 +121,7 @@ class DelayedSensitivities:
 
     def begin(self) -> dict[str, SX]:
         """Left limits stored before an instant."""
-        return {"left limit": self.u, "left slope": self.du} if self.n else {}
+        return {"left limit": self.u, "left derivative": self.du} if self.n else {}
 
     def guards(self, at_instant: SX) -> list[SX]:
         """Guards that fire upwards: when a jump arrives, and when the input of a delay has jumped at this
@@ -127,12 +129,14 @@ class DelayedSensitivities:
         if not self.n:
             return []
         size = fabs(self.u) + fabs(self.left)
-        drift = 1e-13 * (1.0 + self.columns.t) * fmax(fabs(self.du), fabs(self.left_slope))
+        drift = 1e-13 * (1.0 + self.columns.t) * fmax(fabs(self.du), fabs(self.left_derivative))
         jumps = fabs(self.u - self.left) > SAME_VALUE * size + drift
-        bends = fabs(self.du - self.left_slope) > SAME_VALUE * (fabs(self.du) + fabs(self.left_slope))
+        bends = fabs(self.du - self.left_derivative) > SAME_VALUE * (
+            fabs(self.du) + fabs(self.left_derivative)
+        )
         fixed = SX([float(fixed) for fixed in self._delays.fixed])
         changed = logic_and(at_instant, logic_or(jumps, logic_and(bends, fixed)))
-        return [self.past_jumps - self.arrived - 0.5, if_else(changed, 1.0, -1.0)]
+        return [self.delayed_jumps - self.arrived - 0.5, if_else(changed, 1.0, -1.0)]
 
     @property
     def _delays(self) -> Delays:
@@ -143,16 +147,16 @@ class DelayedSensitivities:
     def arrival(self, k: int) -> SX:
         """The derivative by parameter ``k`` of the arrival time of the last jump, (n,)."""
         steady = if_else(self.delay_rate == 1.0, 0.0, self.delay_rate)
-        return (self.past_p[k] + self.tau_p[k]) / (1.0 - steady)
+        return (self.delayed_p[k] + self.tau_p[k]) / (1.0 - steady)
 
     def before_arrival(self, fired: SX) -> SX:
         """z with the delayed values before the jumps that have arrived."""
         z = SX(self.columns.z)
         for i, value in enumerate(self.values):
-            z[value] = if_else(fired[i], self.past_before[i], z[value])
-            if self.reads_slopes:
-                slope = self.slopes[i]
-                z[slope] = if_else(fired[i], self.past_slope_before[i], z[slope])
+            z[value] = if_else(fired[i], self.delayed_before[i], z[value])
+            if self.reads_derivatives:
+                derivative = self.derivatives[i]
+                z[derivative] = if_else(fired[i], self.delayed_derivative_before[i], z[derivative])
         return z
 
     def after(self, arrived: SX, jumped: SX, instants: list[SX]) -> dict[str, SX]:
@@ -161,12 +165,14 @@ class DelayedSensitivities:
         if not self.n:
             return {}
         changes = {
-            "arrived": if_else(arrived, self.past_jumps, self.arrived),
+            "arrived": if_else(arrived, self.delayed_jumps, self.arrived),
             "jumps": self.jumps + jumped,
             "before jump": if_else(jumped, self.left, self.before_jump),
         }
-        if self.reads_slopes:
-            changes["slope before jump"] = if_else(jumped, self.left_slope, self.slope_before_jump)
+        if self.reads_derivatives:
+            changes["derivative before jump"] = if_else(
+                jumped, self.left_derivative, self.derivative_before_jump
+            )
         for name, known, instant in zip(self.columns.names, self.jump_p, instants):
             changes[f"jump by {name}"] = if_else(jumped, instant, known)
         return changes
@@ -180,25 +186,31 @@ class DelayedSensitivities:
             return None
         c, old, n, nz = self.columns, self._delays, self.n, self.columns.z.numel()
         count = len(c.names)
-        values, slopes = list(self.values), list(self.slopes)
+        values, derivatives = list(self.values), list(self.derivatives)
         u, du = [self.u], [self.du]
         for k in range(count):
             values += [nz * (k + 1) + place for place in self.values]
-            slopes += [nz * (k + 1) + place for place in self.slopes]
+            derivatives += [nz * (k + 1) + place for place in self.derivatives]
             u.append(self._sensitivity(self.u, k))
             du.append(self._sensitivity(self.du, k))
-        flat = self._places("slope of steps", 2 + count)
-        steps = {"jumps then": self.jumps, "before jump then": self.before_jump}
-        steps |= {f"jump by {name} then": known for name, known in zip(c.names, self.jump_p)}
-        for (name, signal), slope in zip(steps.items(), flat):
+        step_derivatives = self._places("derivative of steps", 2 + count)
+        steps = {"jumps (delayed)": self.jumps, "before jump (delayed)": self.before_jump}
+        steps |= {f"jump by {name} (delayed)": known for name, known in zip(c.names, self.jump_p)}
+        for (name, signal), derivative in zip(steps.items(), step_derivatives):
             values += self._places(name)[0]
-            slopes += slope
+            derivatives += derivative
             u.append(signal)
             du.append(SX.zeros(n))
-        if self.reads_slopes:
-            values += [*self._places("slope before jump then")[0], *self._places("slope then")[0]]
-            slopes += [*self._places("slope of steps of the slope")[0], *self._places("curvature")[0]]
-            u += [self.slope_before_jump, self.du]
+        if self.reads_derivatives:
+            values += [
+                *self._places("derivative before jump (delayed)")[0],
+                *self._places("derivative (delayed)")[0],
+            ]
+            derivatives += [
+                *self._places("derivative of steps of the derivative")[0],
+                *self._places("curvature")[0],
+            ]
+            u += [self.derivative_before_jump, self.du]
             du += [SX.zeros(n), self.ddu]
         copies = len(u)
         (p,) = old.bounds.arguments
@@ -206,7 +218,7 @@ class DelayedSensitivities:
         bounds = vertcat(*[shortest] * copies, *[longest] * copies)
         return Delays(
             values=tuple(values),
-            slopes=tuple(slopes),
+            derivatives=tuple(derivatives),
             fixed=old.fixed * copies,
             inputs=c.function("delay_inputs", {}, d=vertcat(*u, *du)),
             times=c.function("delay_times", {}, d=vertcat(*[self.tau] * copies)),

@@ -26,13 +26,14 @@ class Slot:
     """One named quantity: its shape and its SI unit (``""`` if it has none or its entries differ).
 
     ``entries`` are the names of the entries of a vector, such as joint names; without names they are
-    numbered.
+    numbered. ``title`` is the name that a user has given to the signal.
     """
 
     name: str
     shape: Shape = ()
     unit: str = ""
     entries: tuple[str, ...] = ()
+    title: str = ""
 
     @property
     def size(self) -> int:
@@ -117,6 +118,12 @@ class Signature:
                 replace(slot, entries=entries[slot.name]) if slot.name in entries else slot for slot in self
             )
         )
+
+    def with_titles(self, titles: Mapping[str, str]) -> Signature:
+        """The same quantities with titles, by name."""
+        if not titles:
+            return self
+        return Signature(tuple(replace(slot, title=titles.get(slot.name, "")) for slot in self))
 
     def pack(self, values: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
         """Copy named values, each with the shape of its slot, into a new flat vector of shape ``(size,)``."""

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from armblocks.analysis.operating_point import OperatingPoint
 from armblocks.diagram import Diagram, content_key, trace_diagram, with_parameters
 from armblocks.diagram.entry_names import entry_names
+from armblocks.diagram.signal_names import signal_titles
 from armblocks.equations import HybridSystem, Signature, SimulationOptions
 from armblocks.errors import InputError
 from armblocks.face.called import called_functions
@@ -23,7 +24,7 @@ from armblocks.face.diagram_run import DiagramRun, tuned_parameters
 from armblocks.face.diagrams import load_diagram
 from armblocks.face.limit_watch import LimitWatch
 from armblocks.face.settings import RunSettings, check_settings, takes_settings, with_settings
-from armblocks.integration.system import CompiledSystem, compile_system, recall_system
+from armblocks.integration.system import CompiledSystem, cached_system, compile_system
 from armblocks.simulation import LogRequest, RunState, Simulation, SimulationResult
 from armblocks.simulation.plan import changed_parameters
 from armblocks.simulation.whole_run import Progress, run_to_the_end
@@ -49,13 +50,14 @@ class CompiledDiagram:
     def compiled(self) -> CompiledSystem:
         """The equations as native code; with a cache entry there is no tracing."""
         key = content_key(self.diagram)
-        return compile_system(self.system) if key is None else recall_system(key, lambda: self.system)
+        return compile_system(self.system) if key is None else cached_system(key, lambda: self.system)
 
     @cached_property
     def _signals_layout(self) -> Signature:
-        """The layout of the signals, with the names of joints."""
+        """The layout of the signals, with the names of joints and of signals."""
         layout = self.compiled.signals_layout
-        return layout.with_entries(entry_names(self.diagram, {slot.name: slot.shape for slot in layout}))
+        entries = entry_names(self.diagram, {slot.name: slot.shape for slot in layout})
+        return layout.with_entries(entries).with_titles(signal_titles(self.diagram))
 
     @takes_settings
     def simulate(

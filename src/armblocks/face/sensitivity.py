@@ -60,7 +60,7 @@ class SensitivityResult:
         raise UnknownNameError("parameter", parameter, dict.fromkeys(known), where=self.run.name)
 
     def __repr__(self) -> str:
-        head = f"<SensitivityResult {self.run.name}: {self.time.size} instants>"
+        head = f"<SensitivityResult {self.run.name}: {self.time.size} samples>"
         lines = [f"  d {output} / d {name}" for output in self.outputs for name in self.parameters]
         return "\n".join([head, *lines])
 

@@ -69,7 +69,7 @@ def jtraj(
             )
     for name, angles in (("q0", start), ("qf", goal)):
         warn_of_degrees(angles, f"jtraj, {name}")
-    times = _instants(t)
+    times = _times(t)
     motion = Quintic(q0=start, qf=goal, tmax=times[-1:], qd0=first, qd1=last).at(times)
     return JointTrajectory(t=times, q=motion.q, qd=motion.qd, qdd=motion.qdd)
 
@@ -89,7 +89,7 @@ def _joint_vector(name: str, value: ArrayLike) -> NDArray[np.float64]:
     return vector
 
 
-def _instants(t: ArrayLike | int) -> NDArray[np.float64]:
+def _times(t: ArrayLike | int) -> NDArray[np.float64]:
     if isinstance(t, int):
         if t < 2:
             raise InputError(

@@ -62,15 +62,15 @@ def trim(
     p = system.parameters.pack(known.parameters)
     given = _values(system.states, states or {}, "state", system)
     x[list(given)] = list(given.values())
-    places = _parameter_places(system, free)
+    indices = _parameter_indices(system, free)
     for name, value in (guess or {}).items():
         layout, slot = _state_or_parameter(system, name)
         kind, vector = ("state", x) if layout is system.states else ("parameter", p)
         found = _values(layout, {slot: value}, kind, system)
         vector[list(found)] = list(found.values())
-    let_go = {place for name in moving for place in _places(system.states, name, "state", system)}
+    moving_states = {index for name in moving for index in _indices(system.states, name, "state", system)}
     rows, targets = _targets(system, outputs or {})
-    everything = range(system.states.size)
+    all_states = range(system.states.size)
     return trim_system(
         TrimProblem(
             system=system,
@@ -81,9 +81,9 @@ def trim(
                 w=system.algebraic.pack(known.algebraic),
                 p=p,
             ),
-            free_states=np.array([k for k in everything if k not in given], dtype=np.intp),
-            resting=np.array([k for k in everything if k not in let_go], dtype=np.intp),
-            free_parameters=np.array(places, dtype=np.intp),
+            free_states=np.array([k for k in all_states if k not in given], dtype=np.intp),
+            resting=np.array([k for k in all_states if k not in moving_states], dtype=np.intp),
+            free_parameters=np.array(indices, dtype=np.intp),
             rows=np.array(rows, dtype=np.intp),
             targets=np.array(targets, dtype=np.float64),
             bounds=_bounds(system, bounds or {}),
@@ -103,7 +103,7 @@ def _slot_name(layout: Signature, name: str, kind: str, system: HybridSystem) ->
     return own[0]
 
 
-def _places(layout: Signature, name: str, kind: str, system: HybridSystem) -> list[int]:
+def _indices(layout: Signature, name: str, kind: str, system: HybridSystem) -> list[int]:
     """The indices of a whole slot, or of one entry of it: ``table.values[3]``."""
     head, bracket, _ = name.partition("[")
     if bracket and head in layout.ranges and name in layout[head].elements:
@@ -116,12 +116,12 @@ def _values(layout: Signature, values: Values, kind: str, system: HybridSystem) 
     found: dict[int, float] = {}
     for name, value in values.items():
         slot = layout[_slot_name(layout, name, kind, system)]
-        places = _places(layout, name, kind, system)
-        found |= dict(zip(places, _spread(value, slot.shape, f"{kind} '{name}'").tolist()))
+        indices = _indices(layout, name, kind, system)
+        found |= dict(zip(indices, _broadcast(value, slot.shape, f"{kind} '{name}'").tolist()))
     return found
 
 
-def _spread(value: ArrayLike, shape: tuple[int, ...], what: str) -> Array:
+def _broadcast(value: ArrayLike, shape: tuple[int, ...], what: str) -> Array:
     array = np.asarray(value, dtype=np.float64)
     if array.ndim and array.shape != shape:
         raise InputError(
@@ -137,12 +137,12 @@ def _span(layout: Signature, slot: str) -> range:
     return range(*layout.ranges[slot].indices(layout.size))
 
 
-def _parameter_places(system: HybridSystem, free: Sequence[str]) -> list[int]:
+def _parameter_indices(system: HybridSystem, free: Sequence[str]) -> list[int]:
     found: list[int] = []
     tables = parameters_read_by_index(system) if free else frozenset[str]()
     for name in free:
-        places = _places(system.parameters, name, "parameter", system)
-        owner = next(slot for slot in system.parameters.names if places[0] in _span(system.parameters, slot))
+        indices = _indices(system.parameters, name, "parameter", system)
+        owner = next(slot for slot in system.parameters.names if indices[0] in _span(system.parameters, slot))
         if owner in tables:
             raise InputError(
                 f"the free parameter '{name}' is part of a table that is read by index",
@@ -150,7 +150,7 @@ def _parameter_places(system: HybridSystem, free: Sequence[str]) -> list[int]:
                 allowed="parameters outside such tables",
                 fix="free the input of the table, or a gain after it",
             )
-        found += places
+        found += indices
     return found
 
 
@@ -162,11 +162,11 @@ def _targets(system: HybridSystem, outputs: Values) -> tuple[list[int], list[flo
         path = system.aliases.get(name, name)
         if path not in layout.ranges:
             raise UnknownNameError("signal", name, [*layout.names, *system.aliases], where=system.name)
-        wanted = _spread(value, layout[path].shape, f"signal '{name}'").tolist()
-        places = range(*layout.ranges[path].indices(layout.size))
-        kept = [(place, target) for place, target in zip(places, wanted) if not np.isnan(target)]
-        rows += [place for place, _ in kept]
-        targets += [target for _, target in kept]
+        required = _broadcast(value, layout[path].shape, f"signal '{name}'").tolist()
+        indices = range(*layout.ranges[path].indices(layout.size))
+        given = [(index, target) for index, target in zip(indices, required) if not np.isnan(target)]
+        rows += [index for index, _ in given]
+        targets += [target for _, target in given]
     return rows, targets
 
 
@@ -176,7 +176,7 @@ def _bounds(
     """The bounds by the name of every scalar."""
     found: dict[str, tuple[float, float]] = {}
     for name, (low, high) in bounds.items():
-        place = _state_or_parameter(system, name)
+        layout, slot = _state_or_parameter(system, name)
         if not low <= high:
             raise InputError(
                 f"the bounds of '{name}' are {low:g} and {high:g}",
@@ -184,7 +184,6 @@ def _bounds(
                 fix="swap them",
                 where=system.name,
             )
-        layout, slot = place
         found |= dict.fromkeys(layout[slot].elements, (float(low), float(high)))
     return found
 

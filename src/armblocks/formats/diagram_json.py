@@ -20,6 +20,9 @@ A diagram may declare parameters, its ``mask``; a block's ``formulas`` of them a
 their values are not written. The values of mask parameters are among the parameters of the subsystem block,
 for the outermost diagram under ``parameters`` of the document.
 
+A block that takes no part in the model has ``"commented": "out"`` or ``"through"``, see
+:mod:`armblocks.diagram.comments`.
+
 A block that is linked to an entry of a library has ``library`` instead of ``diagram``: see
 :mod:`armblocks.formats.subsystem_libraries`.
 

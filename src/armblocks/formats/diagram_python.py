@@ -85,7 +85,7 @@ class _Listing:
         added: set[str] = set()
         late = _late(diagram, order)
         used = {wire.source.block for wire in diagram.connections} | {wire.target.block for wire in late}
-        used |= {ref.block for ref in diagram.logged}
+        used |= {ref.block for ref in (*diagram.logged, *diagram.signal_names)} | set(diagram.commented)
         before: list[str] = []
         for name in order:
             block = diagram.blocks[name]
@@ -98,6 +98,11 @@ class _Listing:
             source = _end(diagram, wire.source, names)
             written.append(f'{builder}.connect({source}, {names[wire.target.block]}["{wire.target.port}"])')
         written += [f"{builder}.log({_end(diagram, ref, names)})" for ref in diagram.logged]
+        written += [
+            f"{builder}.name_signal({_end(diagram, ref, names)}, {_text(name)})"
+            for ref, name in diagram.signal_names.items()
+        ]
+        written += [f"{builder}.comment_{how}({names[name]})" for name, how in diagram.commented.items()]
         return [*before, *written]
 
     def _construction(self, block: Block, name: str, before: list[str]) -> str:
@@ -194,10 +199,10 @@ def _reading_order(diagram: Diagram) -> list[str]:
         while stack:
             name, ports = stack[-1]
             for port in ports:
-                source = diagram.drivers[PortRef(name, port)].block
-                if source not in begun:
-                    begun.add(source)
-                    stack.append((source, iter(inputs[source])))
+                driver = diagram.drivers.get(PortRef(name, port))
+                if driver is not None and driver.block not in begun:
+                    begun.add(driver.block)
+                    stack.append((driver.block, iter(inputs[driver.block])))
                     break
             else:
                 order[name] = None
@@ -217,8 +222,8 @@ def _sources(diagram: Diagram, name: str, added: set[str], names: Mapping[str, s
     arguments: list[str] = []
     in_order = True
     for port in diagram.blocks[name].input_ports():
-        source = diagram.drivers[PortRef(name, port.name)]
-        if source.block not in added:
+        source = diagram.drivers.get(PortRef(name, port.name))
+        if source is None or source.block not in added:
             in_order = False
             continue
         text = _end(diagram, source, names)

@@ -9,6 +9,7 @@ from typing import cast
 from armblocks.diagram import (
     Block,
     BlockLibrary,
+    Comment,
     Diagram,
     DiagramBuilder,
     Parameter,
@@ -27,7 +28,17 @@ from armblocks.formats.robot_references import RobotReader
 from armblocks.formats.subsystem_libraries import Libraries
 from armblocks.formats.unknown_members import Extras, split_extras
 
-INNER_KEYS = ("name", "description", "mask", "blocks", "connections", "logged", "layout", "settings")
+INNER_KEYS = (
+    "name",
+    "description",
+    "mask",
+    "blocks",
+    "connections",
+    "logged",
+    "signal_names",
+    "layout",
+    "settings",
+)
 """The keys of a diagram inside another one."""
 _SETTINGS = {field.name: field.default for field in dataclasses.fields(SimulationOptions)}
 
@@ -66,13 +77,18 @@ class DiagramReader:
         for key, block in blocks.items():
             with located(block_nodes[key]):
                 builder.add(key, block)
+                if "commented" in block_nodes[key].members():
+                    builder.comment(key, _comment(block_nodes[key].members()["commented"]))
         for entry in members["connections"].elements() if "connections" in members else []:
             source, target = connection_from(entry)
             with located(entry):
                 builder.connect(source, target)
         for entry in members["logged"].elements() if "logged" in members else []:
             with located(entry):
-                builder.log(_port(entry))
+                builder.log(_port(entry, entry.text()))
+        for key, entry in (members["signal_names"].members() if "signal_names" in members else {}).items():
+            with located(entry):
+                builder.name_signal(_port(entry, key), entry.text())
         for key, place in layout.places.items():
             builder.place(key, **dataclasses.asdict(place))
         for wire, bends in layout.bends.items():
@@ -91,7 +107,7 @@ class DiagramReader:
         inside = [name for name, rule in rules.items() if is_diagram(rule)]
         linked = ("library",) if inside else ()
         members = split_extras(
-            node, ("type", "parameters", "formulas", *inside, *linked), extras, "blocks", key
+            node, ("type", "parameters", "formulas", "commented", *inside, *linked), extras, "blocks", key
         )
         values: dict[str, object] = {
             name: self.diagram(members[name], INNER_KEYS, key) for name in inside if name in members
@@ -168,8 +184,16 @@ def _settings(node: Node, extras: Extras) -> SimulationOptions:
     return dataclasses.replace(SimulationOptions(), **values)  # pyright: ignore[reportArgumentType]
 
 
-def _port(node: Node) -> PortRef:
-    block, _, port = node.text().rpartition("/")
+def _comment(node: Node) -> Comment:
+    match node.text():
+        case "out" | "through" as comment:
+            return comment
+        case other:
+            raise node.error(f"'{other[:80]}' is not a comment", allowed='"out" or "through"')
+
+
+def _port(node: Node, text: str) -> PortRef:
+    block, _, port = text.rpartition("/")
     if not block or not port:
-        raise node.error(f"'{node.text()[:80]}' is not an output", allowed='"block/output"')
+        raise node.error(f"'{text[:80]}' is not an output", allowed='"block/output"')
     return PortRef(block, port)

@@ -45,11 +45,16 @@ class DiagramWriter:
                 else {}
             ),
             "blocks": {
-                key: {**members_of(block_extras.get(key)), **self._block(block)}
+                key: {**members_of(block_extras.get(key)), **self._block(block), **_commented(key, diagram)}
                 for key, block in diagram.blocks.items()
             },
             "connections": [str(wire) for wire in diagram.connections],
             **({"logged": [str(ref) for ref in diagram.logged]} if diagram.logged else {}),
+            **(
+                {"signal_names": {str(ref): name for ref, name in diagram.signal_names.items()}}
+                if diagram.signal_names
+                else {}
+            ),
             "layout": layout_to(diagram, layout_extras),
             "settings": {**extras.get("settings", {}), **settings},
         }
@@ -89,3 +94,7 @@ class DiagramWriter:
 
     def _value(self, rule: Parameter, value: object) -> object:
         return parameter_to(rule, value, self.robots)
+
+
+def _commented(name: str, diagram: Diagram) -> dict[str, object]:
+    return {"commented": diagram.commented[name]} if name in diagram.commented else {}

@@ -24,8 +24,8 @@ ReadValue = Callable[[Parameter, Node], object]
 
 def mask_parameter_to(rule: Parameter, write: WriteValue) -> dict[str, object]:
     """A parameter as plain values, without fields that have their defaults."""
-    said = {key: value for key in _SAID if (value := getattr(rule, key)) != getattr(_PLAIN, key)}
-    return {"name": rule.name, "kind": rule.kind.value, "default": write(rule, rule.default), **said}
+    message = {key: value for key in _SAID if (value := getattr(rule, key)) != getattr(_PLAIN, key)}
+    return {"name": rule.name, "kind": rule.kind.value, "default": write(rule, rule.default), **message}
 
 
 def mask_parameter_from(node: Node, read: ReadValue) -> Parameter:

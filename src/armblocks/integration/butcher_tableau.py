@@ -15,7 +15,7 @@ CONSISTENCY = 1e-12
 
 @dataclass(frozen=True, kw_only=True)
 class ButcherTableau:
-    """One explicit Runge-Kutta method with the polynomial that gives its values between the steps.
+    """An explicit Runge-Kutta method and its dense output, the polynomial for values within a step.
 
     One step of size ``h`` from ``(t, x)`` to ``(t + h, x_new)``, with ``s = len(nodes)`` stages::
 
@@ -27,10 +27,10 @@ class ButcherTableau:
 
     An adaptive method also has ``error`` (s + 1 weights): the estimate ``h * sum_j error[j] K[j]`` is of
     order ``error_order``, so the step scales with ``norm^(-1 / (error_order + 1))``. Where
-    ``stretched_error`` is given, both estimates are combined as in DOP853: ``e = h |e5|^2 / sqrt(|e5|^2 +
+    ``second_error`` is given, both estimates are combined as in DOP853: ``e = h |e5|^2 / sqrt(|e5|^2 +
     0.01 |e3|^2)``.
 
-    ``order`` is that of the steps, ``dense_order`` that of the values between them (global, both).
+    ``order`` is the global order of the steps, ``dense_order`` that of the dense output.
     """
 
     name: str
@@ -45,7 +45,7 @@ class ButcherTableau:
     aliases: tuple[str, ...] = ()
     error: Row | None = None
     error_order: int = 0
-    stretched_error: Row | None = None
+    second_error: Row | None = None
     extra_nodes: Row = ()
     extra_matrix: tuple[Row, ...] = ()
 
@@ -55,7 +55,7 @@ class ButcherTableau:
             "matrix": [len(row) for row in self.matrix] == list(range(s)),
             "weights": len(self.weights) == s,
             "error": self.error is None or len(self.error) == s + 1,
-            "stretched_error": self.stretched_error is None or len(self.stretched_error) == s + 1,
+            "second_error": self.second_error is None or len(self.second_error) == s + 1,
             "extra_matrix": [len(row) for row in self.extra_matrix]
             == [s + 1 + k for k in range(len(self.extra_nodes))],
             "dense": len(self.dense) == s + 1 + len(self.extra_nodes)
@@ -158,7 +158,7 @@ class ButcherTableau:
                 self.dense,
                 self.error,
                 self.error_order,
-                self.stretched_error,
+                self.second_error,
                 self.extra_nodes,
                 self.extra_matrix,
             )
@@ -174,6 +174,6 @@ def hermite_dense(weights: Row) -> tuple[Row, ...]:
     """
     s = len(weights)
     rows = [[0.0, 3.0 * w, -2.0 * w] for w in (*weights, 0.0)]
-    for j, slope in ((0, (1.0, -2.0, 1.0)), (s, (0.0, -1.0, 1.0))):
-        rows[j] = [a + b for a, b in zip(rows[j], slope)]
+    for j, derivative in ((0, (1.0, -2.0, 1.0)), (s, (0.0, -1.0, 1.0))):
+        rows[j] = [a + b for a, b in zip(rows[j], derivative)]
     return tuple(tuple(row) for row in rows)

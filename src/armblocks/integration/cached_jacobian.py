@@ -29,38 +29,38 @@ class CachedJacobian:
 def cached_jacobian(derivative: str, residual: str, trace: Callable[[], HybridSystem]) -> CachedJacobian:
     """The Jacobian of the flow whose tapes have these digests.
 
-    The system is traced, and CasADi loaded, only where the disk cache lacks the result.
+    The system is traced, and CasADi is loaded, only if the result is not in the disk cache.
     """
     name = cache.object_name(("flow_jacobian", derivative, residual))
     stored = cache.load(name)
     if stored is not None:
         try:
-            kept = json.loads(stored)
+            entry = json.loads(stored)
             pattern = JacobianPattern(
-                states=int(kept["states"]),
-                size=int(kept["size"]),
-                rows=tuple(kept["rows"]),
-                columns=tuple(kept["columns"]),
+                states=int(entry["states"]),
+                size=int(entry["size"]),
+                rows=tuple(entry["rows"]),
+                columns=tuple(entry["columns"]),
             )
-            digest = str(kept["digest"])
+            digest = str(entry["digest"])
             tape = lambda: cached_tape(digest, lambda: _traced(trace).function)  # noqa: E731
             return CachedJacobian(pattern=pattern, digest=digest, tape=tape)
         except (ValueError, KeyError, TypeError):
             pass  # a cache entry of another version: compute it again
     traced = _traced(trace)
-    made = tape_of(traced.function)
+    new_tape = tape_of(traced.function)
     states, size = (slot.size for slot in (traced.function.inputs["x"], traced.function.outputs["T"]))
     pattern = JacobianPattern(states=states, size=size, rows=traced.rows, columns=traced.columns)
-    store_tape(made)
+    store_tape(new_tape)
     record = {
         "states": states,
         "size": size,
         "rows": pattern.rows,
         "columns": pattern.columns,
-        "digest": made.digest,
+        "digest": new_tape.digest,
     }
     cache.store(name, json.dumps(record).encode())
-    return CachedJacobian(pattern=pattern, digest=made.digest, tape=lambda: made)
+    return CachedJacobian(pattern=pattern, digest=new_tape.digest, tape=lambda: new_tape)
 
 
 def _traced(trace: Callable[[], HybridSystem]) -> FlowJacobian:

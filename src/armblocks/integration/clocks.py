@@ -24,7 +24,7 @@ class Clocks:
         self.count = len(frame.sizes.clocks)
         self.numbers = frame.counts.after(Count.END)
         """The number of the next tick of every clock."""
-        self.ticking = frame.vector(frame.places.ticking)
+        self.ticking = frame.vector(frame.workspace.ticking)
 
     def next_tick(self, clock: int) -> Real:
         """The time of the next tick of a clock."""
@@ -62,22 +62,22 @@ class Clocks:
 
     def update(self) -> None:
         """Set ``z`` to the result of ``update`` for the marked clocks."""
-        f, places = self.frame, self.frame.places
+        f, workspace = self.frame, self.frame.workspace
         x, z, unknowns, new_z = (
-            f.vector(place) for place in (places.x, places.z, places.trial_w, places.new_z)
+            f.vector(place) for place in (workspace.x, workspace.z, workspace.trial_w, workspace.new_z)
         )
         t = self.point.memory
         self.evaluation.solve(t, x)
         f.r.call(system_functions.update, t, x, z, unknowns, f.p, self.ticking, new_z)
-        f.copy(places.new_z, places.z, f.sizes.discrete)
+        f.copy(workspace.new_z, workspace.z, f.sizes.discrete)
 
-    def halt(self, time: Real) -> None:
-        """Return before the ticks if ``time`` has reached the time at which the caller wants control."""
+    def pause_before_ticks(self, time: Real) -> None:
+        """Return before the ticks at ``time`` if the caller requested a pause at this time or earlier."""
         if not self.count:
             return
         f = self.frame
         with f.r.when(time * SAME_ABOVE >= f.reals[Scalar.HALT]):
             self.point.value = time
-            self.evaluation.solve(self.point.memory, f.vector(f.places.x))
+            self.evaluation.solve(self.point.memory, f.vector(f.workspace.x))
             self.evaluation.accept_unknowns()
             f.leave(Status.PAUSED)

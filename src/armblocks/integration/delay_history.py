@@ -23,54 +23,54 @@ from armblocks.routines.routine import Program, Routine
 from armblocks.routines.values import Boolean, Integer, Real
 
 SAME_ABOVE = 1.0 + 2.0**-50
-MOST_PIECES = 256
-"""Maximum number of pieces of one step. Toward the singularity of a square root the length of the pieces
-shrinks by up to 48 powers of two, and it grows again behind it."""
-ROWS_OF_A_STEP = 2 * MOST_PIECES + 6
+MOST_SUBINTERVALS = 256
+"""Maximum number of subintervals of one step. The subintervals become shorter toward the singularity of a
+square root, by up to 48 powers of two, and longer again after it."""
+ROWS_OF_A_STEP = 2 * MOST_SUBINTERVALS + 6
 """Maximum number of rows that one step adds, including events at its end and the row for comparison."""
-NO_SLOPE = sys.float_info.max
+NO_DERIVATIVE = sys.float_info.max
 """Marks a derivative that is not finite."""
 
 
 class DelayHistory:
     """The functions of a program for the delayed signals of a system, and the table that they share.
 
-    All have ``reals`` and ``counts``, the arrays of the run; ``t``, ``x`` are a point whose unknowns are
-    solved.
+    All functions take ``reals`` and ``counts``, the arrays of the run. ``t`` and ``x`` are a point at which
+    the implicit equations are solved.
     """
 
     def __init__(self, program: Program, workspace: Workspace, sizes: LoopSizes) -> None:
-        self.places = workspace
+        self.workspace = workspace
         self.lines = sizes.delays
         self.count = len(sizes.delays)
         self.first = int(Count.END) + len(sizes.clocks)
         self.read = program.define(self._read, "read_history")
         self.write = program.define(self._write, "write_history")
         self.write_change = program.define(self._write_change, "write_change")
-        self.strays = program.define(self._strays, "strays")
+        self.deviates = program.define(self._deviates, "deviates")
         self.pass_jumps = program.define(self._pass_jumps, "pass_jumps")
         self.next_jump = program.define(self._next_jump, "next_jump")
-        self.make_room = program.define(self._make_room, "make_room")
+        self.ensure_capacity = program.define(self._ensure_capacity, "ensure_capacity")
 
     # The table.
 
     def entry(self, row: Integer, column: Integer | int) -> Integer:
         """The index of a table entry in ``reals``."""
-        return row * self.places.history_width + self.places.history + column
+        return row * self.workspace.history_width + self.workspace.history + column
 
     def time(self, reals: Reals, row: Integer) -> Real:
         """The time of a row."""
         return reals[self.entry(row, 0)]
 
     def middle(self, reals: Reals, row: Integer) -> Real:
-        """Whether a row is the middle of a piece: 1, else 0."""
+        """Whether a row is the middle of a subinterval: 1, else 0."""
         return reals[self.entry(row, 1)]
 
     def value(self, reals: Reals, row: Integer, line: Integer | int) -> Real:
         """The signal of a line in a row."""
         return reals[self.entry(row, line + 2)]
 
-    def slope(self, reals: Reals, row: Integer, line: Integer | int) -> Real:
+    def derivative(self, reals: Reals, row: Integer, line: Integer | int) -> Real:
         """The derivative of the signal of a line in a row, by the time."""
         return reals[self.entry(row, line + (2 + self.count))]
 
@@ -86,16 +86,16 @@ class DelayHistory:
 
     def _read(self, r: Routine, t: Reals, x: Reals, reals: Reals, counts: Integers, p: Reals) -> None:
         """The delayed values at a point, into ``z``."""
-        places = self.places
-        z, unknowns, taus = (reals.after(place) for place in (places.z, places.trial_w, places.taus))
+        workspace = self.workspace
+        z, unknowns, taus = (reals.after(place) for place in (workspace.z, workspace.trial_w, workspace.taus))
         if not all(line.fixed for line in self.lines):
             r.call(system_functions.delay_times, t, x, z, unknowns, p, taus)
         now = t[0]
         for k, line in enumerate(self.lines):
             instant = now - taus[k]
-            value, slope = self.at_instant(r, reals, counts, instant, k)
+            value, derivative = self.at_instant(r, reals, counts, instant, k)
             z[line.value] = value
-            z[line.slope] = slope
+            z[line.derivative] = derivative
 
     def at_instant(
         self, r: Routine, reals: Reals, counts: Integers, instant: Real, line: int
@@ -116,25 +116,25 @@ class DelayHistory:
                 low.value = half
             with r.otherwise():
                 high.value = half - 1
-        value, slope = r.real(0.0), r.real(0.0)
+        value, derivative = r.real(0.0), r.real(0.0)
         i = low.value
         before = instant < self.time(reals, i)
         with r.when(before | (i >= last)):
             # A time after the last row differs from it by rounding only: extrapolate linearly. Before the
-            # first readable row the signal has the value of that row, because a jump or bend may lie between
-            # them.
-            past = select(before, 0.0, instant - self.time(reals, i))
-            known = self.slope(reals, i, line)
-            known = select(is_slope(known), known, 0.0)
-            value.value = fma(known, past, self.value(reals, i, line))
-            slope.value = self.slope(reals, i, line)
+            # first readable row the signal has the value of that row, because the signal or its derivative
+            # may jump between them.
+            excess = select(before, 0.0, instant - self.time(reals, i))
+            known = self.derivative(reals, i, line)
+            known = select(is_derivative(known), known, 0.0)
+            value.value = fma(known, excess, self.value(reals, i, line))
+            derivative.value = self.derivative(reals, i, line)
         with r.otherwise():
             centre = i + 1 - self.middle(reals, i).to_integer()
             rows = centre - 1, centre, centre + 1
             H = 0.5 * (self.time(reals, rows[2]) - self.time(reals, rows[0]))
             theta = (instant - self.time(reals, centre)) / H
-            self.quintic(reals, theta, H, line, rows, value, slope)
-        return value.value, slope.value
+            self.quintic(reals, theta, H, line, rows, value, derivative)
+        return value.value, derivative.value
 
     def quintic(
         self,
@@ -144,7 +144,7 @@ class DelayHistory:
         line: Integer | int,
         rows: tuple[Integer, Integer, Integer],
         value: RealVariable,
-        slope: RealVariable,
+        derivative: RealVariable,
     ) -> None:
         """The quintic Hermite interpolant through values and derivatives at -1, 0, 1, at ``s``; and its
         derivative."""
@@ -158,44 +158,44 @@ class DelayHistory:
         total: Real | float = 0.0
         rate: Real | float = 0.0
         for place, (row, u, parts) in enumerate(zip(rows, values, bases)):
-            of_value, of_slope, rate_of_value, rate_of_slope = parts
-            known = self.slope(reals, row, line)
-            of_parabola = parabola_slope(values[0], values[2], place)
-            du = select(is_slope(known), H * known, of_parabola)
-            total = fma(of_value, u, fma(of_slope, du, total))
-            rate = fma(rate_of_value, u, fma(rate_of_slope, du, rate))
+            of_value, of_derivative, rate_of_value, rate_of_derivative = parts
+            known = self.derivative(reals, row, line)
+            of_parabola = parabola_derivative(values[0], values[2], place)
+            du = select(is_derivative(known), H * known, of_parabola)
+            total = fma(of_value, u, fma(of_derivative, du, total))
+            rate = fma(rate_of_value, u, fma(rate_of_derivative, du, rate))
         value.value = centre + total
-        slope.value = rate / H
+        derivative.value = rate / H
 
     # Writing.
 
-    def fill(
+    def write_row(
         self, r: Routine, t: Reals, x: Reals, reals: Reals, counts: Integers, p: Reals, middle: Real | float
     ) -> Integer:
         """Write the row after the last one without increasing the number of rows; return its index."""
         rows = counts[Count.HISTORY_ROWS]
-        z, unknowns = (reals.after(place) for place in (self.places.z, self.places.trial_w))
+        z, unknowns = (reals.after(place) for place in (self.workspace.z, self.workspace.trial_w))
         reals[self.entry(rows, 0)] = t[0]
         reals[self.entry(rows, 1)] = middle
-        values, slopes = (reals.after(self.entry(rows, first)) for first in (2, 2 + self.count))
-        r.call(system_functions.delay_inputs, t, x, z, unknowns, p, values, slopes)
+        values, derivatives = (reals.after(self.entry(rows, first)) for first in (2, 2 + self.count))
+        r.call(system_functions.delay_inputs, t, x, z, unknowns, p, values, derivatives)
         for k in r.each(self.count):
-            slope = slopes[k]
-            slopes[k] = select(is_slope(slope), slope, NO_SLOPE)
+            derivative = derivatives[k]
+            derivatives[k] = select(is_derivative(derivative), derivative, NO_DERIVATIVE)
         return rows
 
     def _write(
         self, r: Routine, t: Reals, x: Reals, reals: Reals, counts: Integers, p: Reals, middle: Real
     ) -> None:
-        """Add a row for a point, which is the ``middle`` of a piece (1) or not (0)."""
-        self.fill(r, t, x, reals, counts, p, middle)
+        """Add a row for a point, which is the ``middle`` of a subinterval (1) or not (0)."""
+        self.write_row(r, t, x, reals, counts, p, middle)
         counts[Count.HISTORY_ROWS] = counts[Count.HISTORY_ROWS] + 1
 
     def _write_change(
         self, r: Routine, t: Reals, x: Reals, reals: Reals, counts: Integers, p: Reals, middle: Real
     ) -> None:
         """Add a row for a point only if it differs from the last one."""
-        rows = self.fill(r, t, x, reals, counts, p, middle)
+        rows = self.write_row(r, t, x, reals, counts, p, middle)
         before = rows - 1
         same = r.real(1.0)
         for column in r.each(2 * self.count):
@@ -207,7 +207,7 @@ class DelayHistory:
             reals[self.entry(rows, 0)] = self.time(reals, before)
             counts[Count.HISTORY_ROWS] = counts[Count.HISTORY_ROWS] + 1
 
-    def _strays(
+    def _deviates(
         self,
         r: Routine,
         t: Reals,
@@ -220,19 +220,19 @@ class DelayHistory:
     ) -> Boolean:
         """Whether the quintic through the last three rows, at ``s`` (-1 to 1), deviates from a signal at the
         point by more than ``factor`` times the tolerances."""
-        rows = self.fill(r, t, x, reals, counts, p, 0.0)
+        rows = self.write_row(r, t, x, reals, counts, p, 0.0)
         start, centre, end = (rows - back for back in (3, 2, 1))
         H = 0.5 * (self.time(reals, end) - self.time(reals, start))
         rtol, atol = (reals[place] for place in (Scalar.RTOL, Scalar.ATOL))
-        value, slope = r.real(0.0), r.real(0.0)
+        value, derivative = r.real(0.0), r.real(0.0)
         found = r.boolean(False)
         for line in r.each(self.count):
-            self.quintic(reals, s, H, line, (start, centre, end), value, slope)
+            self.quintic(reals, s, H, line, (start, centre, end), value, derivative)
             exact = self.value(reals, rows, line)
-            off = abs(value.value - exact)
+            deviation = abs(value.value - exact)
             tolerance = factor * fma(abs(exact), rtol, atol)
-            beyond = off > tolerance
-            found.value = found.value | beyond
+            exceeded = deviation > tolerance
+            found.value = found.value | exceeded
         return found.value
 
     # Jumps of signals.
@@ -247,7 +247,7 @@ class DelayHistory:
             i = r.integer(0)
             with r.part() as search, r.loop():
                 with r.when(last_rows[k] >= 0):
-                    tau = reals[self.places.taus + k]
+                    tau = reals[self.workspace.taus + k]
                     search.leave_unless(self.time(reals, last_rows[k]) + tau <= until)
                     first_rows[k] = last_rows[k] + 1
                 last_rows[k] = -1
@@ -257,10 +257,10 @@ class DelayHistory:
                     after = here + 1
                     search.leave_unless(after < counts[Count.HISTORY_ROWS])
                     i.value = after
-                    together = self.time(reals, here) == self.time(reals, after)
+                    same_time = self.time(reals, here) == self.time(reals, after)
                     jumps = self.value(reals, here, k) != self.value(reals, after, k)
-                    bends = self.slope(reals, here, k) != self.slope(reals, after, k)
-                    with r.unless(together & (jumps | bends)):
+                    derivative_jumps = self.derivative(reals, here, k) != self.derivative(reals, after, k)
+                    with r.unless(same_time & (jumps | derivative_jumps)):
                         rows.again()
                 last_rows[k] = here
 
@@ -273,20 +273,20 @@ class DelayHistory:
             last = self.last_rows(counts)[k]
             known = last >= 0
             row = select(known, last, 0)
-            arrival = self.time(reals, row) + reals[self.places.taus + k]
+            arrival = self.time(reals, row) + reals[self.workspace.taus + k]
             soonest = select(known & (arrival < soonest), arrival, soonest)
         return soonest
 
-    # Room.
+    # Memory.
 
-    def _make_room(self, r: Routine, now: Real, reals: Reals, counts: Integers) -> Boolean:
-        """Drop rows that no line can read any more; return whether there is memory for another step."""
-        places = self.places
-        capacity = counts[Count.HISTORY_ROOM]
+    def _ensure_capacity(self, r: Routine, now: Real, reals: Reals, counts: Integers) -> Boolean:
+        """Drop rows that no line reads any more; return whether there is memory for another step."""
+        workspace = self.workspace
+        capacity = counts[Count.HISTORY_CAPACITY]
         needed = counts[Count.HISTORY_ROWS] + ROWS_OF_A_STEP
         with r.when(needed <= capacity):
             r.return_(r.constant_boolean(True))
-        oldest = now - reals[places.longest]
+        oldest = now - reals[workspace.longest]
         # Keep the rows from the last end of a step that is earlier than all readable times.
         keep, i = r.integer(0), r.integer(0)
         with r.loop() as search:
@@ -298,31 +298,31 @@ class DelayHistory:
             at_end = self.middle(reals, safe) == 0.0
             keep.value = select(at_end, here, keep.value)
             i.value = i.value + 1
-        gone = keep.value
-        left = counts[Count.HISTORY_ROWS] - gone
+        dropped = keep.value
+        left = counts[Count.HISTORY_ROWS] - dropped
         counts[Count.HISTORY_ROWS] = left
-        total, shift = left * places.history_width, gone * places.history_width
+        total, shift = left * workspace.history_width, dropped * workspace.history_width
         for n in r.range(0, total):
-            target = n + places.history
+            target = n + workspace.history
             reals[target] = reals[target + shift]
         for k in range(self.count):
             first, last = self.first_rows(counts), self.last_rows(counts)
             # ``first`` becomes 0 if its row was dropped. -1 in ``last`` means the newest row and stays.
             for rows, unknown in ((first, 0), (last, last[k])):
-                shifted = rows[k] - gone
+                shifted = rows[k] - dropped
                 rows[k] = select(shifted >= 0, shifted, unknown)
-        # Request twice the memory if less than half is free, else it would soon be full again.
+        # Also request more memory if less than half is free, so that requests are rare.
         enough = left * 2 <= capacity
         fits = left + ROWS_OF_A_STEP <= capacity
         return enough & fits
 
 
-def is_slope(slope: Real) -> Boolean:
-    """Whether an entry of the table is a finite derivative, and not ``NO_SLOPE``."""
-    return abs(slope) < NO_SLOPE
+def is_derivative(derivative: Real) -> Boolean:
+    """Whether an entry of the table is a finite derivative, and not ``NO_DERIVATIVE``."""
+    return abs(derivative) < NO_DERIVATIVE
 
 
-def parabola_slope(before: Real, after: Real, place: int) -> Real:
+def parabola_derivative(before: Real, after: Real, place: int) -> Real:
     """Derivative at -1, 0 or 1 (``place`` 0, 1, 2) of the parabola with values at -1 and 1, and 0 at 0."""
     of_before, of_after = ((-1.5, -0.5), (-0.5, 0.5), (0.5, 1.5))[place]
     return fma(of_before, before, of_after * after)
@@ -342,9 +342,9 @@ def end_basis(s: Real, side: float) -> tuple[Real, Real, Real, Real]:
     common = 0.25 * s * up
     outer = common * (s * up)
     of_value = outer * fma(-3.0, s, 4.0)
-    of_slope = outer * (s - 1.0)
+    of_derivative = outer * (s - 1.0)
     down = 1.0 - s
     rate_of_value = common * (down * fma(15.0, s, 8.0))
     inner = fma(fma(5.0, s, -1.0), s, -2.0)
-    rate_of_slope = common * inner
-    return of_value, side * of_slope, side * rate_of_value, rate_of_slope
+    rate_of_derivative = common * inner
+    return of_value, side * of_derivative, side * rate_of_value, rate_of_derivative

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from armblocks.integration import system_functions
-from armblocks.integration.delay_history import MOST_PIECES, DelayHistory
+from armblocks.integration.delay_history import MOST_SUBINTERVALS, DelayHistory
 from armblocks.integration.evaluation import Evaluation
 from armblocks.integration.frame import Frame
 from armblocks.integration.method import Method
@@ -38,8 +38,8 @@ class Delays:
 
     def bound_steps(self) -> None:
         """Limit steps to the shortest delay, so that all delayed values are in the history."""
-        f, places, n = self.frame, self.frame.places, len(self.frame.sizes.delays)
-        bounds, taus = f.vector(places.bounds), f.vector(places.taus)
+        f, workspace, n = self.frame, self.frame.workspace, len(self.frame.sizes.delays)
+        bounds, taus = f.vector(workspace.bounds), f.vector(workspace.taus)
         f.r.call(system_functions.delay_bounds, f.p, bounds)
         shortest, longest = f.max_step, f.r.constant(0.0)
         for k in range(n):
@@ -47,13 +47,13 @@ class Delays:
             longest = maximum(longest, bounds[n + k])
             taus[k] = bounds[k]
         f.max_step = shortest
-        f.reals[places.longest] = longest
+        f.reals[workspace.longest] = longest
 
-    def make_room(self) -> None:
-        """Return where the history has no memory for another step."""
+    def ensure_capacity(self) -> None:
+        """Return from the loop if the history has no memory for another step."""
         f = self.frame
-        room = f.r.call(self.history.make_room, f.time.value, f.reals, f.counts)
-        f.leave_unless(room, Status.HISTORY_FULL)
+        enough = f.r.call(self.history.ensure_capacity, f.time.value, f.reals, f.counts)
+        f.leave_unless(enough, Status.HISTORY_FULL)
 
     def next_jump(self) -> Real:
         """The next time at which a delayed signal jumps."""
@@ -66,61 +66,61 @@ class Delays:
     def write_change(self, time: Real) -> None:
         """Store the signals after an event or tick in the history, if they have changed."""
         f = self.frame
-        t, x = self.point.memory, f.vector(f.places.x)
+        t, x = self.point.memory, f.vector(f.workspace.x)
         self.point.value = time
         self.evaluation.solve(t, x)
         f.r.call(self.history.write_change, t, x, f.reals, f.counts, f.p, f.r.constant(0.0))
         self.pass_jumps(time)
 
     def write_step(self, time: Real, new_time: Real, h: Real) -> None:
-        """Store an accepted step in the history, in pieces with a middle and an end.
+        """Store an accepted step in the history, in subintervals with a middle and an end.
 
-        A piece is the whole step, half of a step for methods of high order, or shorter where the quintic
-        deviates from a signal. After half of the maximum number of pieces the tolerance grows with each
-        piece, so that the rest of the step needs no more than the other half.
+        A subinterval is the whole step, half of a step for methods of high order, or shorter where the
+        quintic deviates from a signal. After half of the maximum number of subintervals, the tolerance is
+        increased with each one. The rest of the step then needs at most the other half.
         """
         f, r, history = self.frame, self.frame.r, self.history
         self.records.extra_stages_once(time, h)
         before = f.counts[Count.HISTORY_ROWS]
-        most, many = (before + 2 * count for count in (MOST_PIECES - 1, MOST_PIECES // 2))
+        most, many = (before + 2 * count for count in (MOST_SUBINTERVALS - 1, MOST_SUBINTERVALS // 2))
         factor = r.real(1.0)
         begin, end = r.real(time), r.real(new_time)
         half = fma(0.5, new_time - time, time)
         end.value = half if self.method.tableau.order >= HIGH_ORDER else new_time
-        t, x = self.point.memory, f.vector(f.places.new_x)
-        with r.loop() as pieces:
+        t, x = self.point.memory, f.vector(f.workspace.new_x)
+        with r.loop() as subintervals:
             a, b = begin.value, end.value
             length, known = b - a, f.counts[Count.HISTORY_ROWS]
-            # Beyond the maximum number, the rest of the step is one piece.
+            # After the maximum number, the rest of the step is one subinterval.
             last = known >= most
             b = select(last, new_time, b)
             for part, mark in ((0.5, 1.0), (1.0, 0.0)):
                 self._point(part, a, b, time, new_time, h)
                 r.call(history.write, t, x, f.reals, f.counts, f.p, r.constant(mark))
-            pieces.leave_when(last)
-            strays: Boolean | None = None
+            subintervals.leave_when(last)
+            deviates: Boolean | None = None
             for part in (0.25, 0.75):
                 self._point(part, a, b, time, new_time, h)
                 place = r.constant(2.0 * part - 1.0)
-                found = r.call(history.strays, t, x, f.reals, f.counts, f.p, place, factor.value)
-                strays = found if strays is None else strays | found
-            assert strays is not None
+                found = r.call(history.deviates, t, x, f.reals, f.counts, f.p, place, factor.value)
+                deviates = found if deviates is None else deviates | found
+            assert deviates is not None
             divisible = length > b * 2.0**-48
-            with r.when(strays & divisible):
+            with r.when(deviates & divisible):
                 f.counts[Count.HISTORY_ROWS] = known
                 end.value = fma(0.5, length, a)
-                pieces.again()
+                subintervals.again()
             factor.value = factor.value * select(known >= many, 1.1, 1.0)
             begin.value = b
             reached = fma(2.0, length, b)
             end.value = minimum(reached, new_time)
-            pieces.leave_when(b >= new_time)
+            subintervals.leave_when(b >= new_time)
 
     def _point(self, part: float, a: Real, b: Real, time: Real, new_time: Real, h: Real) -> None:
-        """Write the state at the fraction ``part`` of the piece from ``a`` to ``b`` into ``new_x``, and
+        """Write the state at the fraction ``part`` of the subinterval from ``a`` to ``b`` into ``new_x``, and
         evaluate the system there."""
-        f, places = self.frame, self.frame.places
-        x, y = f.vector(places.new_x), f.vector(places.y)
+        f, workspace = self.frame, self.frame.workspace
+        x, y = f.vector(workspace.new_x), f.vector(workspace.y)
         instant = b if part == 1.0 else fma(part, b - a, a)
         self.method.interpolate(instant, time, h, x)
         if part == 1.0:

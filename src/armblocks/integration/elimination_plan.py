@@ -26,8 +26,8 @@ class JacobianPattern:
 
 @dataclass(frozen=True, kw_only=True)
 class Elimination:
-    """``A = L U`` with the unknowns in the order ``columns[0], columns[1], …``; places are indices in this
-    order.
+    """``A = L U`` with the unknowns in the order ``columns[0], columns[1], …``. A place is an
+    index in this order.
 
     Row ``i`` is equation ``equations[i]``. ``entries[i]`` are pairs of an entry of J and its place in row i.
     ``lower[i]`` and ``upper[i]`` are the places of the entries of L and U in row i without the diagonal, in
@@ -53,7 +53,7 @@ def plan_elimination(pattern: JacobianPattern) -> Elimination:
     An implicit equation is assigned to an unknown by bipartite matching, because its diagonal entry may be
     zero.
     """
-    equation_of = _match(pattern)
+    equation_of = _match_equations(pattern)
     place_of = {equation: place for place, equation in enumerate(equation_of)}
     neighbours: list[set[int]] = [set() for _ in range(pattern.size)]
     by_row: list[list[tuple[int, int]]] = [[] for _ in range(pattern.size)]
@@ -63,7 +63,7 @@ def plan_elimination(pattern: JacobianPattern) -> Elimination:
         if place != column:
             neighbours[place].add(column)
             neighbours[column].add(place)
-    order = _least_degree(neighbours)
+    order = _minimum_degree_order(neighbours)
     position = {place: i for i, place in enumerate(order)}
     entries = [tuple((entry, position[column]) for entry, column in by_row[place]) for place in order]
     lower: list[tuple[int, ...]] = []
@@ -92,7 +92,7 @@ def plan_elimination(pattern: JacobianPattern) -> Elimination:
     )
 
 
-def _match(pattern: JacobianPattern) -> list[int]:
+def _match_equations(pattern: JacobianPattern) -> list[int]:
     """The equation of every unknown: its derivative for a state, else an implicit one by augmenting paths.
 
     Where no complete matching exists, the remaining unknowns get arbitrary equations. The matrix is then
@@ -127,7 +127,7 @@ def _match(pattern: JacobianPattern) -> list[int]:
     return [left.pop() if equation < 0 else equation for equation in equation_of]
 
 
-def _least_degree(neighbours: Sequence[set[int]]) -> list[int]:
+def _minimum_degree_order(neighbours: Sequence[set[int]]) -> list[int]:
     """Repeatedly eliminate an unknown with the fewest neighbours, and connect its neighbours to each
     other."""
     around = [set(near) for near in neighbours]

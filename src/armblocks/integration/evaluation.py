@@ -6,7 +6,7 @@ from armblocks.integration import system_functions
 from armblocks.integration.delay_history import DelayHistory
 from armblocks.integration.frame import Frame
 from armblocks.integration.implicit_equations import define_solve
-from armblocks.integration.linear_equations import LinearSpace
+from armblocks.integration.linear_equations import LinearEquationsLayout
 from armblocks.routines.memory import Reals
 
 
@@ -16,11 +16,11 @@ class Evaluation:
     def __init__(self, frame: Frame, history: DelayHistory | None) -> None:
         self.frame = frame
         self.history = history
-        sizes, places = frame.sizes, frame.places
-        self.implicit = define_solve(frame.r.program, places, sizes.algebraic) if sizes.algebraic else None
+        sizes, workspace = frame.sizes, frame.workspace
+        self.implicit = define_solve(frame.r.program, workspace, sizes.algebraic) if sizes.algebraic else None
         nowhere = frame.r.nowhere
-        self.z = frame.vector(places.z) if sizes.hybrid else nowhere
-        self.unknowns = frame.vector(places.trial_w) if sizes.hybrid else nowhere
+        self.z = frame.vector(workspace.z) if sizes.hybrid else nowhere
+        self.unknowns = frame.vector(workspace.trial_w) if sizes.hybrid else nowhere
 
     def solve(self, t: Reals, x: Reals) -> None:
         """Write the delayed values at a point into ``z``, and the implicit unknowns into ``trial_w``."""
@@ -36,15 +36,15 @@ class Evaluation:
         f = self.frame
         f.r.call(system_functions.derivative, t, x, self.z, self.unknowns, f.p, xd)
 
-    def jacobian(self, t: Reals, x: Reals, space: LinearSpace) -> None:
+    def jacobian(self, t: Reals, x: Reals, layout: LinearEquationsLayout) -> None:
         """Write the Jacobians of the flow and of the implicit equations at a point into the scratch
         memory."""
         self.solve(t, x)
         f, scratch = self.frame, self.frame.arrays.scratch
-        J, T = scratch.after(space.J), scratch.after(space.T)
+        J, T = scratch.after(layout.J), scratch.after(layout.T)
         f.r.call(system_functions.flow_jacobian, t, x, self.z, self.unknowns, f.p, J, T)
 
     def accept_unknowns(self) -> None:
         """Set ``w`` to the solution found last."""
-        places = self.frame.places
-        self.frame.copy(places.trial_w, places.w, self.frame.sizes.algebraic)
+        workspace = self.frame.workspace
+        self.frame.copy(workspace.trial_w, workspace.w, self.frame.sizes.algebraic)

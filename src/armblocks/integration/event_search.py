@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from armblocks.integration.events import Events
 from armblocks.integration.frame import SAME_ABOVE, copy
-from armblocks.integration.guard_functions import NEXT_TO_ZERO, UNDECIDED
+from armblocks.integration.guard_functions import NEAR_ZERO, NO_SIGN
 from armblocks.integration.step_control import GROW
 from armblocks.integration.workspace import Scalar, Status
 from armblocks.routines.arithmetic import fma, maximum, minimum, select
@@ -16,13 +16,13 @@ from armblocks.routines.memory import IntegerVariable, RealVariable
 from armblocks.routines.routine import Part
 from armblocks.routines.values import Boolean, Integer, Real
 
-LAST_PLACE = 2.0**-52
+EPSILON = 2.0**-52
 """Relative rounding error of a double."""
-FINEST = 2.0**-12
+SHORTEST_WINDOW = 2.0**-12
 """Minimum distance of guard evaluations, as a fraction of a step."""
 NEAR_START = 2.0**-6
-"""Events within this fraction of a step after its start are doubtful: the error of the dense output may be as
-large as the change since the start."""
+"""Event locations within this fraction of a step after its start are unreliable: the error of the dense
+output may be as large as the change since the start."""
 
 
 class EventSearch:
@@ -32,105 +32,115 @@ class EventSearch:
         self.events = events
         self.frame, self.method, self.records = events.frame, events.method, events.records
         self.functions, self.guards = events.functions, events.guards
-        self.happened = self.frame.r.integer(0)
+        self.event_located = self.frame.r.integer(0)
         """Whether the step ends at an event that was located on the dense output."""
-        places = self.frame.places
-        self.y, self.new_x = (self.frame.vector(place) for place in (places.y, places.new_x))
+        workspace = self.frame.workspace
+        self.y, self.new_x = (self.frame.vector(place) for place in (workspace.y, workspace.new_x))
 
-    def first_event(self, time: Real) -> None:
+    def locate_first_event(self, time: Real) -> None:
         """If a guard fires within the step, shorten the step to the first such time.
 
         The step is searched in windows. The guards are evaluated at the middle and the end of each window.
         The first window is an eighth of the step. Windows grow while the guards are smooth, and are halved
-        where a guard may have touched zero and returned (``dips``). Bisection on the condition "some guard
-        has fired" then finds the first of several events. The step ends just after the zero, where the guard
-        has fired.
+        where a guard may have touched zero and returned (``possible_touches``). A window is also halved if a
+        guard has fired at its middle, so that the time before the event is searched in the same way.
+        Bisection on the condition "some guard has fired" then finds the first of several events. The step
+        ends just after the zero, where the guard has fired.
         """
         f, r = self.frame, self.frame.r
         low, high, reason = r.real(time), r.real(time), r.integer(0)
         before = r.real(time)
-        self._keep_start()
+        self._save_start()
         with r.part() as search:
             with r.part() as attempt:
                 h, end = f.h.value, f.new_time.value
                 # A step across the boundary of a mode has no stages of its method and cannot be shortened.
-                divisible = h > 2.0 * self.crossing(time)
+                divisible = h > 2.0 * self.crossing_length(time)
                 self.records.extra_stages_once(time, h)
-                with r.part() as judged:
+                with r.part() as checked:
                     with r.part() as found:
-                        self._scan(time, h, low, high, found)
-                        search.leave_unless(divisible & r.call(self.functions.any_returned, f.reals))
-                        reason.value = UNDECIDED
-                        judged.leave()
+                        self._search_windows(time, h, low, high, found)
+                        search.leave_unless(divisible & r.call(self.functions.any_returned_to_zero, f.reals))
+                        reason.value = NO_SIGN
+                        checked.leave()
                     self._bisect(low, high, time, h)
                     before.value = low.value
                     reason.value = 0
                     with r.when(high.value < end):
-                        self._judge(reason, high.value, time, h)
+                        self._check_location(reason, high.value, time, h)
                 with r.when((reason.value != 0) & divisible):
-                    self._take_shorter(high.value, reason.value == UNDECIDED, time, h, attempt)
+                    self._step_to_event(high.value, reason.value == NO_SIGN, time, h, attempt)
                     before.value = (f.new_time.value.bits() - 1).from_bits()
                 with r.otherwise(), r.when(high.value < end):
                     self.method.interpolate(high.value, time, h, self.y)
                     f.new_time.value = high.value
-            self._take_signs_before(before.value, time)
-            self.happened.value = 1
+            self._store_signs_before(before.value, time)
+            self.event_located.value = 1
             # An event that coincides with a tick or breakpoint gets its time.
             known, new_time = f.end.value, f.new_time.value
             f.new_time.value = select(new_time * SAME_ABOVE >= known, known, new_time)
 
-    def _scan(self, time: Real, h: Real, low: RealVariable, high: RealVariable, found: Part) -> None:
+    def _search_windows(
+        self, time: Real, h: Real, low: RealVariable, high: RealVariable, found: Part
+    ) -> None:
         """Search the windows of a step. Where a guard fires, leave ``found``; ``low`` and ``high`` bracket
         it."""
-        f, r, places = self.frame, self.frame.r, self.frame.places
+        f, r, workspace = self.frame, self.frame.r, self.frame.workspace
         end = f.new_time.value
         low.value = time
-        scan = f.reals.after(Scalar.SCAN)
-        unknown = scan[0] == float("inf")
-        scan[0] = select(unknown, 0.125 * h, minimum(scan[0], h))
-        finest = h * FINEST
+        next_length = f.reals.after(Scalar.WINDOW)
+        unknown = next_length[0] == float("inf")
+        next_length[0] = select(unknown, 0.125 * h, minimum(next_length[0], h))
+        shortest = h * SHORTEST_WINDOW
+        length = r.real(next_length[0])
         with r.part() as window:
             a = low.value
-            middle = fma(0.5, scan[0], a)
-            reached = a + scan[0]
+            middle = fma(0.5, length.value, a)
+            reached = a + length.value
             # The window takes the rest of the step if the rest is shorter than half a window, or if rounding
             # makes the middle of the window equal to one of its ends.
-            whole = fma(0.5, scan[0], reached) >= end
+            whole = fma(0.5, length.value, reached) >= end
             apart = (middle > a) & (middle < reached)
             whole = whole | ~apart
             middle = select(whole, fma(0.5, end - a, a), middle)
             reached = select(whole, end, reached)
+            length.value = reached - a
+            divisible = apart & (length.value > shortest)
             high.value = middle
-            found.leave_unless(self.watch_inside(middle, time, h) == 0)
-            f.copy(places.guards, places.guards_middle, self.guards)
+            with r.unless(self.count_fired_at(middle, time, h) == 0):
+                found.leave_unless(divisible)
+                length.value = middle - a
+                window.again()
+            f.copy(workspace.guards, workspace.guards_middle, self.guards)
             high.value = reached
             count = r.integer(0)
             with r.when(reached >= end):
-                count.value = self.events.watch(minimum(end, f.clamp.value), self.y)
+                count.value = self.events.mark_fired(minimum(end, f.clamp.value), self.y)
             with r.otherwise():
-                count.value = self.watch_inside(reached, time, h)
+                count.value = self.count_fired_at(reached, time, h)
+            half = middle - a
+            touches = r.call(self.functions.possible_touches, f.reals, half) != 0
+            with r.when(touches & divisible & (next_length[0] > shortest)):
+                length.value = 0.5 * minimum(length.value, next_length[0])
+                next_length[0] = length.value
+                window.again()
             with r.unless(count.value == 0):
                 low.value = middle
                 found.leave()
-            half = middle - a
-            dips = r.call(self.functions.dips, f.reals, half) != 0
-            with r.when(dips & (scan[0] > finest)):
-                length = minimum(scan[0], reached - a)
-                scan[0] = 0.5 * length
-                window.again()
-            r.call(self.functions.note_slopes, f.reals, half)
-            r.call(self.functions.take_signs, f.reals, r.constant_boolean(False))
-            f.copy(places.guards, places.guards_before, self.guards)
+            r.call(self.functions.store_derivatives, f.reals, half)
+            r.call(self.functions.store_signs, f.reals, r.constant_boolean(False))
+            f.copy(workspace.guards, workspace.guards_before, self.guards)
             low.value = reached
-            scan[0] = 2.0 * scan[0]
+            next_length[0] = 2.0 * next_length[0]
+            length.value = next_length[0]
             window.again_unless(reached >= end)
 
-    def watch_inside(self, instant: Real, time: Real, h: Real) -> Integer:
+    def count_fired_at(self, instant: Real, time: Real, h: Real) -> Integer:
         """The number of guards that have fired at a time within the step."""
         self.method.interpolate(instant, time, h, self.new_x)
-        return self.events.watch(minimum(instant, self.frame.clamp.value), self.new_x)
+        return self.events.mark_fired(minimum(instant, self.frame.clamp.value), self.new_x)
 
-    def _take_signs_before(self, instant: Real, time: Real) -> None:
+    def _store_signs_before(self, instant: Real, time: Real) -> None:
         """Store the signs of all guards just before the event.
 
         A guard may have crossed zero against its direction in this step. That crossing is no event, but the
@@ -139,70 +149,71 @@ class EventSearch:
         f, r = self.frame, self.frame.r
         h = f.h.value
         self.records.extra_stages_once(time, h)
-        with r.when(self.watch_inside(maximum(instant, time), time, h) == 0):
-            r.call(self.functions.take_signs, f.reals, r.constant_boolean(False))
+        with r.when(self.count_fired_at(maximum(instant, time), time, h) == 0):
+            r.call(self.functions.store_signs, f.reals, r.constant_boolean(False))
 
-    def _judge(self, reason: IntegerVariable, instant: Real, time: Real, h: Real) -> None:
-        """Set ``reason`` to the reason why an event on the dense output is doubtful, or to 0.
+    def _check_location(self, reason: IntegerVariable, instant: Real, time: Real, h: Real) -> None:
+        """Set ``reason`` to the reason why the event location is unreliable, or to 0 if it is reliable.
 
-        An event is doubtful near the start of the step, and where its guard is near zero at the start. A
-        guard that leaves zero like a high power of time, such as the position of a mass that starts from
-        rest, may have the wrong sign on the dense output. At the ends of steps its sign is correct.
+        A location on the dense output is unreliable near the start of the step, and if the guard is near zero
+        at the start. A guard that leaves zero like a high power of time, such as the position of a mass that
+        starts from rest, may have the wrong sign on the dense output. At the ends of steps its sign is
+        correct.
         """
         f, r, functions, t = self.frame, self.frame.r, self.functions, self.events.point.memory
-        self.watch_inside(instant, time, h)
+        self.count_fired_at(instant, time, h)
         self.events.point.value = minimum(f.new_time.value, f.clamp.value)
         self.events.evaluation.solve(t, self.y)
         functions.evaluate(r, t, self.y, f.reals, f.p)
         early = instant - time < NEAR_START * h
-        found = r.call(functions.doubtful, f.reals)
-        reason.value = select(early & (found == 0), NEXT_TO_ZERO, found)
+        found = r.call(functions.unreliable_location, f.reals)
+        reason.value = select(early & (found == 0), NEAR_ZERO, found)
 
-    def _take_shorter(self, instant: Real, undecided: Boolean, time: Real, h: Real, attempt: Part) -> None:
-        """Take a step to the time of a doubtful event and evaluate the guards at its end.
+    def _step_to_event(self, instant: Real, no_sign: Boolean, time: Real, h: Real, attempt: Part) -> None:
+        """Take a step to an unreliable event location and evaluate the guards at its end.
 
-        If no guard has fired there, an eighth of the original step is taken and searched, unless the event is
-        even earlier. If the guard had no sign at the start, the step goes only halfway to the event, and the
-        guard gets its sign there.
+        If no guard has fired there, a step of an eighth of the original length is taken and searched, unless
+        the location is even earlier. If the guard had no sign at the start, the step ends halfway to the
+        location, and the guard gets its sign there.
         """
-        f, r, crossing = self.frame, self.frame.r, self.crossing(time)
+        f, r, crossing = self.frame, self.frame.r, self.crossing_length(time)
         distance, shorter = instant - time, 0.125 * h
-        length = select(undecided, maximum(0.5 * distance, crossing), distance)
+        length = select(no_sign, maximum(0.5 * distance, crossing), distance)
         new_time = r.real(time + length)
-        last = undecided | (distance >= shorter) | (shorter < 2.0 * crossing)
+        last = no_sign | (distance >= shorter) | (shorter < 2.0 * crossing)
         searched = r.boolean(False)
         with r.part() as step:
             self._take_step(time, new_time.value)
             self._restore_start()
             with r.when(searched.value):
-                self._grow_from(shorter)
+                self._limit_next_step(shorter)
                 attempt.again()
-            step.leave_unless(self.events.watch(minimum(new_time.value, f.clamp.value), self.y) == 0)
+            step.leave_unless(self.events.mark_fired(minimum(new_time.value, f.clamp.value), self.y) == 0)
             with r.when(last):
-                # Not shorter than the length of ``cross``, so that steps without an event do not become tiny.
+                # At least ``crossing_length``, so that steps without an event are not arbitrarily short.
                 step.leave_when(f.h.value > 0.5 * crossing)
                 new_time.value = time + crossing
                 step.again()
             searched.value = True
             new_time.value = time + shorter
             step.again()
-        self._grow_from(f.h.value)
+        self._limit_next_step(f.h.value)
 
-    def _keep_start(self) -> None:
+    def _save_start(self) -> None:
         """Save the guard data of the start of the step."""
-        places, f = self.frame.places, self.frame
-        f.copy(places.signs, places.signs_at_start, self.guards)
-        f.copy(places.guards_before, places.guards_at_start, self.guards)
+        workspace, f = self.frame.workspace, self.frame
+        f.copy(workspace.signs, workspace.signs_at_start, self.guards)
+        f.copy(workspace.guards_before, workspace.guards_at_start, self.guards)
 
     def _restore_start(self) -> None:
         """Restore the guard data of the start of the step."""
-        places, f = self.frame.places, self.frame
-        f.copy(places.signs_at_start, places.signs, self.guards)
-        f.copy(places.guards_at_start, places.guards_before, self.guards)
+        workspace, f = self.frame.workspace, self.frame
+        f.copy(workspace.signs_at_start, workspace.signs, self.guards)
+        f.copy(workspace.guards_at_start, workspace.guards_before, self.guards)
         for i in f.r.each(self.guards):
-            f.vector(places.guard_slopes)[i] = float("nan")
+            f.vector(workspace.guard_derivatives)[i] = float("nan")
 
-    def _grow_from(self, h: Real) -> None:
+    def _limit_next_step(self, h: Real) -> None:
         """Limit the next adaptive step to ``GROW`` times the length ``h``."""
         if self.method.tableau.adaptive:
             length = self.frame.scalar[Scalar.STEP]
@@ -223,32 +234,32 @@ class EventSearch:
         millionth of the length of the run, the unit in the last place is the one at that time.
         """
         r = self.frame.r
-        closest = (LAST_PLACE * 1e-6) * self.frame.reals[Scalar.SPAN]
+        closest = (EPSILON * 1e-6) * self.frame.reals[Scalar.SPAN]
         with r.loop() as bisection:
             a, b = low.value, high.value
             middle = fma(0.5, b - a, a)
             bisection.leave_unless((middle > a) & (middle < b) & (b - a > closest))
-            with r.when(self.watch_inside(middle, time, h) == 0):
+            with r.when(self.count_fired_at(middle, time, h) == 0):
                 low.value = middle
             with r.otherwise():
                 high.value = middle
 
-    def shortest(self, time: Real) -> Real:
+    def negligible_step(self, time: Real) -> Real:
         """A step length that is negligible relative to the time."""
         return 2.0**-46 * maximum(time, self.frame.reals[Scalar.SPAN])
 
-    def crossing(self, time: Real) -> Real:
-        """The length of the step of :meth:`cross`."""
-        return 8.0 * self.shortest(time)
+    def crossing_length(self, time: Real) -> Real:
+        """The length of the step of :meth:`cross_mode_boundary`."""
+        return 8.0 * self.negligible_step(time)
 
-    def cross(self, time: Real) -> None:
+    def cross_mode_boundary(self, time: Real) -> None:
         """Take a step of negligible length along the last derivative. Some guard must have fired at its end.
 
         It crosses the boundary of a mode beyond which the equations of that mode are undefined, for example
         where the argument of a square root becomes negative.
         """
         f, method = self.frame, self.method
-        new_time = minimum(time + self.crossing(time), f.end.value)
+        new_time = minimum(time + self.crossing_length(time), f.end.value)
         h = new_time - time
         f.new_time.value = new_time
         f.h.value = h
@@ -256,6 +267,6 @@ class EventSearch:
         for row in range(1, method.tableau.rows):
             copy(f.r, method.K(0), method.K(row), f.n)
         self.records.extra_done.value = 1
-        method.move((1.0,), h)
-        fired = self.events.watch(minimum(new_time, f.clamp.value), self.y)
+        method.set_y((1.0,), h)
+        fired = self.events.mark_fired(minimum(new_time, f.clamp.value), self.y)
         f.leave_unless(fired != 0, Status.NON_FINITE)

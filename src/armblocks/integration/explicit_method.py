@@ -15,7 +15,7 @@ CHECK_EVERY = 16
 NEAR_BORDER = 0.97
 """Fraction of the stability interval beyond which a step counts as stability-limited (3.2 of 3.3, as in
 Hairer's DOPRI5)."""
-STIFF_CHECKS, CALM_CHECKS = 250, 6
+STIFF_CHECKS, NON_STIFF_CHECKS = 250, 6
 """Number of checks with a stability-limited step after which the system counts as stiff (4000 steps), and
 number of consecutive checks without one that reset the count."""
 
@@ -33,9 +33,9 @@ class ExplicitMethod(Method):
         """All stages, the new state into y and the derivative there into row ``s`` of K."""
         tableau = self.butcher
         for stage in range(1, tableau.stages):
-            self.move(tableau.matrix[stage], h)
+            self.set_y(tableau.matrix[stage], h)
             self.evaluate(fma(tableau.nodes[stage], h, time), self.y, stage)
-        self.move(tableau.weights, h)
+        self.set_y(tableau.weights, h)
         self.evaluate(new_time, self.y, tableau.stages)
 
     @property
@@ -47,22 +47,22 @@ class ExplicitMethod(Method):
         """The extra stages of the dense output; y keeps its value."""
         tableau = self.butcher
         for k, node in enumerate(tableau.extra_nodes):
-            self.move(tableau.extra_matrix[k], h)
+            self.set_y(tableau.extra_matrix[k], h)
             self.evaluate(fma(node, h, time), self.y, tableau.stages + 1 + k)
         # The extra stages used y as memory: compute the new state in it again, by the same operations.
-        self.move(tableau.weights, h)
+        self.set_y(tableau.weights, h)
 
     def error_norm(self, h: Real, error: Row) -> Real:
         """Norm of the error estimate; for two estimates, their combination as in DOP853."""
-        stretched = self.butcher.stretched_error
-        if stretched is None:
+        second = self.butcher.second_error
+        if second is None:
             return self.norm(h, error)
-        e5, e3 = self.square(self.weighted(error)), self.square(self.weighted(stretched))
+        e5, e3 = self.square(self.weighted(error)), self.square(self.weighted(second))
         denominator = square_root(fma(0.01, e3, e5) * float(self.n))
         norm = h * e5 / denominator
         return select(denominator == 0.0, 0.0, norm)
 
-    def change(self, h: Real) -> Real:
+    def derivative_change(self, h: Real) -> Real:
         """The larger norm of ``h`` times the change of the derivative from the start to the end and to a
         middle stage.
 
@@ -70,10 +70,10 @@ class ExplicitMethod(Method):
         """
         nodes = self.butcher.nodes
         middle = min(range(1, self.butcher.stages), key=lambda stage: abs(nodes[stage] - 0.5))
-        return maximum(super().change(h), self.norm(h, change_to(middle)))
+        return maximum(super().derivative_change(h), self.norm(h, change_to(middle)))
 
-    def watch(self, h: Real) -> None:
-        """Check whether stability limits the step; pause if it has limited many of the steps.
+    def check_stiffness(self, h: Real) -> None:
+        """Check whether stability limits the step; pause if it has limited many steps.
 
         A step is stability-limited if ``h`` times the fastest rate reaches the border of the stability
         region. Six consecutive checks without such a step reset the count (Hairer, Wanner II, IV.2).
@@ -81,19 +81,21 @@ class ExplicitMethod(Method):
         if not self.butcher.measures_stiffness:
             return
         f, r = self.frame, self.r
-        watched, stiff, calm = (f.count[place] for place in (Count.WATCHED, Count.STIFF, Count.CALM))
-        watched.value = watched.value + 1
-        with r.when(watched.value & (CHECK_EVERY - 1) == 0):
+        steps, stiff, non_stiff = (
+            f.count[place] for place in (Count.STIFFNESS_STEPS, Count.STIFF, Count.NON_STIFF)
+        )
+        steps.value = steps.value + 1
+        with r.when(steps.value & (CHECK_EVERY - 1) == 0):
             border = (NEAR_BORDER * self.butcher.real_stability) ** 2
             with r.when(self.stiffness() > border):
                 stiff.value = stiff.value + 1
-                calm.value = 0
-                wanted = f.counts[Count.WATCHING] != 0
-                long = stiff.value >= STIFF_CHECKS
-                f.taken.value = select(wanted & long, f.arrays.max_steps, f.taken.value)
+                non_stiff.value = 0
+                enabled = f.counts[Count.STIFFNESS_DETECTION] != 0
+                reached = stiff.value >= STIFF_CHECKS
+                f.steps_of_call.value = select(enabled & reached, f.arrays.max_steps, f.steps_of_call.value)
             with r.otherwise():
-                calm.value = calm.value + 1
-                with r.when(calm.value >= CALM_CHECKS):
+                non_stiff.value = non_stiff.value + 1
+                with r.when(non_stiff.value >= NON_STIFF_CHECKS):
                     stiff.value = 0
 
     def stiffness(self) -> Real:
@@ -104,7 +106,7 @@ class ExplicitMethod(Method):
         last = (*tableau.matrix[-1], 0.0)
         difference = tuple(b - a for a, b in zip(last, tableau.weights))
         end, before = self.K(tableau.stages), self.K(tableau.stages - 1)
-        slopes = self.square(lambda i: end[i] - before[i])
+        derivatives = self.square(lambda i: end[i] - before[i])
         states = self.square(lambda i: self.combination(difference, i))
         # Both sums lack h^2: y_new - y_last = h sum_j (b_j - a_j) K[j].
-        return slopes / maximum(states, 1e-300)
+        return derivatives / maximum(states, 1e-300)

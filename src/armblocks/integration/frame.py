@@ -16,17 +16,17 @@ REALS = (Scalar.TIME, Scalar.STEP, Scalar.TRIED)
 COUNTS = (
     Count.SAMPLE,
     Count.SEGMENT,
-    Count.STARTED,
+    Count.STAGE,
     Count.GRID,
     Count.ACCEPTED,
     Count.REJECTED,
     Count.EVALUATIONS,
-    Count.FRESH,
+    Count.RESTARTED,
     Count.SAVED,
-    Count.WATCHED,
+    Count.STIFFNESS_STEPS,
     Count.STIFF,
-    Count.CALM,
-    Count.SHORT,
+    Count.NON_STIFF,
+    Count.SHORT_STEPS,
 )
 
 
@@ -63,13 +63,13 @@ class Frame:
     """The routine of a loop with its arrays and its variables.
 
     Scalars that change in every step are variables during a call of the loop. Between calls the arrays hold
-    them: :meth:`keep` writes them there.
+    them: :meth:`store_variables` writes them there.
     """
 
-    def __init__(self, r: Routine, arrays: Arrays, places: Workspace, sizes: LoopSizes) -> None:
+    def __init__(self, r: Routine, arrays: Arrays, workspace: Workspace, sizes: LoopSizes) -> None:
         self.r = r
         self.arrays = arrays
-        self.places = places
+        self.workspace = workspace
         self.sizes = sizes
         self.n = sizes.states
         reals, counts = arrays.reals, arrays.counts
@@ -90,14 +90,14 @@ class Frame:
         self.clamp = r.real(arrays.clamps[segment])
         """The latest time at which the derivative may be evaluated in this piece."""
         self.last_end = arrays.ends[self.segments - 1]
-        self.taken = r.integer(0)
+        self.steps_of_call = r.integer(0)
         """Steps accepted in this call."""
         self.status = r.integer(Status.DONE)
         self.h = r.real(0.0)
         """Length of the current trial step."""
         self.new_time = r.real(0.0)
         """Time at the end of the trial step."""
-        self.whole: Part | None = None
+        self.body: Part | None = None
         """The part that contains the whole loop: leaving it returns the status."""
 
     @property
@@ -120,16 +120,16 @@ class Frame:
 
     def leave(self, status: Status) -> None:
         """Return from the loop."""
-        assert self.whole is not None
+        assert self.body is not None
         self.status.value = status
-        self.whole.leave()
+        self.body.leave()
 
     def leave_unless(self, condition: Boolean, status: Status) -> None:
         """Return from the loop if the condition fails."""
         with self.r.unless(condition):
             self.leave(status)
 
-    def keep(self) -> None:
+    def store_variables(self) -> None:
         """Write the variables to the arrays."""
         for place, variable in self.scalar.items():
             self.reals[place] = variable.value

@@ -4,7 +4,8 @@
 dense elimination with row pivoting, and halved steps while the residual does not fall. It starts from the
 ``w`` of the last accepted step, so a repeated step gives identical results.
 
-If Newton's method does not converge, or the Jacobian is singular, ``w`` becomes NaN. The loop then repeats
+A point where the residual is exactly zero and the Jacobian is undefined is a solution. If Newton's method
+does not converge, or the Jacobian is singular, ``w`` becomes NaN. The loop then repeats
 the step with a shorter length. If that fails, the run ends as for any other NaN, and Python diagnoses the
 cause.
 """
@@ -17,7 +18,7 @@ from armblocks.integration.workspace import Workspace
 from armblocks.routines.arithmetic import fma, select
 from armblocks.routines.memory import Reals
 from armblocks.routines.routine import Function, Program, Routine
-from armblocks.routines.values import Real
+from armblocks.routines.values import Boolean, Real
 
 ITERATIONS = 50
 HALVINGS = 12
@@ -41,22 +42,22 @@ def define_solve(
 
 class _Newton:
     def __init__(
-        self, r: Routine, places: Workspace, unknowns: int, t: Reals, x: Reals, reals: Reals, p: Reals
+        self, r: Routine, workspace: Workspace, unknowns: int, t: Reals, x: Reals, reals: Reals, p: Reals
     ) -> None:
         self.r = r
         self.n = unknowns
-        self.point = t, x, reals.after(places.z)
+        self.point = t, x, reals.after(workspace.z)
         self.p = p
-        self.accepted = reals.after(places.w)
-        self.trial = reals.after(places.trial_w)
-        self.before = reals.after(places.before)
-        self.residual = reals.after(places.residual)
-        self.jacobian = reals.after(places.jacobian)
+        self.accepted = reals.after(workspace.w)
+        self.trial = reals.after(workspace.trial_w)
+        self.before = reals.after(workspace.before)
+        self.residual = reals.after(workspace.residual)
+        self.jacobian = reals.after(workspace.jacobian)
         self.elimination = PivotedElimination(
             size=unknowns,
             matrix=self.jacobian,
-            pivots=reals.after(places.pivots),
-            swaps=reals.integers.after(places.swaps),
+            pivots=reals.after(workspace.pivots),
+            swaps=reals.integers.after(workspace.swaps),
         )
 
     def write(self) -> None:
@@ -70,11 +71,12 @@ class _Newton:
                 r.call(residual, *self.point, self.trial, self.p, self.residual)
                 r.call(residual_jacobian, *self.point, self.trial, self.p, self.jacobian)
                 before = self.square(self.residual)
+                search.leave_when((before == 0.0) & self.undefined())
                 self.elimination.factor(r)
                 self.elimination.solve(r, self.residual)
                 for i in r.range(0, n):
                     self.before[i] = self.trial[i]
-                self.walk(before)
+                self.damped_correction(before)
                 size = self.correction()
                 with r.when(size <= CONVERGED):
                     search.leave()
@@ -83,6 +85,13 @@ class _Newton:
                     search.leave()
             for i in r.range(0, n):
                 self.trial[i] = float("nan")
+
+    def undefined(self) -> Boolean:
+        """Whether an entry of the Jacobian is NaN, as for ``hypot(u, w)`` at the origin."""
+        found = self.r.boolean(False)
+        for i in self.r.range(0, self.n * self.n):
+            found.value = found.value | ~self.jacobian[i].ordered
+        return found.value
 
     def square(self, vector: Reals) -> Real:
         """Sum of the squares of a vector."""
@@ -103,7 +112,7 @@ class _Newton:
             largest.value = select(known > part, known, part + known * 0.0)
         return largest.value
 
-    def walk(self, before: Real) -> None:
+    def damped_correction(self, before: Real) -> None:
         """``w -= lambda d``, with ``lambda`` halved at most a dozen times until the residual decreases."""
         r = self.r
         length = r.real(1.0)

@@ -1,4 +1,4 @@
-"""The course of a system with clocks, events, delays or implicit equations: pieces between instants.
+"""The schedule of a system with clocks, events, delays or implicit equations. A piece ends at an instant.
 
 At an instant (a tick, an event, a breakpoint, the start) the loop does the following, in native code:
 
@@ -10,8 +10,8 @@ store left limits, ``update`` is called without a marked clock;
    stateful modes take their consistent values; this is repeated until nothing changes;
 4. the instant is recorded: signals are right-continuous;
 5. the integration restarts. The first step after an event is at most a hundredth of the time between the last
-   two events, and each later step at most ten times the one before. No step can then pass over bounces whose
-   distances shrink.
+   two events, and each later step at most ten times the one before. No step can then pass over several
+   bounces whose distances shrink.
 
 Times within four units in the last place are one instant. So 3 times 0.1 s and 0.3 s coincide although their
 doubles differ, and a tick can coincide with a breakpoint or a recorded time.
@@ -20,7 +20,6 @@ doubles differ, and a tick can coincide with a breakpoint or a recorded time.
 from __future__ import annotations
 
 from armblocks.integration.clocks import Clocks
-from armblocks.integration.course import INSTANT, START, STEP, Course, Trial
 from armblocks.integration.delays import Delays
 from armblocks.integration.evaluation import Evaluation
 from armblocks.integration.event_search import EventSearch
@@ -28,6 +27,7 @@ from armblocks.integration.events import Events
 from armblocks.integration.frame import SAME_ABOVE, SAME_BELOW, Frame
 from armblocks.integration.method import Method
 from armblocks.integration.records import Records
+from armblocks.integration.schedule import INSTANT, START, STEP, Schedule, Trial
 from armblocks.integration.segments import choose_first_step
 from armblocks.integration.workspace import Count, Scalar, Stage, Status
 from armblocks.routines.arithmetic import fma, maximum, minimum, select
@@ -36,7 +36,7 @@ from armblocks.routines.routine import Part, Stages
 from armblocks.routines.values import Boolean, Real
 
 
-class Instants(Course):
+class Instants(Schedule):
     """Pieces end at ticks, events, breakpoints, and where a delayed signal jumps.
 
     ``point`` is the variable that holds the time of an evaluation.
@@ -56,7 +56,7 @@ class Instants(Course):
         history = evaluation.history
         self.delays = Delays(frame, method, records, evaluation, history, point) if history else None
         self.segment_end = frame.r.real(0.0)
-        self.x = frame.vector(frame.places.x)
+        self.x = frame.vector(frame.workspace.x)
 
     def enter(self, stages: Stages) -> None:
         """Continue where the last call stopped; the end of the current piece is computed again."""
@@ -64,7 +64,7 @@ class Instants(Course):
         if self.delays:
             self.delays.bound_steps()
         self.begin_piece()
-        started = f.count[Count.STARTED].value
+        started = f.count[Count.STAGE].value
         with r.when(started == Stage.RUNNING):
             stages.go(STEP)
         with r.when(started == Stage.START):
@@ -103,14 +103,14 @@ class Instants(Course):
         # the last place: a sample time after it, however close, is not recorded with it.
         known = time >= f.end.value * SAME_BELOW
         recorded = select(known, until, time)
-        self.before_jump(time)
+        self.record_left_limits(time)
         self.clocks.capture(time)
         if self.delays:
             self.delays.pass_jumps(time)
         self.clocks.tick(time, until)
         if self.events:
             self.events.make_modes_consistent(time)
-            self.events.fire(time)
+            self.events.process(time)
         else:
             f.counts[Count.AT_START] = 0
             self.point.value = time
@@ -120,36 +120,37 @@ class Instants(Course):
         self.evaluation.accept_unknowns()
         self.records.samples(time, recorded, None)
         with f.r.when(self.records.jumps_recorded):
-            self.records.side_of_jump(time, f.count[Count.SAMPLE].value, self.x)
+            self.records.record_side(time, f.count[Count.SAMPLE].value, self.x)
         if self.events:
-            self.events.stop(time)
+            self.events.end_run(time)
         f.leave_unless(f.count[Count.SEGMENT].value < f.segments, Status.DONE)
         self.begin_piece()
-        f.count[Count.STARTED].value = Stage.START
+        f.count[Count.STAGE].value = Stage.START
 
-    def before_jump(self, time: Real) -> None:
-        """Record the left limits at an instant. At the start of a run they are the initial values."""
+    def record_left_limits(self, time: Real) -> None:
+        """Record the left limits at an instant, unless they are recorded. At the start of a run they are the
+        initial values."""
         f, records = self.frame, self.records
-        with f.r.when(records.jumps_recorded):
+        with f.r.when(records.jumps_recorded & (f.counts[Count.JUMPS] & 1 == 0)):
             before = select(time > 0.0, (time.bits() - 1).from_bits(), time)
             self.point.value = before
             self.evaluation.solve(self.point.memory, self.x)
-            records.side_of_jump(before, f.count[Count.SAMPLE].value, self.x)
+            records.record_side(before, f.count[Count.SAMPLE].value, self.x)
 
     def before_step(self) -> None:
-        """Make sure that the history of delayed signals has room for another step."""
+        """Ensure that the history of delayed signals has memory for another step."""
         if self.delays:
-            self.delays.make_room()
+            self.delays.ensure_capacity()
 
     def first_step(self, time: Real) -> None:
         """Choose the length of the step after a restart; after a tick the proposed length stays."""
         f = self.frame
-        with f.r.when(f.count[Count.FRESH].value != 0):
+        with f.r.when(f.count[Count.RESTARTED].value != 0):
             choose_first_step(f, self.method, self.records, time)
             length = f.scalar[Scalar.STEP]
             length.value = minimum(length.value, f.scalar[Scalar.BOUND].value)
 
-    def try_finite(self, trial: Trial, time: Real, new_time: Real) -> None:
+    def take_fixed_step(self, trial: Trial, time: Real, new_time: Real) -> None:
         """Try a fixed step; quarter it while its end is not finite, then cross the boundary of a mode."""
         f, r, method = self.frame, self.frame.r, self.method
         end_row = method.K(method.tableau.end_row)
@@ -164,24 +165,24 @@ class Instants(Course):
                 finite.leave_when(method.all_finite(method.y, end_row))
                 h = 0.25 * (end.value - time)
                 end.value = time + h
-                attempt.again_when(h > self.search.shortest(time))
-            self.search.cross(time)
+                attempt.again_when(h > self.search.negligible_step(time))
+            self.search.cross_mode_boundary(time)
 
-    def not_finite(self, time: Real, finite: Boolean, accepted: Part) -> None:
+    def handle_non_finite(self, time: Real, finite: Boolean, accepted: Part) -> None:
         """If steps of minimum length are not finite, cross the boundary of a mode, else return."""
         if self.search:
             with self.frame.r.unless(finite):
-                self.search.cross(time)
+                self.search.cross_mode_boundary(time)
                 accepted.leave()
         else:
             self.frame.leave_unless(finite, Status.NON_FINITE)
 
-    def passed(self, time: Real, spacing: Real) -> Real:
+    def passed_until(self, time: Real, spacing: Real) -> Real:
         """Grid points up to the returned time count as passed: one within rounding after a tick is the
         tick."""
         return fma(spacing, 1e-9, time)
 
-    def bounded(self, time: Real, new_time: Real) -> Real:
+    def fixed_step_end(self, time: Real, new_time: Real) -> Real:
         """The end of a fixed step, which is earlier right after an event."""
         f = self.frame
         following = (time.bits() + 10).from_bits()
@@ -190,42 +191,44 @@ class Instants(Course):
             soon = minimum(soon, time + f.max_step)
         return minimum(soon, new_time)
 
-    def next_length(self, proposed: Real) -> Real:
+    def next_step_length(self, proposed: Real) -> Real:
         """The length of the next step. A step that was shortened to end at a tick does not reduce it."""
         f = self.frame
         length = f.scalar[Scalar.STEP].value
-        cut = f.new_time.value >= f.end.value
-        return select(cut, maximum(proposed, length), proposed)
+        shortened = f.new_time.value >= f.end.value
+        return select(shortened, maximum(proposed, length), proposed)
 
     def accept(self, stages: Stages) -> None:
         """Locate the first event within the step, record its samples, and make its end the new point."""
-        f, r, places, records = self.frame, self.frame.r, self.frame.places, self.records
+        f, r, workspace, records = self.frame, self.frame.r, self.frame.workspace, self.records
         if self.search:
-            self.search.happened.value = 0
+            self.search.event_located.value = 0
         time, h = f.time.value, f.h.value
         if self.search:
-            self.search.first_event(time)
+            self.search.locate_first_event(time)
             h = f.h.value
         new_time = f.new_time.value
         before = new_time * SAME_BELOW
         if self.search:
             # An event is located to the last place: a sample time just before it is recorded with the values
             # before the event, unless a tick or breakpoint is at this instant as well.
-            apart = (self.search.happened.value != 0) & (new_time < f.end.value * SAME_BELOW)
+            apart = (self.search.event_located.value != 0) & (new_time < f.end.value * SAME_BELOW)
             before = select(apart, (new_time.bits() - 1).from_bits(), before)
         records.samples(time, before, h)
         if self.delays:
             self.delays.write_step(time, new_time, h)
-        f.copy(places.y, places.x, f.n)
+        f.copy(workspace.y, workspace.x, f.n)
         f.time.value = new_time
         f.increase(Count.ACCEPTED)
-        f.count[Count.FRESH].value = 0
+        f.count[Count.RESTARTED].value = 0
         bound = f.scalar[Scalar.BOUND]
         bound.value = bound.value * 10.0
-        f.taken.value = f.taken.value + 1
+        f.steps_of_call.value = f.steps_of_call.value + 1
         ends = new_time >= f.end.value
-        with r.unless((self.search.happened.value != 0) | ends if self.search else ends):
-            f.copy(places.slope(self.method.tableau.end_row), places.slope(0), f.n)
+        with r.unless((self.search.event_located.value != 0) | ends if self.search else ends):
+            f.copy(
+                workspace.stage_derivative(self.method.tableau.end_row), workspace.stage_derivative(0), f.n
+            )
             if f.sizes.algebraic or self.delays:
                 # Recording samples may have changed ``trial_w``. Newton's method finds the same solution
                 # quickly.
@@ -236,7 +239,9 @@ class Instants(Course):
             stages.go(STEP)
         with r.when(new_time >= self.segment_end.value):
             f.increase(Count.SEGMENT)
-            f.count[Count.FRESH].value = 1
-        f.count[Count.STARTED].value = Stage.INSTANT
-        self.clocks.halt(new_time)
+            f.count[Count.RESTARTED].value = 1
+        f.count[Count.STAGE].value = Stage.INSTANT
+        # The left limits are recorded before the caller changes variables.
+        self.record_left_limits(new_time)
+        self.clocks.pause_before_ticks(new_time)
         stages.go(INSTANT)

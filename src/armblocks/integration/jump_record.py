@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
+
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.integration.records import ROOM_OF_A_STEP, row_width
+from armblocks.integration.records import JUMP_ROWS_OF_A_STEP, row_width
 from armblocks.integration.workspace import Count, LoopSizes
 
 Vector = NDArray[np.float64]
 
-FIRST_NUMBERS = 1_000_000
+INITIAL_SIZE = 1_000_000
 """Initial number of doubles, 8 MB. The operating system provides the memory that is used."""
-ALL = np.iinfo(np.int64).max
+NO_LIMIT = np.iinfo(np.int64).max
 
 
 class JumpRecord:
@@ -33,7 +35,7 @@ class JumpRecord:
         """Begin an empty record of at most this number of rows; 0: no record."""
         width = self.memory.shape[1]
         self._most = most
-        self.memory = np.empty((min(most, max(64, FIRST_NUMBERS // width)), width))
+        self.memory = np.empty((min(most, max(64, INITIAL_SIZE // width)), width))
         self._counts[Count.JUMPS] = 0
         self.enable()
 
@@ -46,7 +48,7 @@ class JumpRecord:
         """Set the counters of the native loop for the present memory."""
         wanted = bool(self.memory.size) and self.end is None
         self._counts[Count.JUMPS_RECORDED] = int(wanted)
-        self._counts[Count.JUMPS_ROOM] = len(self.memory) - ROOM_OF_A_STEP if wanted else ALL
+        self._counts[Count.JUMPS_CAPACITY] = len(self.memory) - JUMP_ROWS_OF_A_STEP if wanted else NO_LIMIT
 
     def enlarge(self, time: float) -> None:
         """Double the memory; at its maximum size, end the record at the present ``time`` (s)."""
@@ -70,10 +72,11 @@ class JumpRecord:
         complete = self._counts[Count.JUMPS] // 2
         return self.memory[: 2 * complete].reshape(complete, 2, self.memory.shape[1])
 
-    def drop(self, samples: int) -> None:
-        """Drop the instants that belong to the first ``samples`` samples, which are removed from memory."""
-        rows = self.rows
-        later = rows[rows[:, 0, 1] >= samples]
-        later[:, :, 1] -= samples
-        rows[: len(later)] = later
-        self._counts[Count.JUMPS] = 2 * len(later)
+    def drop(self, until: float, samples: int) -> None:
+        """Drop the instants up to a time (s); the first ``samples`` samples are removed from memory."""
+        first = 2 * bisect_right(self.rows, until, key=lambda sides: sides[1, 0])
+        # The instant that is being processed may have its first side only.
+        later = self.memory[first : self._counts[Count.JUMPS]].copy()
+        later[:, 1] -= samples
+        self.memory[: len(later)] = later
+        self._counts[Count.JUMPS] = len(later)

@@ -4,7 +4,8 @@
 eliminated in the order of :mod:`armblocks.integration.elimination_plan`, with its pivots on the diagonal and
 work in proportion to its entries. The residual of its first solution is checked, each row relative to its
 terms (Oettli, Prager, *Numer. Math.* 6 (1964) 405-409: no scaling of states or equations changes that). If it
-is too large, and always for small or full matrices, the whole matrix is eliminated with row pivoting instead.
+is too large, and always for small or nearly full matrices, the dense matrix is eliminated with row pivoting
+instead.
 """
 
 from __future__ import annotations
@@ -19,21 +20,21 @@ from armblocks.routines.routine import Function, Program, Routine
 from armblocks.routines.values import Boolean, Integer, Real
 
 SMALL = 8
-"""Up to this size the whole matrix is eliminated with pivoting, which is the fastest way."""
+"""Up to this size the dense matrix is eliminated with pivoting, which is the fastest way."""
 FULL = 0.5
 """The same applies if L and U have this fraction of all entries."""
 SCALING_ROUNDS = 6
 """Iterations after which the bound of the rates is within a factor of about two, for most matrices."""
-LEFT_OVER = 1e-7
+LARGEST_RESIDUAL = 1e-7
 """Relative residual above which the elimination without pivoting counts as failed. An error of this size in
 the Jacobian causes an error far below the usual tolerances of a Rosenbrock method."""
 
 
-class LinearSpace:
+class LinearEquationsLayout:
     """The positions of the linear equations in ``scratch``. No step reads what an earlier step wrote there.
 
     The system's ``flow_jacobian`` writes ``J`` and ``T``. ``right`` has the order of the equations,
-    ``solution`` that of the unknowns. ``swaps`` are integers, and so is ``whole``: whether the whole matrix
+    ``solution`` that of the unknowns. ``swaps`` are integers, and so is ``dense``: whether the dense matrix
     was eliminated.
     """
 
@@ -44,7 +45,7 @@ class LinearSpace:
         if plan is not None and plan.filled > FULL * pattern.size**2:
             plan = None
         self.plan = plan
-        inside = 0 if plan is None else plan.filled
+        stored = 0 if plan is None else plan.filled
         self.J = 0
         self.T = self.J + len(pattern.rows)
         self.right = self.T + self.size
@@ -52,9 +53,9 @@ class LinearSpace:
         self.work = self.solution + self.size
         self.pivots = self.work + self.size
         self.lower = self.pivots + self.size
-        self.swaps = self.lower + inside
-        self.whole = self.swaps + self.size
-        self.matrix = self.whole + 1
+        self.swaps = self.lower + stored
+        self.dense = self.swaps + self.size
+        self.matrix = self.dense + 1
         self.length = self.matrix + self.size**2
 
 
@@ -62,24 +63,24 @@ class LinearEquations:
     """The functions of a program that factor the matrix of a step and solve for its right sides.
 
     ``gamma`` is the coefficient of the method. :attr:`factor` is the cheapest elimination,
-    :attr:`factor_whole` the one with pivoting.
+    :attr:`factor_dense` the one with pivoting.
     """
 
-    def __init__(self, program: Program, space: LinearSpace, gamma: float) -> None:
+    def __init__(self, program: Program, layout: LinearEquationsLayout, gamma: float) -> None:
         self.program = program
-        self.space = space
-        whole = _Whole(space, 1.0 / gamma)
-        self.factor_whole = program.define(whole.factor_whole, inlined=False)
-        self.factor: Function[[Reals, Real], None] = self.factor_whole
-        self.solved_well: Function[[Reals, Real], Boolean] | None = None
+        self.layout = layout
+        dense = _Dense(layout, 1.0 / gamma)
+        self.factor_dense = program.define(dense.factor_dense, inlined=False)
+        self.factor: Function[[Reals, Real], None] = self.factor_dense
+        self.is_accurate: Function[[Reals, Real], Boolean] | None = None
         """Whether the solution with the step ``h`` is accurate: the residual of every row is small relative
         to the terms of the row. None for elimination with pivoting, which needs no check."""
-        if space.plan is not None:
-            sparse = _Sparse(space, space.plan, 1.0 / gamma)
+        if layout.plan is not None:
+            sparse = _Sparse(layout, layout.plan, 1.0 / gamma)
             self.factor = program.define(sparse.factor, inlined=False)
-            self.solved_well = program.define(sparse.solved_well, inlined=False)
-            whole.solve_sparse = program.define(sparse.solve_sparse, inlined=False)
-        self.solve = program.define(whole.solve_linear, inlined=False)
+            self.is_accurate = program.define(sparse.is_accurate, inlined=False)
+            dense.solve_sparse = program.define(sparse.solve_sparse, inlined=False)
+        self.solve = program.define(dense.solve_linear, inlined=False)
 
     @property
     def rate_bound(self) -> Function[[Reals], Real]:
@@ -89,13 +90,13 @@ class LinearEquations:
         Matrix Analysis, 8.1.31 and 8.1.18). A few iterations of ``v = sqrt(v |J| v)`` adapt v to the scales
         of the states.
         """
-        space = self.space
+        layout = self.layout
 
         def rate_bound(r: Routine, scratch: Reals) -> Real:
-            n, entries = space.n, len(space.pattern.rows)
-            rows = r.integers("jacobian.rows", space.pattern.rows)
-            columns = r.integers("jacobian.columns", space.pattern.columns)
-            J, v, product = (scratch.after(place) for place in (space.J, space.right, space.work))
+            n, entries = layout.n, len(layout.pattern.rows)
+            rows = r.integers("jacobian.rows", layout.pattern.rows)
+            columns = r.integers("jacobian.columns", layout.pattern.columns)
+            J, v, product = (scratch.after(place) for place in (layout.J, layout.right, layout.work))
             bound = r.real(0.0)
             for i in r.range(0, n):
                 v[i] = 1.0
@@ -117,23 +118,23 @@ class LinearEquations:
         return self.program.define(rate_bound, inlined=False)
 
 
-class _Whole:
-    """Elimination of the whole matrix, with row pivoting."""
+class _Dense:
+    """Elimination of the dense matrix, with row pivoting."""
 
-    def __init__(self, space: LinearSpace, diagonal: float) -> None:
-        self.space = space
-        self.n, self.size = space.n, space.size
+    def __init__(self, layout: LinearEquationsLayout, diagonal: float) -> None:
+        self.layout = layout
+        self.n, self.size = layout.n, layout.size
         self.diagonal = diagonal
         self.solve_sparse: Function[[Reals], None] | None = None
 
-    def factor_whole(self, r: Routine, scratch: Reals, h: Real) -> None:
+    def factor_dense(self, r: Routine, scratch: Reals, h: Real) -> None:
         """Compute ``E / gamma - h J`` and factor it in place."""
-        space, size = self.space, self.size
-        pattern = space.pattern
-        matrix, J = scratch.after(space.matrix), scratch.after(space.J)
+        layout, size = self.layout, self.size
+        pattern = layout.pattern
+        matrix, J = scratch.after(layout.matrix), scratch.after(layout.J)
         places = [row * size + column for row, column in zip(pattern.rows, pattern.columns)]
         targets = r.integers("jacobian.places", places)
-        scratch.integers[space.whole] = 1
+        scratch.integers[layout.dense] = 1
         for i in r.range(0, size**2):
             matrix[i] = 0.0
         for i in r.range(0, self.n):
@@ -146,33 +147,33 @@ class _Whole:
 
     def solve_linear(self, r: Routine, scratch: Reals) -> None:
         """Solve for the right side in ``scratch`` with the factors computed last."""
-        space = self.space
+        layout = self.layout
         if self.solve_sparse is not None:
-            with r.unless(scratch.integers[space.whole] != 0):
+            with r.unless(scratch.integers[layout.dense] != 0):
                 r.call(self.solve_sparse, scratch)
                 r.return_()
-        right, y = scratch.after(space.right), scratch.after(space.solution)
+        right, y = scratch.after(layout.right), scratch.after(layout.solution)
         for i in r.range(0, self.size):
             y[i] = right[i]
         self.elimination(scratch).solve(r, y)
 
     def elimination(self, scratch: Reals) -> PivotedElimination:
-        space = self.space
+        layout = self.layout
         return PivotedElimination(
-            size=space.size,
-            matrix=scratch.after(space.matrix),
-            pivots=scratch.after(space.pivots),
-            swaps=scratch.integers.after(space.swaps),
+            size=layout.size,
+            matrix=scratch.after(layout.matrix),
+            pivots=scratch.after(layout.pivots),
+            swaps=scratch.integers.after(layout.swaps),
         )
 
 
 class _Sparse:
     """Sparse elimination by a plan: the places of the entries are constants of the program."""
 
-    def __init__(self, space: LinearSpace, plan: Elimination, diagonal: float) -> None:
-        self.space = space
+    def __init__(self, layout: LinearEquationsLayout, plan: Elimination, diagonal: float) -> None:
+        self.layout = layout
         self.plan = plan
-        self.diagonal = [diagonal if column < space.n else 0.0 for column in plan.columns]
+        self.diagonal = [diagonal if column < layout.n else 0.0 for column in plan.columns]
 
     def entries(self, r: Routine) -> Rows:
         """The entries of J in each row: their indices, and their places in the row."""
@@ -194,15 +195,15 @@ class _Sparse:
 
     def factor(self, r: Routine, scratch: Reals, h: Real) -> None:
         """Compute the factors of ``E / gamma - h J``, row by row."""
-        space = self.space
+        layout = self.layout
         J, work, pivots, factors = (
-            scratch.after(place) for place in (space.J, space.work, space.pivots, space.lower)
+            scratch.after(place) for place in (layout.J, layout.work, layout.pivots, layout.lower)
         )
         entries, lower, upper = self.entries(r), self.lower(r), self.upper(r)
         diagonal = r.reals("diagonal.of", self.diagonal)
-        scratch.integers[space.whole] = 0
+        scratch.integers[layout.dense] = 0
         minus_h = -h
-        for i in r.range(0, space.size):
+        for i in r.range(0, layout.size):
             for part in (lower, upper):
                 for k in part.of(i):
                     work[part.places[k]] = 0.0
@@ -224,9 +225,9 @@ class _Sparse:
 
     def solve_sparse(self, r: Routine, scratch: Reals) -> None:
         """Forward and backward substitution."""
-        space = self.space
-        y, pivots, factors = (scratch.after(place) for place in (space.work, space.pivots, space.lower))
-        right, solution = scratch.after(space.right), scratch.after(space.solution)
+        layout = self.layout
+        y, pivots, factors = (scratch.after(place) for place in (layout.work, layout.pivots, layout.lower))
+        right, solution = scratch.after(layout.right), scratch.after(layout.solution)
         equations, unknowns = self.order(r)
         lower, upper = self.lower(r), self.upper(r)
 
@@ -237,33 +238,33 @@ class _Sparse:
                 total.value = fma(factors[k], known, total.value)
             return total.value
 
-        for i in r.range(0, space.size):
+        for i in r.range(0, layout.size):
             y[i] = subtract_all(lower, i, right[equations[i]])
-        for turn in r.range(0, space.size):
-            i = space.size - 1 - turn
+        for k in r.range(0, layout.size):
+            i = layout.size - 1 - k
             value = subtract_all(upper, i, y[i]) * pivots[i]
             y[i] = value
             solution[unknowns[i]] = value
 
-    def solved_well(self, r: Routine, scratch: Reals, h: Real) -> Boolean:
+    def is_accurate(self, r: Routine, scratch: Reals, h: Real) -> Boolean:
         """Whether the residual of every solved equation is small relative to the terms of the equation."""
-        space = self.space
-        J, right, solution = (scratch.after(place) for place in (space.J, space.right, space.solution))
+        layout = self.layout
+        J, right, solution = (scratch.after(place) for place in (layout.J, layout.right, layout.solution))
         entries, diagonal = self.entries(r), r.reals("diagonal.of", self.diagonal)
         equations, unknowns = self.order(r)
-        good = r.boolean(True)
+        accurate = r.boolean(True)
         minus_h = -h
-        for i in r.range(0, space.size):
+        for i in r.range(0, layout.size):
             known, own = right[equations[i]], solution[unknowns[i]]
             product = diagonal[i] * own
-            rest, terms = r.real(known - product), r.real(abs(known) + abs(product))
+            residual, terms = r.real(known - product), r.real(abs(known) + abs(product))
             for k in entries.of(i):
                 coefficient = minus_h * J[entries.numbers[k]]
                 part = coefficient * solution[unknowns[entries.places[k]]]
-                rest.value = rest.value - part
+                residual.value = residual.value - part
                 terms.value = terms.value + abs(part)
-            good.value = good.value & (abs(rest.value) <= LEFT_OVER * terms.value)
-        return good.value
+            accurate.value = accurate.value & (abs(residual.value) <= LARGEST_RESIDUAL * terms.value)
+        return accurate.value
 
     def order(self, r: Routine) -> tuple[Integers, Integers]:
         """The equation and the unknown of each row."""

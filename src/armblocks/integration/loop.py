@@ -7,8 +7,8 @@ bitwise identical results.
 
 The loop has these parts: a :class:`~armblocks.integration.method.Method` takes a step,
 :class:`~armblocks.integration.step_control.Steps` chooses its length, a
-:class:`~armblocks.integration.course.Course` determines where steps end and the actions there. The course is
-:class:`~armblocks.integration.segments.Segments` for a system without ticks and events, else
+:class:`~armblocks.integration.schedule.Schedule` determines where steps end and the actions there. The
+schedule is :class:`~armblocks.integration.segments.Segments` for a system without ticks and events, else
 :class:`~armblocks.integration.instants.Instants` with its clocks, events and delayed signals.
 """
 
@@ -18,18 +18,18 @@ from collections.abc import Mapping
 from functools import lru_cache
 
 from armblocks.integration.butcher_tableau import ButcherTableau
-from armblocks.integration.course import INSTANT, START, STEP, Course
 from armblocks.integration.delay_history import DelayHistory
 from armblocks.integration.elimination_plan import JacobianPattern
 from armblocks.integration.evaluation import Evaluation
 from armblocks.integration.explicit_method import ExplicitMethod
 from armblocks.integration.frame import Arrays, Frame
 from armblocks.integration.instants import Instants
-from armblocks.integration.linear_equations import LinearSpace
+from armblocks.integration.linear_equations import LinearEquationsLayout
 from armblocks.integration.method import Method
 from armblocks.integration.records import Records
 from armblocks.integration.rosenbrock_method import RosenbrockMethod
 from armblocks.integration.rosenbrock_tableau import Tableau
+from armblocks.integration.schedule import INSTANT, START, STEP, Schedule
 from armblocks.integration.segments import Segments
 from armblocks.integration.step_control import Steps
 from armblocks.integration.workspace import Count, LoopSizes, Stage, Status, Workspace
@@ -46,8 +46,8 @@ POINTERS = 13
 def loop_text(tableau: Tableau, sizes: LoopSizes, pattern: JacobianPattern | None) -> Mapping[str, str]:
     """LLVM IR of the loop ``advance`` and its functions, by symbol. Systems of equal sizes share it."""
     program = Program()
-    space = None if pattern is None else LinearSpace(pattern)
-    define_loop(program, "advance", tableau, Workspace(tableau, sizes), sizes, space)
+    layout = None if pattern is None else LinearEquationsLayout(pattern)
+    define_loop(program, "advance", tableau, Workspace(tableau, sizes), sizes, layout)
     return definitions(program)
 
 
@@ -57,11 +57,11 @@ def define_loop(
     tableau: Tableau,
     workspace: Workspace,
     sizes: LoopSizes,
-    space: LinearSpace | None = None,
+    layout: LinearEquationsLayout | None = None,
 ) -> None:
     """Define the loop of a method for a system. The loop returns a ``Status``.
 
-    The system's functions (:mod:`armblocks.integration.system_functions`) are external. ``space`` is the
+    The system's functions (:mod:`armblocks.integration.system_functions`) are external. ``layout`` is the
     memory for the linear equations of a Rosenbrock method.
     """
 
@@ -99,7 +99,7 @@ def define_loop(
             max_steps=max_steps,
         )
         frame = Frame(r, arrays, workspace, sizes)
-        _Loop(frame, tableau, space).write()
+        _Loop(frame, tableau, layout).write()
         return frame.status.value
 
     program.define(loop, symbol, public=True, distinct=True)
@@ -108,37 +108,37 @@ def define_loop(
 class _Loop:
     """Combines the parts and emits them in order of execution."""
 
-    def __init__(self, frame: Frame, tableau: Tableau, space: LinearSpace | None) -> None:
+    def __init__(self, frame: Frame, tableau: Tableau, layout: LinearEquationsLayout | None) -> None:
         self.frame = frame
-        r, sizes, places = frame.r, frame.sizes, frame.places
-        history = DelayHistory(r.program, places, sizes) if sizes.delays else None
+        r, sizes, workspace = frame.r, frame.sizes, frame.workspace
+        history = DelayHistory(r.program, workspace, sizes) if sizes.delays else None
         evaluation = Evaluation(frame, history)
-        self.method = _method(frame, tableau, evaluation, space)
+        self.method = _method(frame, tableau, evaluation, layout)
         point = r.real(0.0)
         records = Records(frame, self.method, evaluation, point.memory)
         self.records = records
-        self.course: Course
+        self.schedule: Schedule
         if sizes.hybrid:
-            self.course = Instants(frame, self.method, records, evaluation, point)
+            self.schedule = Instants(frame, self.method, records, evaluation, point)
         else:
-            self.course = Segments(frame, self.method, records)
-        self.steps = Steps(frame, self.method, records, self.course)
+            self.schedule = Segments(frame, self.method, records)
+        self.steps = Steps(frame, self.method, records, self.schedule)
 
     def write(self) -> None:
         """The whole body; at the end the variables are written to the arrays."""
         f, r = self.frame, self.frame.r
-        with r.part() as f.whole, r.stages(INSTANT, START, STEP) as stages:
-            self.course.enter(stages)
+        with r.part() as f.body, r.stages(INSTANT, START, STEP) as stages:
+            self.schedule.enter(stages)
             stages.begin(START)
             self.start()
             stages.begin(STEP)
-            on = (f.taken.value < f.arrays.max_steps) & (f.time.value < f.pause)
-            f.leave_unless(on, Status.PAUSED)
-            self.records.make_room()
-            self.course.before_step()
+            continues = (f.steps_of_call.value < f.arrays.max_steps) & (f.time.value < f.pause)
+            f.leave_unless(continues, Status.PAUSED)
+            self.records.ensure_capacity()
+            self.schedule.before_step()
             self.steps.write()
-            self.course.accept(stages)
-        f.keep()
+            self.schedule.accept(stages)
+        f.store_variables()
 
     def start(self) -> None:
         """Evaluate the first derivative of a segment, record samples at its start, choose the first step."""
@@ -148,12 +148,14 @@ class _Loop:
         self.records.samples(time, time, None)
         f.leave_unless(method.all_finite(method.K(0)), Status.NON_FINITE_START)
         if method.tableau.adaptive:
-            self.course.first_step(time)
-        f.count[Count.STARTED].value = Stage.RUNNING
+            self.schedule.first_step(time)
+        f.count[Count.STAGE].value = Stage.RUNNING
 
 
-def _method(frame: Frame, tableau: Tableau, evaluation: Evaluation, space: LinearSpace | None) -> Method:
+def _method(
+    frame: Frame, tableau: Tableau, evaluation: Evaluation, layout: LinearEquationsLayout | None
+) -> Method:
     if isinstance(tableau, ButcherTableau):
         return ExplicitMethod(frame, tableau, evaluation)
-    assert space is not None
-    return RosenbrockMethod(frame, tableau, evaluation, space)
+    assert layout is not None
+    return RosenbrockMethod(frame, tableau, evaluation, layout)

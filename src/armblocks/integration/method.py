@@ -42,15 +42,15 @@ class Method(ABC):
         self.tableau = tableau
         self.evaluation = evaluation
         self.n = frame.n
-        self.x = frame.vector(frame.places.x)
-        self.y = frame.vector(frame.places.y)
+        self.x = frame.vector(frame.workspace.x)
+        self.y = frame.vector(frame.workspace.y)
         self._point = frame.r.real(0.0)
         self._rtol = frame.reals[Scalar.RTOL]
         self._atol = frame.reals[Scalar.ATOL]
 
     def K(self, row: int) -> Reals:
         """One row of the stage derivatives."""
-        return self.frame.vector(self.frame.places.slope(row))
+        return self.frame.vector(self.frame.workspace.stage_derivative(row))
 
     # The step.
 
@@ -73,11 +73,11 @@ class Method(ABC):
         """Weighted root-mean-square norm of the error estimate of the step to y."""
         return self.norm(h, error)
 
-    def change(self, h: Real) -> Real:
+    def derivative_change(self, h: Real) -> Real:
         """Norm of ``h`` times the change of the derivative within the step."""
         return self.norm(h, change_to(self.tableau.end_row))
 
-    def watch(self, h: Real) -> None:  # noqa: B027
+    def check_stiffness(self, h: Real) -> None:  # noqa: B027
         """Check at intervals whether another method is faster; pause if so."""
 
     def set_point(self, time: Real) -> Reals:
@@ -91,7 +91,7 @@ class Method(ABC):
         self.evaluation.flow(self.set_point(time), state, self.K(row))
         self.frame.increase(Count.EVALUATIONS)
 
-    def move(self, weights: Row, h: Real) -> None:
+    def set_y(self, weights: Row, h: Real) -> None:
         """``y = x + h sum_j weights[j] K[j]``."""
         for i in self.r.each(self.n):
             self.y[i] = fma(h, self.combination(weights, i), self.x[i])
@@ -120,7 +120,7 @@ class Method(ABC):
         return h * self.mean_square(self.weighted(weights))
 
     def first_step(self, time: Real, interval: Real, max_step: Real) -> tuple[Real, Boolean]:
-        """Length of a segment's first step: Hairer, Norsett, Wanner I, II.4, as SciPy does it.
+        """Length of the first step of a segment, chosen as in SciPy (Hairer, Norsett, Wanner I, II.4).
 
         Also returns whether the length of the interval limits it.
         """
@@ -134,7 +134,7 @@ class Method(ABC):
         h0 = select(small, 1e-6, 0.01 * d0 / d1)
         clipped = h0 >= interval
         h0 = minimum(h0, interval)
-        self.move((1.0,), h0)
+        self.set_y((1.0,), h0)
         self.evaluate(time + h0, self.y, 1)
         d2 = self.mean_square(weighted(lambda i: self.K(1)[i] - self.K(0)[i])) / h0
         steepest = maximum(d2, d1)

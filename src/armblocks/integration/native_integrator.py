@@ -16,7 +16,7 @@ from armblocks.integration.delay_history import ROWS_OF_A_STEP
 from armblocks.integration.elimination_plan import JacobianPattern
 from armblocks.integration.explicit_method import STIFF_CHECKS
 from armblocks.integration.jump_record import JumpRecord
-from armblocks.integration.linear_equations import LinearSpace
+from armblocks.integration.linear_equations import LinearEquationsLayout
 from armblocks.integration.loop import POINTERS, loop_text
 from armblocks.integration.rosenbrock_method import STABLE_CHECKS
 from armblocks.integration.rosenbrock_tableau import Tableau
@@ -33,7 +33,7 @@ _ADVANCE = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * POINTERS, ctype
 SAME_INSTANT = 1.0 + 2.0**-50
 """Two times within this factor are equal, as in the native loop."""
 
-FIRST_ROOM = 2 * ROWS_OF_A_STEP
+INITIAL_CAPACITY = 2 * ROWS_OF_A_STEP
 """Initial capacity of the delay history, rows."""
 
 
@@ -54,7 +54,7 @@ class NativeIntegrator:
         Rosenbrock method also needs the ``pattern`` of ``flow_jacobian`` and its tape.
         """
         self.tableau = tableau
-        self.space = None if pattern is None else LinearSpace(pattern)
+        self.layout = None if pattern is None else LinearEquationsLayout(pattern)
         self.sizes = sizes
         self.states = sizes.states
         self.workspace = Workspace(tableau, sizes)
@@ -86,7 +86,7 @@ class NativeIntegrator:
         atol: float = 1e-9,
         max_step: float = float("inf"),
         checkpoint: Checkpoint | None = None,
-        watch_stiffness: bool = False,
+        detect_stiffness: bool = False,
         stop: float | None = None,
         span: float | None = None,
         jumps: int = 0,
@@ -98,11 +98,11 @@ class NativeIntegrator:
         step ends exactly on each one inside the run. Before it ``f`` is evaluated at most at the last double
         before it, and after it the integration restarts. ``step`` s: grid of a fixed-step method (its times
         are ``k step``); ``rtol``, ``atol``, ``max_step`` s: for adaptive methods. With a ``checkpoint`` the
-        run continues from there, with the results of the run that wrote it. With ``watch_stiffness`` it
+        run continues from there, with the results of the run that wrote it. With ``detect_stiffness`` it
         pauses where a method for stiff systems, or an explicit method again, is faster
-        (:attr:`Integration.wants_other`). ``span`` s: approximate length of the run, for the resolution of
-        events near time 0 (default: ``stop``). ``jumps``: maximum number of rows for both sides of the
-        instants; 0: they are not recorded. Arguments are not checked.
+        (:attr:`Integration.other_method_faster`). ``span`` s: approximate length of the run, for the
+        resolution of events near time 0 (default: ``stop``). ``jumps``: maximum number of rows for both sides
+        of the instants; 0: they are not recorded. Arguments are not checked.
         """
         if not isinstance(start, RunPoint):
             start = RunPoint(time=float(samples[0]), x=start)
@@ -116,11 +116,11 @@ class NativeIntegrator:
         clamps[: inside.size] = np.nextafter(inside, -np.inf)
         run = Integration(self, p, samples, ends, clamps)
         if checkpoint is not None:
-            run.back_to(checkpoint)
-            run.counts[: Count.STARTED] = (0, samples.size, 0, ends.size)
+            run.restore(checkpoint)
+            run.counts[: Count.STAGE] = (0, samples.size, 0, ends.size)
             run.counts[[Count.ACCEPTED, Count.REJECTED, Count.EVALUATIONS, Count.INSTANTS, Count.EVENTS]] = 0
         else:
-            run.place(start, step=step, first=not start.begun)
+            run.start_at(start, step=step, first=not start.begun)
         run.reals[Scalar.RTOL] = rtol
         run.reals[Scalar.ATOL] = atol
         run.reals[Scalar.MAX_STEP] = max_step
@@ -128,8 +128,10 @@ class NativeIntegrator:
         run.reals[Scalar.PAUSE] = np.inf
         run.reals[Scalar.HALT] = np.inf
         run.jumps.begin(jumps)
-        run.take_addresses()
-        run.watch(max(1, int(run.counts[Count.WATCHING])) if watch_stiffness else 0)
+        run.update_addresses()
+        run.enable_stiffness_detection(
+            max(1, int(run.counts[Count.STIFFNESS_DETECTION])) if detect_stiffness else 0
+        )
         if stop <= begins and not self.sizes.hybrid:
             run.states[0] = start.x
             run.counts[Count.SAMPLE] = 1
@@ -138,22 +140,22 @@ class NativeIntegrator:
             run.counts[Count.SEGMENT] = run.counts[Count.SEGMENTS]  # process the instant, take no step
         return run
 
-    def take_over(self, run: Integration) -> Integration:
+    def continue_run(self, run: Integration) -> Integration:
         """Continue with this method from the state of another method of the same system, between two steps.
 
         Samples are recorded into the same arrays.
         """
-        old, here = run.integrator.workspace, self.workspace
-        new = Integration(self, *run.course, records=(run.states, run.discrete, run.algebraic))
-        new.make_room(run.reals.size - old.size)
-        head = here.slope(1)  # numbers, x, y, and the derivative at x
+        old, own = run.integrator.workspace, self.workspace
+        new = Integration(self, *run.inputs, records=(run.states, run.discrete, run.algebraic))
+        new.ensure_capacity(run.reals.size - old.size)
+        head = own.stage_derivative(1)  # numbers, x, y, and the derivative at x
         new.reals[:head] = run.reals[:head]
-        new.reals[here.z :] = run.reals[old.z :]
+        new.reals[own.z :] = run.reals[old.z :]
         new.counts[:] = run.counts
-        new.counts[[Count.WATCHED, Count.STIFF, Count.CALM, Count.SHORT]] = 0
-        new.watch(1 + int(run.counts[Count.WATCHING]))
+        new.counts[[Count.STIFFNESS_STEPS, Count.STIFF, Count.NON_STIFF, Count.SHORT_STEPS]] = 0
+        new.enable_stiffness_detection(1 + int(run.counts[Count.STIFFNESS_DETECTION]))
         new.jumps.share(run.jumps)
-        new.take_addresses()
+        new.update_addresses()
         return new
 
     def advance(self, addresses: tuple[int, ...], max_steps: int) -> Status:
@@ -189,21 +191,21 @@ class Integration:
     ) -> None:
         workspace = integrator.workspace
         self.integrator = integrator
-        self._room = FIRST_ROOM * workspace.history_width if integrator.sizes.delays else 0
-        self.reals = np.zeros(workspace.size + self._room)
+        self._history_size = INITIAL_CAPACITY * workspace.history_width if integrator.sizes.delays else 0
+        self.reals = np.zeros(workspace.size + self._history_size)
         self.counts = np.zeros(workspace.counts, dtype=np.int64)
         self.counts[Count.SEGMENTS] = ends.size
         self.status = Status.PAUSED
         self._saved = _checkpoint(self, np.full_like(self.reals, np.nan), np.zeros_like(self.counts))
         # Parameters, sample times, ends of the segments, and the latest evaluation time of each segment.
-        self.course = (np.ascontiguousarray(p), np.ascontiguousarray(samples), ends, clamps)
-        self._scratch = np.empty(1 if integrator.space is None else integrator.space.length)
+        self.inputs = (np.ascontiguousarray(p), np.ascontiguousarray(samples), ends, clamps)
+        self._scratch = np.empty(1 if integrator.layout is None else integrator.layout.length)
         self.jumps = JumpRecord(self.counts, integrator.sizes)
-        self.record(samples, records)
+        self.record_at(samples, records)
 
-    def record(self, samples: Vector, records: tuple[Vector, Vector, Vector] | None = None) -> None:
+    def record_at(self, samples: Vector, records: tuple[Vector, Vector, Vector] | None = None) -> None:
         """Record at the times ``samples``, (N,) s, from now on, into new arrays if none are given."""
-        sizes, (p, _, ends, clamps) = self.integrator.sizes, self.course
+        sizes, (p, _, ends, clamps) = self.integrator.sizes, self.inputs
         if records is None:
             x, z, w = (np.empty((samples.size, n)) for n in (sizes.states, sizes.discrete, sizes.algebraic))
             records = x, z, w
@@ -212,102 +214,96 @@ class Integration:
         nw)`` at the sample times. The first ``recorded`` rows are valid."""
         self.counts[Count.SAMPLE] = 0
         self.counts[Count.SAMPLES] = samples.size
-        self.course = (p, np.ascontiguousarray(samples), ends, clamps)
-        self.take_addresses()
+        self.inputs = (p, np.ascontiguousarray(samples), ends, clamps)
+        self.update_addresses()
 
-    def make_room(self, numbers: int) -> None:
+    def ensure_capacity(self, numbers: int) -> None:
         """Enlarge the array of doubles, which contains the delay history, to at least ``numbers``
         elements."""
-        if numbers <= self._room:
+        if numbers <= self._history_size:
             return
-        more = np.zeros(numbers - self._room)
+        more = np.zeros(numbers - self._history_size)
         self.reals = np.concatenate([self.reals, more])
         saved = np.concatenate([self._saved.reals, more])
         self._saved = _checkpoint(self, saved, self._saved.counts)
-        self._room = numbers
-        self.counts[Count.HISTORY_ROOM] = numbers // self.integrator.workspace.history_width
-        self.take_addresses()
+        self._history_size = numbers
+        self.counts[Count.HISTORY_CAPACITY] = numbers // self.integrator.workspace.history_width
+        self.update_addresses()
 
-    def take_addresses(self) -> None:
-        """Note the addresses of all arrays, after one of them was replaced."""
-        arrays = (self.reals, self.counts, *self.course, self.states, self.discrete, self.algebraic)
+    def update_addresses(self) -> None:
+        """Store the addresses of all arrays. Required after one of them was replaced."""
+        arrays = (self.reals, self.counts, *self.inputs, self.states, self.discrete, self.algebraic)
         arrays += (self.jumps.memory, self._saved.reals, self._saved.counts, self._scratch)
         self._addresses = tuple(array.ctypes.data for array in arrays)
 
-    def place(self, start: RunPoint, *, step: float, first: bool) -> None:
+    def start_at(self, start: RunPoint, *, step: float, first: bool) -> None:
         """Set the run to a point; with ``first`` the ticks at that time are pending."""
-        places, sizes = self.integrator.workspace, self.integrator.sizes
+        workspace, sizes = self.integrator.workspace, self.integrator.sizes
         self.reals[Scalar.TIME] = start.time
         self.reals[Scalar.STEP] = step
         self.reals[Scalar.BOUND] = np.inf
-        self.reals[Scalar.SCAN] = np.inf
+        self.reals[Scalar.WINDOW] = np.inf
         self.reals[Scalar.LAST_EVENT] = -np.inf
-        self.reals[places.last : places.last + len(sizes.directions)] = -np.inf
-        self.reals[places.gap : places.gap + len(sizes.directions)] = np.inf
+        self.reals[workspace.last : workspace.last + len(sizes.directions)] = -np.inf
+        self.reals[workspace.gap : workspace.gap + len(sizes.directions)] = np.inf
         self.state[:] = start.x
-        self._vector(places.z, sizes.discrete)[:] = start.z
-        self._vector(places.w, sizes.algebraic)[:] = start.w
-        self.counts[Count.STARTED] = Stage.INSTANT if sizes.hybrid else Stage.START
-        self.counts[Count.FRESH] = 1
+        self._vector(workspace.z, sizes.discrete)[:] = start.z
+        self._vector(workspace.w, sizes.algebraic)[:] = start.w
+        self.counts[Count.STAGE] = Stage.INSTANT if sizes.hybrid else Stage.START
+        self.counts[Count.RESTARTED] = 1
         self.counts[Count.AT_START] = 1
         if sizes.delays:
-            self._place_past(start)
+            self._set_history(start)
         for clock, (period, offset) in enumerate(sizes.clocks):
             number = 0 if first else max(0, int((start.time - offset) / period) - 1)
             while not first and number * period + offset <= start.time * SAME_INSTANT:
                 number += 1
             self.counts[Count.END + clock] = number
 
-    def _place_past(self, start: RunPoint) -> None:
+    def _set_history(self, start: RunPoint) -> None:
         """The initial history: that of the point, or the constant initial values."""
-        places, lines = self.integrator.workspace, self.integrator.sizes.delays
-        past = start.past
-        if not past.size:
+        workspace, lines = self.integrator.workspace, self.integrator.sizes.delays
+        history = start.history
+        if not history.size:
             before = [start.z[line.value] for line in lines]
-            past = np.array([start.time, 0.0, *before, *(0.0 for _ in lines)])
-        self.make_room(2 * past.size)
-        self.reals[places.history : places.history + past.size] = past
-        self.counts[Count.HISTORY_ROWS] = past.size // places.history_width
-        self.counts[Count.HISTORY_ROOM] = self._room // places.history_width
+            history = np.array([start.time, 0.0, *before, *(0.0 for _ in lines)])
+        self.ensure_capacity(2 * history.size)
+        self.reals[workspace.history : workspace.history + history.size] = history
+        self.counts[Count.HISTORY_ROWS] = history.size // workspace.history_width
+        self.counts[Count.HISTORY_CAPACITY] = self._history_size // workspace.history_width
         first = int(Count.END) + len(self.integrator.sizes.clocks)
         self.counts[first : first + len(lines)] = 0
         self.counts[first + len(lines) :] = -1
 
-    def cut_at(self, time: float) -> None:
+    def end_step_at(self, time: float) -> None:
         """Let a step end exactly at a later time (s), and restart there."""
-        p, samples, *bounds = self.course
+        p, samples, *bounds = self.inputs
         ends, clamps = (bound[self.counts[Count.SEGMENT] :] for bound in bounds)
         place = int(np.searchsorted(ends, time))
         if place == ends.size or ends[place] == time:
             return
-        self.course = (p, samples, np.insert(ends, place, time), np.insert(clamps, place, time))
+        self.inputs = (p, samples, np.insert(ends, place, time), np.insert(clamps, place, time))
         self.counts[Count.SEGMENT] = 0
-        self.counts[Count.SEGMENTS] = self.course[2].size
-        self.take_addresses()
+        self.counts[Count.SEGMENTS] = self.inputs[2].size
+        self.update_addresses()
 
-    @property
-    def start_of_jumps(self) -> float | None:
-        """The time of the start, which the record of the jumps contains as its first instant; ``None`` if it
-        does not."""
-        return self.time if self.integrator.sizes.hybrid and self.counts[Count.AT_START] else None
-
-    def halt_at(self, time: float) -> None:
+    def pause_before_ticks_at(self, time: float) -> None:
         """Return from :meth:`advance` before the ticks of the first instant at a time (s) or later."""
         self.reals[Scalar.HALT] = time
 
     @property
-    def waiting(self) -> bool:
+    def instant_pending(self) -> bool:
         """Whether the ticks and events at the present time are pending."""
-        return bool(self.counts[Count.STARTED] == Stage.INSTANT)
+        return bool(self.counts[Count.STAGE] == Stage.INSTANT)
 
     def next_tick(self, clock: int) -> float:
-        """The time of the next tick, s; this may be now while the run is :attr:`waiting`."""
+        """The time of the next tick, s; this may be now while the run is :attr:`instant_pending`."""
         period, offset = self.integrator.sizes.clocks[clock]
         return float(self.counts[Count.END + clock]) * period + offset
 
-    def put_discrete(self, places: slice, values: Vector) -> None:
+    def set_discrete(self, indices: slice, values: Vector) -> None:
         """Set some discrete variables at the present time."""
-        self._vector(self.integrator.workspace.z, self.integrator.sizes.discrete)[places] = values
+        self._vector(self.integrator.workspace.z, self.integrator.sizes.discrete)[indices] = values
 
     def advance(self, max_steps: int, pause: float = np.inf) -> Status:
         """Take at most ``max_steps`` accepted steps, and none that begins at ``pause`` (s) or later."""
@@ -316,10 +312,10 @@ class Integration:
             self.status = self.integrator.advance(self._addresses, max_steps)
             while self.status in (Status.HISTORY_FULL, Status.JUMPS_FULL):
                 if self.status is Status.HISTORY_FULL:
-                    self.make_room(2 * self._room)
+                    self.ensure_capacity(2 * self._history_size)
                 else:
                     self.jumps.enlarge(self.time)
-                    self.take_addresses()
+                    self.update_addresses()
                 self.status = self.integrator.advance(self._addresses, max_steps)
         return self.status
 
@@ -330,55 +326,57 @@ class Integration:
             return None
         return _checkpoint(self, self._saved.reals.copy(), self._saved.counts.copy())
 
-    def back_to(self, checkpoint: Checkpoint) -> None:
-        """Return to the state of :meth:`now`, and drop later samples."""
-        self.make_room(checkpoint.reals.size - self.integrator.workspace.size)
+    def restore(self, checkpoint: Checkpoint) -> None:
+        """Return to the state of :meth:`present_checkpoint`, and drop later samples."""
+        self.ensure_capacity(checkpoint.reals.size - self.integrator.workspace.size)
         self.reals[: checkpoint.reals.size] = checkpoint.reals
         self.counts[:] = checkpoint.counts
         if self.integrator.sizes.delays:
-            self.counts[Count.HISTORY_ROOM] = self._room // self.integrator.workspace.history_width
+            self.counts[Count.HISTORY_CAPACITY] = (
+                self._history_size // self.integrator.workspace.history_width
+            )
         self.jumps.enable()
         self.status = Status.PAUSED
 
-    def now(self) -> Checkpoint:
+    def present_checkpoint(self) -> Checkpoint:
         """The arrays as they are, between two calls of :meth:`advance`."""
         return _checkpoint(self, self.reals.copy(), self.counts.copy())
 
     @property
     def point(self) -> RunPoint:
         """Copies of the present state."""
-        places, sizes = self.integrator.workspace, self.integrator.sizes
-        z, w = self._vector(places.z, sizes.discrete), self._vector(places.w, sizes.algebraic)
-        past = np.empty(0)
+        workspace, sizes = self.integrator.workspace, self.integrator.sizes
+        z, w = self._vector(workspace.z, sizes.discrete), self._vector(workspace.w, sizes.algebraic)
+        history = np.empty(0)
         if sizes.delays:
-            rows = int(self.counts[Count.HISTORY_ROWS]) * places.history_width
-            past = self._vector(places.history, rows).copy()
-        return RunPoint(time=self.time, x=self.state.copy(), z=z.copy(), w=w.copy(), past=past)
+            rows = int(self.counts[Count.HISTORY_ROWS]) * workspace.history_width
+            history = self._vector(workspace.history, rows).copy()
+        return RunPoint(time=self.time, x=self.state.copy(), z=z.copy(), w=w.copy(), history=history)
 
     @property
     def trial_unknowns(self) -> Vector:
         """Unknowns of the implicit equations at the point evaluated last, ``(nw,)``: NaN if not found."""
         return self._vector(self.integrator.workspace.trial_w, self.integrator.sizes.algebraic)
 
-    def watch(self, changes: int) -> None:
+    def enable_stiffness_detection(self, changes: int) -> None:
         """Pause where another method is faster. ``changes``: 1 plus the number of changes so far, or 0 for
         never.
 
         With each change, more checks are required before an explicit method takes over again.
         """
-        self.counts[Count.WATCHING] = changes
+        self.counts[Count.STIFFNESS_DETECTION] = changes
         if not self._explicit:
             self.counts[Count.STIFF] = STABLE_CHECKS * 4 ** min(10, max(0, changes - 2) // 2)
 
     @property
-    def wants_other(self) -> bool:
+    def other_method_faster(self) -> bool:
         """Whether the run paused because another method is faster from here on: stability has limited the
         steps of an explicit method, or an explicit method could have taken the steps of a stiff one."""
-        if self.status is not Status.PAUSED or not self.counts[Count.WATCHING]:
+        if self.status is not Status.PAUSED or not self.counts[Count.STIFFNESS_DETECTION]:
             return False
         if self._explicit:
             return bool(self.counts[Count.STIFF] >= STIFF_CHECKS)
-        return bool(self.counts[Count.CALM] >= self.counts[Count.STIFF])
+        return bool(self.counts[Count.NON_STIFF] >= self.counts[Count.STIFF])
 
     @property
     def _explicit(self) -> bool:
@@ -394,7 +392,7 @@ class Integration:
         """Guards that fired so far."""
         return int(self.counts[Count.EVENTS])
 
-    def positive(self, guards: Sequence[int]) -> list[int]:
+    def positive_guards(self, guards: Sequence[int]) -> list[int]:
         """Those of ``guards`` that are positive at the present time."""
         signs = self._vector(self.integrator.workspace.signs, len(self.integrator.sizes.directions))
         return [guard for guard in guards if signs[guard] > 0.0]
@@ -406,16 +404,16 @@ class Integration:
     @property
     def repeating_guards(self) -> list[int]:
         """The guards that fired in most of the latest consecutive close events."""
-        places, count = self.integrator.workspace, len(self.integrator.sizes.directions)
-        repeats = self.reals[places.repeats : places.repeats + count]
+        workspace, count = self.integrator.workspace, len(self.integrator.sizes.directions)
+        repeats = self.reals[workspace.repeats : workspace.repeats + count]
         return [int(k) for k in np.flatnonzero((repeats > 0.0) & (repeats >= 0.5 * repeats.max(initial=0.0)))]
 
     @property
-    def contradicting_modes(self) -> list[int]:
+    def inconsistent_modes(self) -> list[int]:
         """The indices in ``z`` of the inconsistent modes."""
-        places, modes = self.integrator.workspace, self.integrator.sizes.modes
-        found = self.reals[places.contradictions : places.contradictions + len(modes)]
-        return [place for place, contradicts in zip(modes, found) if contradicts]
+        workspace, modes = self.integrator.workspace, self.integrator.sizes.modes
+        found = self.reals[workspace.contradictions : workspace.contradictions + len(modes)]
+        return [place for place, inconsistent in zip(modes, found) if inconsistent]
 
     @property
     def time(self) -> float:
@@ -425,7 +423,7 @@ class Integration:
     @property
     def stop(self) -> float:
         """Time at which the run is complete, s."""
-        return float(self.course[2][-1])
+        return float(self.inputs[2][-1])
 
     @property
     def state(self) -> Vector:
@@ -462,7 +460,7 @@ class Integration:
 
     def _stage_derivatives(self) -> Vector:
         n, rows = self.integrator.states, self.integrator.tableau.rows
-        return self._vector(self.integrator.workspace.slope(0), rows * n).reshape(rows, n)
+        return self._vector(self.integrator.workspace.stage_derivative(0), rows * n).reshape(rows, n)
 
     def weighted_errors(self) -> Vector:
         """Error of every state in the last trial step, divided by its tolerance, ``(n,)`` (adaptive
@@ -475,20 +473,22 @@ class Integration:
         K = self._stage_derivatives()
         return self._weighted(K[self.integrator.tableau.end_row] - K[0])
 
-    def _weighted(self, slope: Vector) -> Vector:
+    def _weighted(self, derivative: Vector) -> Vector:
         after = self._vector(self.integrator.workspace.y, self.integrator.states)
         rtol, atol = self.reals[Scalar.RTOL], self.reals[Scalar.ATOL]
-        return np.abs(self.last_step * slope) / (atol + rtol * np.maximum(np.abs(self.state), np.abs(after)))
+        return np.abs(self.last_step * derivative) / (
+            atol + rtol * np.maximum(np.abs(self.state), np.abs(after))
+        )
 
     def first_non_finite_stage(self) -> tuple[float, Vector]:
         """Time and state of the first stage of the last trial step with a NaN or infinite derivative."""
         tableau = self.integrator.tableau
-        K, h, clamp = self._stage_derivatives(), self.last_step, self.course[3][self.counts[Count.SEGMENT]]
+        K, h, clamp = self._stage_derivatives(), self.last_step, self.inputs[3][self.counts[Count.SEGMENT]]
         first = tableau.first_stage
-        bad = [stage for stage in range(tableau.stages) if not np.isfinite(K[first + stage]).all()]
-        stage = bad[0] if bad and np.isfinite(K[0]).all() else 0 if bad else tableau.stages
+        failed = [stage for stage in range(tableau.stages) if not np.isfinite(K[first + stage]).all()]
+        stage = failed[0] if failed and np.isfinite(K[0]).all() else 0 if failed else tableau.stages
         row = [*tableau.matrix, tableau.weights][stage]
         state = self.state.copy()
-        for weight, slope in zip(row, K[first:]):
-            state += h * weight * slope
+        for weight, derivative in zip(row, K[first:]):
+            state += h * weight * derivative
         return min(self.time + [*tableau.nodes, 1.0][stage] * h, float(clamp)), state

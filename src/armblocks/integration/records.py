@@ -14,7 +14,7 @@ from armblocks.routines.arithmetic import select
 from armblocks.routines.memory import Reals
 from armblocks.routines.values import Boolean, Integer, Real
 
-ROOM_OF_A_STEP = 4
+JUMP_ROWS_OF_A_STEP = 4
 """Rows that must be free before a step: a step has one instant at its end."""
 
 
@@ -54,45 +54,45 @@ class Records:
                     method.interpolate(instant, time, h, row)
                 with r.otherwise():
                     copy(r, method.y, row, f.n)
-            self.others(instant, sample, row)
+            self.discrete_and_unknowns(instant, sample, row)
             f.increase(Count.SAMPLE)
 
-    def others(self, instant: Real, sample: Integer, x: Reals) -> None:
+    def discrete_and_unknowns(self, instant: Real, sample: Integer, x: Reals) -> None:
         """Record ``z`` and ``w`` of a sample; ``w`` is solved for the recorded state ``x``."""
-        f, places, sizes = self.frame, self.frame.places, self.frame.sizes
+        f, workspace, sizes = self.frame, self.frame.workspace, self.frame.sizes
         if sizes.delays or sizes.algebraic:
             self.point[0] = instant
             self.evaluation.solve(self.point, x)
         for out, place, count in (
-            (f.arrays.out_z, places.z, sizes.discrete),
-            (f.arrays.out_w, places.trial_w, sizes.algebraic),
+            (f.arrays.out_z, workspace.z, sizes.discrete),
+            (f.arrays.out_w, workspace.trial_w, sizes.algebraic),
         ):
             if count:
                 copy(f.r, f.vector(place), out.after(sample * count), count)
 
-    def make_room(self) -> None:
-        """Return where the record of the jumps has no memory for another step."""
+    def ensure_capacity(self) -> None:
+        """Return from the loop if the record of the jumps has no memory for another step."""
         counts = self.frame.counts
-        self.frame.leave_unless(counts[Count.JUMPS] < counts[Count.JUMPS_ROOM], Status.JUMPS_FULL)
+        self.frame.leave_unless(counts[Count.JUMPS] < counts[Count.JUMPS_CAPACITY], Status.JUMPS_FULL)
 
     @property
     def jumps_recorded(self) -> Boolean:
         """Whether jumps are recorded."""
         return self.frame.counts[Count.JUMPS_RECORDED] != 0
 
-    def side_of_jump(self, time: Real, sample: Integer, x: Reals) -> None:
+    def record_side(self, time: Real, sample: Integer, x: Reals) -> None:
         """Record one side of a jump: ``x``, ``z``, and ``w`` that was solved for them last. ``sample`` is the
         number of samples before this side."""
-        f, places, sizes = self.frame, self.frame.places, self.frame.sizes
+        f, workspace, sizes = self.frame, self.frame.workspace, self.frame.sizes
         number = f.counts[Count.JUMPS]
         row = f.arrays.jumps.after(number * row_width(sizes))
         f.counts[Count.JUMPS] = number + 1
         row[0], row[1] = time, sample.to_real()
         copy(f.r, x, row.after(2), f.n)
         if sizes.discrete:
-            copy(f.r, f.vector(places.z), row.after(2 + f.n), sizes.discrete)
+            copy(f.r, f.vector(workspace.z), row.after(2 + f.n), sizes.discrete)
         if sizes.algebraic:
-            copy(f.r, f.vector(places.trial_w), row.after(2 + f.n + sizes.discrete), sizes.algebraic)
+            copy(f.r, f.vector(workspace.trial_w), row.after(2 + f.n + sizes.discrete), sizes.algebraic)
 
     def extra_stages_once(self, time: Real, h: Real) -> None:
         """Evaluate the extra stages of the dense output, unless this is already done for the present step."""
@@ -113,17 +113,17 @@ class Records:
         f, r, arrays = self.frame, self.frame.r, self.frame.arrays
         unsaved = f.count[Count.SAVED].value == 0
         with r.when(condition & unsaved):
-            f.keep()
+            f.store_variables()
             r.copy(f.reals, arrays.saved_reals, self._length())
-            r.copy(f.counts, arrays.saved_counts, f.places.counts)
-            fresh = f.count[Count.FRESH].value != 0
+            r.copy(f.counts, arrays.saved_counts, f.workspace.counts)
+            fresh = f.count[Count.RESTARTED].value != 0
             stage = select(fresh, r.constant_integer(Stage.START), Stage.RUNNING)
-            arrays.saved_counts[Count.STARTED] = stage
+            arrays.saved_counts[Count.STAGE] = stage
             f.count[Count.SAVED].value = 1
 
     def _length(self) -> Integer | int:
         """Length of the array of doubles including the stored rows of the delay history."""
-        f, places = self.frame, self.frame.places
+        f, workspace = self.frame, self.frame.workspace
         if not f.sizes.delays:
-            return places.size
-        return f.counts[Count.HISTORY_ROWS] * places.history_width + places.history
+            return workspace.size
+        return f.counts[Count.HISTORY_ROWS] * workspace.history_width + workspace.history

@@ -13,7 +13,7 @@ from armblocks.integration.butcher_tableau import Row
 from armblocks.integration.evaluation import Evaluation
 from armblocks.integration.explicit_method import CHECK_EVERY
 from armblocks.integration.frame import Frame, copy
-from armblocks.integration.linear_equations import LinearEquations, LinearSpace
+from armblocks.integration.linear_equations import LinearEquations, LinearEquationsLayout
 from armblocks.integration.method import Index, Method
 from armblocks.integration.rosenbrock_tableau import RosenbrockTableau
 from armblocks.integration.workspace import Count
@@ -27,26 +27,26 @@ number of consecutive checks with this result after which it takes over (times f
 
 
 class RosenbrockMethod(Method):
-    """Emits the steps of a Rosenbrock tableau, whose linear equations are in ``space``."""
+    """Emits the steps of a Rosenbrock tableau, whose linear equations are in ``layout``."""
 
     short_checks = 512
 
     def __init__(
-        self, frame: Frame, tableau: RosenbrockTableau, evaluation: Evaluation, space: LinearSpace
+        self, frame: Frame, tableau: RosenbrockTableau, evaluation: Evaluation, layout: LinearEquationsLayout
     ) -> None:
         super().__init__(frame, tableau, evaluation)
         self.rosenbrock = tableau
-        self.space = space
+        self.layout = layout
         self.scratch = frame.arrays.scratch
-        self.right = self.scratch.after(space.right)
-        self.solution = self.scratch.after(space.solution)
-        self.equations = LinearEquations(frame.r.program, space, tableau.gamma)
+        self.right = self.scratch.after(layout.right)
+        self.solution = self.scratch.after(layout.solution)
+        self.equations = LinearEquations(frame.r.program, layout, tableau.gamma)
         self._time: Real | None = None
 
     def prepare(self, time: Real) -> None:
         """The Jacobian at the step's start."""
-        self.evaluation.jacobian(self.set_point(time), self.x, self.space)
-        for k in self.r.each(self.space.T + self.space.size):
+        self.evaluation.jacobian(self.set_point(time), self.x, self.layout)
+        for k in self.r.each(self.layout.T + self.layout.size):
             value = self.scratch[k]
             self.scratch[k] = select(value.finite, value, 0.0)
 
@@ -59,18 +59,18 @@ class RosenbrockMethod(Method):
             row = 1 + stage
             source = self.K(0)
             if stage:
-                self.move((0.0, *tableau.matrix[stage]), h)
+                self.set_y((0.0, *tableau.matrix[stage]), h)
                 self.evaluate(fma(tableau.nodes[stage], h, time), self.y, row)
                 source = self.K(row)
             self._right(source, stage, h)
             r.call(self.equations.solve, self.scratch)
-            if stage == 0 and self.equations.solved_well:
+            if stage == 0 and self.equations.is_accurate:
                 # If the elimination without pivoting failed, repeat it with pivoting.
-                with r.unless(r.call(self.equations.solved_well, self.scratch, h)):
-                    r.call(self.equations.factor_whole, self.scratch, h)
+                with r.unless(r.call(self.equations.is_accurate, self.scratch, h)):
+                    r.call(self.equations.factor_dense, self.scratch, h)
                     r.call(self.equations.solve, self.scratch)
             copy(r, self.solution, self.K(row), self.n)
-        self.move((0.0, *tableau.weights), h)
+        self.set_y((0.0, *tableau.weights), h)
         self.evaluate(new_time, self.y, tableau.end_row)
 
     def error_norm(self, h: Real, error: Row) -> Real:
@@ -83,7 +83,7 @@ class RosenbrockMethod(Method):
         middle = fma(0.5, h, self._time)
         self.interpolate(middle, self._time, h, state)
         self.evaluate(middle, state, tableau.middle_row + 1)
-        weights = tableau.slope_weights(0.5)
+        weights = tableau.derivative_weights(0.5)
 
         def weighted(i: Index) -> Real:
             value = self.solution[i]
@@ -92,35 +92,37 @@ class RosenbrockMethod(Method):
 
         for i in r.each(self.n):
             self.right[i] = derivative[i] - self.combination(weights, i)
-        for i in r.each(self.space.size - self.n):
+        for i in r.each(self.layout.size - self.n):
             self.right.after(self.n)[i] = 0.0
         r.call(self.equations.solve, self.scratch)
         between = h * self.mean_square(weighted)
         # If either is NaN the result is NaN, and the step is repeated with a shorter length.
         return select(between < ends, ends, between + ends * 0.0)
 
-    def watch(self, h: Real) -> None:
+    def check_stiffness(self, h: Real) -> None:
         """Check whether an explicit method could take equally long steps; pause if many checks agree.
 
         With implicit equations the flow's Jacobian does not give the rates, so the method never changes back.
         """
-        if self.space.size != self.n:
+        if self.layout.size != self.n:
             return
         f, r = self.frame, self.r
-        watched, wanted, calm = (f.count[place] for place in (Count.WATCHED, Count.STIFF, Count.CALM))
-        watched.value = watched.value + 1
-        checked = watched.value & (CHECK_EVERY - 1)
-        due = (f.counts[Count.WATCHING] != 0) & (checked == 0)
+        steps, required, non_stiff = (
+            f.count[place] for place in (Count.STIFFNESS_STEPS, Count.STIFF, Count.NON_STIFF)
+        )
+        steps.value = steps.value + 1
+        checked = steps.value & (CHECK_EVERY - 1)
+        due = (f.counts[Count.STIFFNESS_DETECTION] != 0) & (checked == 0)
         with r.when(due):
             stable = h * r.call(self.equations.rate_bound, self.scratch) < STABLE_BELOW
-            more = calm.value + 1
-            calm.value = select(stable, more, 0)
-            long = calm.value >= wanted.value
-            f.taken.value = select(long, f.arrays.max_steps, f.taken.value)
+            increased = non_stiff.value + 1
+            non_stiff.value = select(stable, increased, 0)
+            reached = non_stiff.value >= required.value
+            f.steps_of_call.value = select(reached, f.arrays.max_steps, f.steps_of_call.value)
 
     def _right(self, source: Reals, stage: int, h: Real) -> None:
         """``right = f + sum_j couplings[j] k[j] + h time_weight T``."""
-        tableau, T = self.rosenbrock, self.scratch.after(self.space.T)
+        tableau, T = self.rosenbrock, self.scratch.after(self.layout.T)
         weight = tableau.time_weights[stage]
         factor = weight * h if weight else None
 
@@ -132,5 +134,5 @@ class RosenbrockMethod(Method):
             for j, coupling in enumerate(tableau.couplings[stage]):
                 total = fma(coupling, self.K(1 + j)[i], total)
             self.right[i] = over_time(i, total)
-        for i in self.r.each(self.space.size - self.n):
+        for i in self.r.each(self.layout.size - self.n):
             self.right[i + self.n] = over_time(i + self.n, self.r.constant(0.0))

@@ -14,7 +14,7 @@ from armblocks.integration.butcher_tableau import CONSISTENCY, ButcherTableau, R
 
 @dataclass(frozen=True, kw_only=True)
 class RosenbrockTableau:
-    """One Rosenbrock method with the polynomial that gives its values between the steps.
+    """A Rosenbrock method and its dense output, the polynomial for values within a step.
 
     One step of size ``h`` from ``(t, x)``, with ``J = df/dx`` and ``T = df/dt`` there and ``s`` stages::
 
@@ -142,7 +142,7 @@ class RosenbrockTableau:
         """The row of ``K`` with the state in the middle of the step; the next one has its derivative."""
         return self.stages + 2
 
-    def slope_weights(self, theta: float) -> Row:
+    def derivative_weights(self, theta: float) -> Row:
         """``x'(t + theta h)`` of the values between the steps, over the rows of ``K``."""
         powers = [(m + 1) * theta**m for m in range(len(self.dense[0]))]
         return (0.0, *(sum(a * b for a, b in zip(row, powers)) for row in self.dense))

@@ -8,10 +8,10 @@ after a rejection, the same choice of the first step. Step counts are therefore 
 from __future__ import annotations
 
 from armblocks.integration.butcher_tableau import Row
-from armblocks.integration.course import Course
 from armblocks.integration.frame import SAME_ABOVE, Frame
 from armblocks.integration.method import Method
 from armblocks.integration.records import Records
+from armblocks.integration.schedule import Schedule
 from armblocks.integration.workspace import Count, Scalar, Status
 from armblocks.routines.arithmetic import fma, inverse_root, maximum, minimum, select
 from armblocks.routines.values import Real
@@ -33,11 +33,11 @@ MOST_STEPS = 1e8
 class Steps:
     """Emits one accepted step of the loop: trials until the error is small enough, or one fixed step."""
 
-    def __init__(self, frame: Frame, method: Method, records: Records, course: Course) -> None:
+    def __init__(self, frame: Frame, method: Method, records: Records, schedule: Schedule) -> None:
         self.frame = frame
         self.method = method
         self.records = records
-        self.course = course
+        self.schedule = schedule
 
     def write(self) -> None:
         """Emit the step up to its acceptance."""
@@ -90,14 +90,14 @@ class Steps:
                 length.value = shrunk
                 attempt.again_unless(shrunk < shortest)
             finite = norm * 0.0 == 0.0
-            self.course.not_finite(time, finite, accepted)
+            self.schedule.handle_non_finite(time, finite, accepted)
             f.leave(Status.STEP_TOO_SMALL)
-        method.watch(h)
-        self._watch_short_steps(h)
-        following = self.course.next_length(h * minimum(ideal, growth.value))
+        method.check_stiffness(h)
+        self._check_short_steps(h)
+        following = self.schedule.next_step_length(h * minimum(ideal, growth.value))
         f.scalar[Scalar.STEP].value = following
 
-    def _watch_short_steps(self, h: Real) -> None:
+    def _check_short_steps(self, h: Real) -> None:
         """Every ``SHORT_EVERY`` steps, check whether the step is needlessly short; end the run if most are.
 
         If the equations jump without an event, for example a sign in a feedback loop, every method shrinks
@@ -105,7 +105,7 @@ class Steps:
         explicit method. Steps that are limited by the end of a piece or by ``max_step`` are not checked.
         """
         f, r, method = self.frame, self.frame.r, self.method
-        tableau, short = method.tableau, f.count[Count.SHORT]
+        tableau, short = method.tableau, f.count[Count.SHORT_STEPS]
         with r.when(f.count[Count.ACCEPTED].value & (SHORT_EVERY - 1) == 0):
             new_time = f.new_time.value
             with r.when((new_time < f.end.value) & (h < f.max_step)):
@@ -114,7 +114,7 @@ class Steps:
                 power = r.constant(RESOLVED)
                 for _ in range(tableau.error_order - 1):
                     power = power * root
-                with r.when(method.change(h) < minimum(r.constant(SHORT_CHANGE), power)):
+                with r.when(method.derivative_change(h) < minimum(r.constant(SHORT_CHANGE), power)):
                     short.value = short.value + 1
                     far = f.last_end - new_time > MOST_STEPS * h
                     long = short.value >= method.short_checks
@@ -126,17 +126,17 @@ class Steps:
 
     def _fixed(self) -> None:
         """Emit one step to the next grid point ``k STEP`` (never accumulated), or to the end of the piece."""
-        f, r, course = self.frame, self.frame.r, self.course
+        f, r, schedule = self.frame, self.frame.r, self.schedule
         grid = f.count[Count.GRID]
         time, spacing, end = f.time.value, f.scalar[Scalar.STEP].value, f.end.value
         with r.part() as search:
             instant = grid.value.to_real() * spacing
-            with r.when(instant <= course.passed(time, spacing)):
+            with r.when(instant <= schedule.passed_until(time, spacing)):
                 f.increase(Count.GRID)
                 search.again()
         # A grid point within rounding before the end is the end. Otherwise a step of 1e-16 s would follow.
         last = fma(spacing, 1e-9, instant) >= end
-        new_time = course.bounded(time, select(last, end, instant))
+        new_time = schedule.fixed_step_end(time, select(last, end, instant))
         self.records.checkpoint(new_time * SAME_ABOVE >= f.last_end)
         self.method.prepare(time)
-        course.try_finite(self.trial, time, new_time)
+        schedule.take_fixed_step(self.trial, time, new_time)

@@ -32,9 +32,9 @@ Vector = NDArray[np.float64]
 
 ENDING = ("stop", "fail")
 """The actions of guards that end a run when they are positive."""
-_OF_PARAMETERS = ("initial_states", "initial_discrete", "initial_algebraic", "breakpoints")
+_PARAMETER_FUNCTIONS = ("initial_states", "initial_discrete", "initial_algebraic", "breakpoints")
 _FUNCTIONS = (
-    *("derivative", *_OF_PARAMETERS, "signals", "residual", "residual_jacobian"),
+    *("derivative", *_PARAMETER_FUNCTIONS, "signals", "residual", "residual_jacobian"),
     *("update", "guards", "reset"),
 )
 _SIGNALS_LAYOUT = BatchLayout(
@@ -51,7 +51,7 @@ def compile_system(system: HybridSystem) -> CompiledSystem:
     return CompiledSystem(_describe(system, tapes), tapes.__getitem__, lambda: system)
 
 
-def recall_system(key: str, trace: Callable[[], HybridSystem]) -> CompiledSystem:
+def cached_system(key: str, trace: Callable[[], HybridSystem]) -> CompiledSystem:
     """The system that ``key`` identifies, from the disk cache where an earlier process compiled it.
 
     ``key`` must cover everything that the equations depend on, including parameter values; the sources of
@@ -112,8 +112,8 @@ class CompiledSystem:
             discrete=self.discrete.size,
             algebraic=self.algebraic.size,
             delays=tuple(
-                DelaySlots(value=int(value), slope=int(slope), fixed=bool(fixed))
-                for value, slope, fixed in description["delays"]
+                DelaySlots(value=int(value), derivative=int(derivative), fixed=bool(fixed))
+                for value, derivative, fixed in description["delays"]
             ),
             clocks=tuple((float(period), float(offset)) for period, offset in description["clocks"]),
             directions=tuple(int(direction) for direction in description["guard_directions"]),
@@ -159,7 +159,7 @@ class CompiledSystem:
 
     @cached_property
     def _start_functions(self) -> Mapping[str, Callable[..., None]]:
-        return self._functions_of(_OF_PARAMETERS, 2)
+        return self._functions_of(_PARAMETER_FUNCTIONS, 2)
 
     @cached_property
     def _point_functions(self) -> Mapping[str, Callable[..., None]]:
@@ -269,13 +269,13 @@ class CompiledSystem:
             if not tableau.needs_jacobian:
                 found = NativeIntegrator(self.sizes, self._digests, self.tape, tableau)
             else:
-                kept = self._flow_jacobian
-                digests = {**self._digests, "flow_jacobian": kept.digest}
+                jacobian = self._flow_jacobian
+                digests = {**self._digests, "flow_jacobian": jacobian.digest}
 
                 def tape(function: str) -> Tape:
-                    return kept.tape() if function == "flow_jacobian" else self.tape(function)
+                    return jacobian.tape() if function == "flow_jacobian" else self.tape(function)
 
-                found = NativeIntegrator(self.sizes, digests, tape, tableau, kept.pattern)
+                found = NativeIntegrator(self.sizes, digests, tape, tableau, jacobian.pattern)
             self._integrators[id(tableau)] = found
         return found
 
@@ -319,7 +319,7 @@ def _describe(system: HybridSystem, tapes: Mapping[str, Tape]) -> dict[str, Any]
         "called": list(system.called),
         "delays": []
         if system.delays is None
-        else list(zip(system.delays.values, system.delays.slopes, system.delays.fixed)),
+        else list(zip(system.delays.values, system.delays.derivatives, system.delays.fixed)),
         "loops": [] if system.loops is None else [list(names) for names in system.loops.signals],
         "parameters": slots_to_json(system.parameters),
         "signals": slots_to_json(system.signals_layout),

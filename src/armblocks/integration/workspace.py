@@ -35,7 +35,7 @@ class Status(IntEnum):
 
 
 class Scalar(IntEnum):
-    """Places in the array of doubles; the vectors of :class:`Workspace` come after them."""
+    """Indices in the array of doubles; the vectors of :class:`Workspace` come after them."""
 
     TIME = 0
     STEP = 1
@@ -51,7 +51,7 @@ class Scalar(IntEnum):
     """Time of the last event of any guard."""
     SPAN = 8
     """Approximate length of the run. The resolution of events is relative to ``max(time, 1e-6 SPAN)``."""
-    SCAN = 9
+    WINDOW = 9
     """Length of the next window of the event search. It grows while the guards are smooth."""
     PAUSE = 10
     """The loop returns before the first step that begins at this time or later."""
@@ -61,7 +61,7 @@ class Scalar(IntEnum):
 
 
 class Count(IntEnum):
-    """Places in the array of integers.
+    """Indices in the array of integers.
 
     After them come the number of the next tick of every clock, then the first and the last row of the history
     that each delayed signal reads. A last row of -1 stands for the newest.
@@ -72,47 +72,47 @@ class Count(IntEnum):
     SAMPLES = 1
     SEGMENT = 2
     SEGMENTS = 3
-    STARTED = 4
+    STAGE = 4
     """A :class:`Stage`."""
     GRID = 5
     """With a fixed step: the next step ends at ``GRID * STEP``."""
     ACCEPTED = 6
     REJECTED = 7
     EVALUATIONS = 8
-    FRESH = 9
-    """Whether the next start also chooses the first step's length."""
+    RESTARTED = 9
+    """Whether the next step is the first after a restart, so that its length is chosen anew."""
     INSTANTS = 10
     """Instants with ticks so far."""
     EVENTS = 11
     """Events so far."""
-    CLOSE = 12
+    CLOSE_EVENTS = 12
     """Consecutive close events whose distances do not shrink."""
     SAVED = 13
     """Whether the checkpoint has been written."""
-    WATCHED = 14
+    STIFFNESS_STEPS = 14
     """Number of steps so far; every ``CHECK_EVERY``-th step is checked for stiffness."""
     STIFF = 15
     """Explicit methods: number of checks with a stability-limited step. Methods for stiff systems: number of
-    consecutive checks after which an explicit method, which could take the same steps, takes over."""
-    CALM = 16
+    consecutive checks without stiffness after which an explicit method replaces them."""
+    NON_STIFF = 16
     """Number of consecutive checks without stiffness."""
-    WATCHING = 17
+    STIFFNESS_DETECTION = 17
     """0: the run keeps its method. Else 1 plus the number of changes of the method so far: the run pauses
     where another method is faster."""
     AT_START = 18
     """Whether the run is at its start, before the first mode iteration."""
     HISTORY_ROWS = 19
     """Rows of the history of delayed signals."""
-    HISTORY_ROOM = 20
+    HISTORY_CAPACITY = 20
     """Capacity in rows."""
-    SHORT = 21
+    SHORT_STEPS = 21
     """Number of checks that found a needlessly short step, minus ``SHORT_BACK`` for every check that did
     not."""
-    CROWDED = 22
-    """Consecutive events whose distances are at most ``CROWD`` times the time."""
+    RAPID_EVENTS = 22
+    """Consecutive events whose distances are at most ``RAPID_DISTANCE`` times the time."""
     JUMPS = 23
     """Rows in the record of the jumps."""
-    JUMPS_ROOM = 24
+    JUMPS_CAPACITY = 24
     """The loop returns before a step where ``JUMPS`` has reached this number."""
     JUMPS_RECORDED = 25
     """Whether jumps are recorded."""
@@ -132,11 +132,11 @@ class Stage(IntEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class DelaySlots:
-    """One delayed scalar: the places of its value and derivative in ``z``, and whether the delay is
+    """One delayed scalar: the indices of its value and derivative in ``z``, and whether the delay is
     constant."""
 
     value: int
-    slope: int
+    derivative: int
     fixed: bool
 
 
@@ -148,12 +148,12 @@ class LoopSizes:
     - ``directions``: the direction of each guard. ``stops``: the guards that end the run when they are
       positive.
     - ``captures``: whether ``update`` is also called just before every instant.
-    - ``modes``: the places of the modes in ``z``. ``followers``: for each mode, whether it is a following
+    - ``modes``: the indices of the modes in ``z``. ``followers``: for each mode, whether it is a following
       mode.
-    - ``remembered``: the places in ``z`` of the hysteresis modes, each with the place of its previous value.
-    - ``recaptured``: the places in ``z`` of the captured values that belong to hysteresis modes.
-    - ``momentary``: the places in ``z`` that are set to 0 at the end of every instant.
-    - ``silenced``: guards, each with a place in ``momentary``; the guard does not fire while that value is
+    - ``remembered``: the indices in ``z`` of the hysteresis modes, each with the index of its previous value.
+    - ``recaptured``: the indices in ``z`` of the captured values that belong to hysteresis modes.
+    - ``momentary``: the indices in ``z`` that are set to 0 at the end of every instant.
+    - ``silenced``: guards, each with an index of ``momentary``; the guard does not fire while that value is
       nonzero.
     - ``locating``: the guards that only locate mode changes.
     - ``tangents``: the first entries of ``x``, ``z`` and the guards that belong to derivatives, if there are
@@ -190,7 +190,7 @@ class Workspace:
 
     - ``x``: the state of the last accepted step.
     - ``y``: the state of each stage of the trial step, then the state at its end.
-    - ``slope(row)``: the stage derivatives.
+    - ``stage_derivative(row)``: the stage derivatives.
 
     Only hybrid systems:
 
@@ -199,7 +199,7 @@ class Workspace:
     - ``trial_w``: the implicit unknowns at the point evaluated last.
     - ``guards``: their present values; ``guards_before``, ``guards_middle``: at the beginning and in the
       middle of the searched window.
-    - ``guard_slopes``: their derivatives at the end of the previous window (NaN: unknown).
+    - ``guard_derivatives``: their derivatives at the end of the previous window (NaN: unknown).
     - ``signs``: their stored signs (0: none yet); ``guards_at_start``, ``signs_at_start``: values and signs
       at the start of the step.
     - ``fired``: the marks of the guards that fired; ``last``: the time of the last event of each guard.
@@ -219,8 +219,8 @@ class Workspace:
         self.states = n
         self.x = int(Scalar.END)
         self.y = self.x + n
-        self._slopes = self.y + n
-        self.z = self._slopes + tableau.rows * n
+        self._stage_derivatives = self.y + n
+        self.z = self._stage_derivatives + tableau.rows * n
         self.w = self.z + nz
         self.new_x = self.w + nw
         self.new_z = self.new_x + n
@@ -229,8 +229,8 @@ class Workspace:
         self.contradictions = self.guards + ng
         self.guards_before = self.contradictions + len(sizes.modes)
         self.guards_middle = self.guards_before + ng
-        self.guard_slopes = self.guards_middle + ng
-        self.signs = self.guard_slopes + ng
+        self.guard_derivatives = self.guards_middle + ng
+        self.signs = self.guard_derivatives + ng
         self.guards_at_start = self.signs + ng
         self.signs_at_start = self.guards_at_start + ng
         self.fired = self.signs_at_start + ng
@@ -254,6 +254,6 @@ class Workspace:
         self.history_width = 2 + 2 * lines
         self.counts = int(Count.END) + len(sizes.clocks) + 2 * lines
 
-    def slope(self, row: int) -> int:
-        """The place of row ``row`` of the stage derivatives."""
-        return self._slopes + row * self.states
+    def stage_derivative(self, row: int) -> int:
+        """The index of row ``row`` of the stage derivatives."""
+        return self._stage_derivatives + row * self.states

@@ -21,8 +21,8 @@ def picture_pdf(picture: Picture, *, theme: Theme = "light") -> bytes:
 
     width, height = picture.width * _POINTS_PER_PX, picture.height * _POINTS_PER_PX
     target = BytesIO()
-    said = {"Title": picture.title, "Creator": "armblocks", "CreationDate": None}
-    file: Any = PdfFile(target, metadata=said)  # untyped in matplotlib's stubs
+    text = {"Title": picture.title, "Creator": "armblocks", "CreationDate": None}
+    file: Any = PdfFile(target, metadata=text)  # untyped in matplotlib's stubs
     file.newPage(width / 72.0, height / 72.0)
     renderer = RendererPdf(file, 72.0, height / 72.0, width / 72.0)
     Painter(renderer, height, theme, _POINTS_PER_PX).picture(picture)

@@ -218,6 +218,8 @@ def _scope(diagram: Diagram, block: str, view: View, result: SimulationResult, w
             entries = list(np.ndindex(*slot.shape))[:_FIRST_ENTRIES]
             columns.append(result[path].reshape(len(result.time), -1)[:, : len(entries)])
             joined = () if label else _joined(diagram, path, result)[: len(entries)]
+            label = label or slot.title
+            joined = () if label else joined
             name = label or (", ".join(joined) if 0 < len(joined) <= 3 else path)
             names.append(name)
             if joined:
@@ -256,9 +258,9 @@ def _joined(diagram: Diagram, path: str, result: SimulationResult) -> tuple[str,
     for port in block.input_ports():
         source = flat.source(name, port.name)
         several = len(flat.blocks[source.block].output_ports()) > 1
-        said = source.block.rpartition("/")[2] + (f" {source.port}" if several else "")
+        text = source.block.rpartition("/")[2] + (f" {source.port}" if several else "")
         shape = result.signals_layout[result.resolve(str(source))].shape
-        names += [f"{said}[{','.join(map(str, index))}]" if index else said for index in np.ndindex(*shape)]
+        names += [f"{text}[{','.join(map(str, index))}]" if index else text for index in np.ndindex(*shape)]
     return tuple(names)
 
 

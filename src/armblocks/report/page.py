@@ -230,8 +230,8 @@ def _diagram(contents: ReportContents) -> str:
 
 def _drawing(picture: Picture, identifier: str, caption: str) -> str:
     wide = f' style="max-width:{max(round(picture.width * 1.25), 320)}px;margin-inline:auto"'
-    said = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
-    return f'<figure class="wide"{wide}>{svg_inline(picture, identifier)}{said}</figure>'
+    caption_html = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
+    return f'<figure class="wide"{wide}>{svg_inline(picture, identifier)}{caption_html}</figure>'
 
 
 def _same(sheet: Sheet) -> str:

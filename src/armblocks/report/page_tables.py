@@ -41,8 +41,8 @@ def limits_table(summary: MotionSummary) -> str:
         cells = [
             _cell(_span(joint.position_min * factor, joint.position_max * factor) + tail),
             _cell(allowed),
-            _judged(joint.position_margin, factor, broken.get((joint.name, LimitKind.POSITION))),
-            _judged(joint.speed_peak, factor, broken.get((joint.name, LimitKind.SPEED))),
+            _limit_cell(joint.position_margin, factor, broken.get((joint.name, LimitKind.POSITION))),
+            _limit_cell(joint.speed_peak, factor, broken.get((joint.name, LimitKind.SPEED))),
             _cell(table_number(joint.speed_peak_time, 3)),
             _cell("not limited" if joint.speed_limit is None else table_number(joint.speed_limit * factor)),
             _cell("" if share is None else table_number(share, 3)),
@@ -66,7 +66,7 @@ def loads_table(motion: Motion, summary: MotionSummary) -> str:
             joint.name,
             index,
             [
-                _judged(joint.torque_peak, 1.0, broken.get((joint.name, LimitKind.TORQUE))),
+                _limit_cell(joint.torque_peak, 1.0, broken.get((joint.name, LimitKind.TORQUE))),
                 _cell(_optional(joint.torque_rms)),
                 _cell(_optional(joint.motor_torque_peak)),
                 _cell(_optional(joint.motor_torque_rms)),
@@ -132,7 +132,7 @@ def _cell(text: str) -> str:
     return f"<td>{text}</td>"
 
 
-def _judged(value: float | None, factor: float, finding: LimitFinding | None) -> str:
+def _limit_cell(value: float | None, factor: float, finding: LimitFinding | None) -> str:
     text = _optional(value, factor)
     if finding is None:
         return _cell(text)

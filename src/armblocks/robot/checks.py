@@ -139,9 +139,9 @@ def _check_motor(where: str, motor: Motor) -> None:
 def _check_dh(where: str, link: Link) -> None:
     if link.dh is None:
         return
-    said = (link.before, link.after, link.joint.letter, link.joint.axis, link.joint.offset)
+    text = (link.before, link.after, link.joint.letter, link.joint.axis, link.joint.offset)
     row = link.dh.joint()
-    if said != (link.dh.before, link.dh.after, row.letter, row.axis, row.offset):
+    if text != (link.dh.before, link.dh.after, row.letter, row.axis, row.offset):
         raise RobotError(
             "the D-H row disagrees with the link's transforms or joint",
             where=where,

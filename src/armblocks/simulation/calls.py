@@ -15,7 +15,7 @@ from armblocks.errors import ArmblocksError, SimulationError
 from armblocks.integration.native_integrator import Integration
 from armblocks.integration.system import CompiledSystem
 from armblocks.integration.workspace import Status
-from armblocks.simulation.stretch import Consumer, Stretch
+from armblocks.simulation.run_part import Consumer, RunPart
 
 Array = NDArray[np.float64]
 SAME_INSTANT = 1.0 + 2.0**-50
@@ -48,54 +48,57 @@ class Calls:
         self._compiled = compiled
         self._functions = tuple(functions)
         self._clocks = sorted({function.clock for function in functions})
-        self._done: dict[int, float] = {}
+        self._called_at: dict[int, float] = {}
         self.count = 0
         self.seconds = 0.0
         """The computing time of the functions, s."""
 
-    def advance(self, stretch: Stretch, steps: int, pause: float, consume: Consumer | None) -> None:
-        """Take steps like :meth:`Stretch.advance`; call the functions that are due.
+    def advance(self, part: RunPart, steps: int, pause: float, consume: Consumer | None) -> None:
+        """Take steps like :meth:`RunPart.advance`; call the functions that are due.
 
         Raises ``SimulationError`` if a function fails.
         """
-        integration = stretch.integration
+        integration = part.integration
         assert integration is not None  # a system with ticks has an integration
-        end = stretch.taken + steps
+        end = part.steps_taken + steps
         while True:
-            if integration.waiting:
-                self._make_due(integration, stretch.p)
-            integration.halt_at(self._next(integration))
-            stretch.advance(max(0, end - stretch.taken), pause, consume)
-            if stretch.status is not Status.PAUSED or not (integration.waiting and self._due(integration)):
+            if integration.instant_pending:
+                self._call_due_functions(integration, part.p)
+            integration.pause_before_ticks_at(self._next_tick(integration))
+            part.advance(max(0, end - part.steps_taken), pause, consume)
+            if part.status is not Status.PAUSED or not (
+                integration.instant_pending and self._due(integration)
+            ):
                 return
 
-    def told(self, wall_time: float) -> str:
+    def summary(self, wall_time: float) -> str:
         """A sentence about the cost of the calls."""
         names = ", ".join(f"'{function.block}'" for function in self._functions)
         share = 100.0 * self.seconds / wall_time if wall_time > 0.0 else 0.0
         cost = f"{self.seconds:.3g} s, {share:.0f} % of the run"
         return f"Python was called {self.count} times for {names}: {cost}"
 
-    def _next(self, integration: Integration) -> float:
+    def _next_tick(self, integration: Integration) -> float:
         """The next tick, s, whose functions have not been called."""
         ticks = {clock: integration.next_tick(clock) for clock in self._clocks}
         return min(
-            tick + self._compiled.sizes.clocks[clock][0] if self._done.get(clock) == tick else tick
+            tick + self._compiled.sizes.clocks[clock][0] if self._called_at.get(clock) == tick else tick
             for clock, tick in ticks.items()
         )
 
-    def _is_done(self, integration: Integration, clock: int) -> bool:
-        return self._done.get(clock) == integration.next_tick(clock)
+    def _is_called(self, integration: Integration, clock: int) -> bool:
+        return self._called_at.get(clock) == integration.next_tick(clock)
 
     def _due(self, integration: Integration) -> list[int]:
+        """The clocks that tick now and whose functions have not been called."""
         now = integration.time * SAME_INSTANT
         return [
             clock
             for clock in self._clocks
-            if integration.next_tick(clock) <= now and not self._is_done(integration, clock)
+            if integration.next_tick(clock) <= now and not self._is_called(integration, clock)
         ]
 
-    def _make_due(self, integration: Integration, p: Array) -> None:
+    def _call_due_functions(self, integration: Integration, p: Array) -> None:
         due = self._due(integration)
         if not due:
             return
@@ -107,14 +110,14 @@ class Calls:
                 continue
             point = integration.point
             z = self._compiled.updated(time, point.x, point.z, point.w, p, ticking)
-            inputs = {port: _given(z[places], shape) for port, (places, shape) in function.inputs.items()}
-            for port, value in self._called(function, time, inputs).items():
-                integration.put_discrete(function.outputs[port][0], value)
-        self._done |= {clock: integration.next_tick(clock) for clock in due}
+            inputs = {
+                port: _input_value(z[places], shape) for port, (places, shape) in function.inputs.items()
+            }
+            for port, value in self._call(function, time, inputs).items():
+                integration.set_discrete(function.outputs[port][0], value)
+        self._called_at |= {clock: integration.next_tick(clock) for clock in due}
 
-    def _called(
-        self, function: CalledFunction, time: float, inputs: Mapping[str, Any]
-    ) -> Mapping[str, Array]:
+    def _call(self, function: CalledFunction, time: float, inputs: Mapping[str, Any]) -> Mapping[str, Array]:
         """The flat results of one function. Raises ``SimulationError`` if it fails."""
         where = f"block '{function.block}' at t = {time:.9g} s"
         began = perf_counter()
@@ -130,7 +133,7 @@ class Calls:
             array = np.asarray(value, dtype=np.float64)
             if array.shape != shape or not np.isfinite(array).all():
                 raise SimulationError(
-                    f"'{port}' became {str(value)[:80]}, of shape {array.shape}",
+                    f"'{port}' is {str(value)[:80]}, of shape {array.shape}",
                     where=where,
                     allowed=f"finite numbers of shape {shape}",
                     fix="correct the function, or declare the shapes of its results",
@@ -139,6 +142,6 @@ class Calls:
         return found
 
 
-def _given(values: Array, shape: Shape) -> Any:
+def _input_value(values: Array, shape: Shape) -> Any:
     """An input of the function: a number, or a copy of an array."""
     return values.reshape(shape).copy() if shape else float(values[0])

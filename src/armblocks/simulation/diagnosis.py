@@ -10,7 +10,12 @@ from numpy.typing import NDArray
 
 from armblocks.equations import Signature
 from armblocks.errors import SimulationError
-from armblocks.integration.guard_functions import CLOSE, CROWD, MOST_AT_ONCE, MOST_CROWDED
+from armblocks.integration.guard_functions import (
+    CLOSE_DISTANCE,
+    MOST_CLOSE_EVENTS,
+    MOST_RAPID_EVENTS,
+    RAPID_DISTANCE,
+)
 from armblocks.integration.native_integrator import Integration
 from armblocks.integration.system import CompiledSystem
 from armblocks.integration.workspace import Status
@@ -29,7 +34,7 @@ def element_name(layout: Signature, place: int) -> str:
     return [name for slot in layout for name in element_names(slot)][place]
 
 
-def first_bad_signal(
+def first_invalid_signal(
     system: CompiledSystem, instants: Array, signals: Array, algebraic: Array
 ) -> tuple[SimulationError, int] | None:
     """The error for the first signal that is NaN or infinite, and the number of valid samples before it.
@@ -59,14 +64,14 @@ def _signal_error(system: CompiledSystem, place: int, value: float, time: float)
         f"signal '{name}' is {value} at {time:.9g} s",
         where=system.name,
         allowed="finite numbers; every signal before it in evaluation order is finite",
-        fix=f"look at block '{block}': a division by zero, a root or logarithm of a negative number, an "
+        fix=f"check block '{block}': a division by zero, a root or logarithm of a negative number, an "
         "overflow, or an algebraic loop through it that has become singular",
     )
 
 
 def ended_by_block(system: CompiledSystem, run: Integration) -> str | SimulationError:
     """A message with the block that ended a run, or the error of an Assertion whose input has become 0."""
-    guard = run.positive(system.sizes.stops)[0]
+    guard = run.positive_guards(system.sizes.stops)[0]
     block = system.guard_names[guard]
     if system.guard_actions[guard] != "fail":
         return f"stopped by block '{block}' at {run.time:.9g} s"
@@ -83,7 +88,7 @@ def warnings_of_blocks(system: CompiledSystem, run: Integration) -> list[str]:
     found: list[str] = []
     for guard, action in enumerate(system.guard_actions):
         fired = run.last_fired(guard)
-        if action == "warn" and (fired > -np.inf or run.positive([guard])):
+        if action == "warn" and (fired > -np.inf or run.positive_guards([guard])):
             when = f"last from {fired:.9g} s on" if fired > -np.inf else "from the start on"
             found.append(f"assertion '{system.guard_names[guard]}' did not hold, {when}")
     return found
@@ -98,18 +103,18 @@ def integration_failure(system: CompiledSystem, run: Integration, p: Array) -> S
     if run.status is Status.INCONSISTENT_MODES:
         return _inconsistent_modes(system, run)
     if run.status is Status.MINIMUM_STEP:
-        return _crawling(system, run)
+        return _minimum_step(system, run)
     time, state = run.first_non_finite_stage()
     point = run.point
     if not np.isfinite(run.trial_unknowns).all():
         return _unsolved(system, time)
     z, w = point.z[np.newaxis], run.trial_unknowns[np.newaxis].copy()
     signals = system.evaluate_signals(np.array([time]), state[np.newaxis], z, w, p)[:, 0]
-    bad = np.flatnonzero(~np.isfinite(signals))
-    if bad.size:
-        return _signal_error(system, int(bad[0]), float(signals[bad[0]]), time)
-    slope = system.derivative(time, state, point.z, run.trial_unknowns, p)
-    place = int(np.argmin(np.isfinite(slope)))
+    invalid = np.flatnonzero(~np.isfinite(signals))
+    if invalid.size:
+        return _signal_error(system, int(invalid[0]), float(signals[invalid[0]]), time)
+    derivative = system.derivative(time, state, point.z, run.trial_unknowns, p)
+    place = int(np.argmin(np.isfinite(derivative)))
     name = element_name(system.states, place)
     return SimulationError(
         f"the derivative of state '{name}' is not finite at {time:.9g} s, where it is {state[place]:.6g}",
@@ -123,7 +128,8 @@ def _unsolved(system: CompiledSystem, time: float) -> SimulationError:
     blocks = sorted({slot.name.rpartition("/")[0] or slot.name for slot in system.algebraic})
     names = ", ".join(f"'{name}'" for name in blocks)
     return SimulationError(
-        f"the implicit equations of the loop through {names} have no solution that was found at {time:.9g} s",
+        f"Newton's method found no solution of the implicit equations of the loop through {names} at "
+        f"{time:.9g} s",
         where=system.name,
         allowed="loops with one solution near the previous one: the Jacobian must not be singular",
         fix="check whether the loop has a unique solution; a delay or an integrator breaks the loop",
@@ -132,34 +138,35 @@ def _unsolved(system: CompiledSystem, time: float) -> SimulationError:
 
 def _endless_events(system: CompiledSystem, run: Integration) -> SimulationError:
     blocks = _unique(system.guard_names[guard] for guard in run.repeating_guards)
-    blocks = blocks or _contradicting(system, run)
+    blocks = blocks or _inconsistent_blocks(system, run)
     verb = "causes" if len(blocks) == 1 else "cause"
     return SimulationError(
         f"{_listed(blocks)} {verb} events without end at {run.time:.15g} s, after {run.events} events in "
         "all: they occur at ever shorter distances, or at one instant (Zeno behaviour or "
         "chattering)",
         where=system.name,
-        allowed=f"{MOST_AT_ONCE} events in a row at distances of {CLOSE:g} t, {MOST_CROWDED} of {CROWD:g} t",
+        allowed=f"{MOST_CLOSE_EVENTS} events in a row at distances of {CLOSE_DISTANCE:g} t, "
+        f"{MOST_RAPID_EVENTS} of {RAPID_DISTANCE:g} t",
         fix=f"give '{blocks[0]}' a hysteresis, a dead band or a state of rest (no bounce below some speed), "
         "or stop the run before",
     )
 
 
 def _inconsistent_modes(system: CompiledSystem, run: Integration) -> SimulationError:
-    blocks = _contradicting(system, run)
+    blocks = _inconsistent_blocks(system, run)
     return SimulationError(
-        f"no choice of the modes of {_listed(blocks)} is consistent at {run.time:.15g} s: each leads "
-        "to signals that require another one",
+        f"no choice of the modes of {_listed(blocks)} is consistent at {run.time:.15g} s: each choice leads "
+        "to signals that require another choice",
         where=system.name,
         allowed="switching blocks in loops that have a solution",
         fix=f"break the loop through '{blocks[0]}' with an integrator, a delay or a hysteresis",
     )
 
 
-def _contradicting(system: CompiledSystem, run: Integration) -> list[str]:
+def _inconsistent_blocks(system: CompiledSystem, run: Integration) -> list[str]:
     """The blocks of the inconsistent modes at the present time."""
     names = [name for slot in system.discrete for name in [slot.name] * slot.size]
-    return _unique(names[place].rpartition("/")[0] for place in run.contradicting_modes)
+    return _unique(names[place].rpartition("/")[0] for place in run.inconsistent_modes)
 
 
 def _listed(blocks: list[str]) -> str:
@@ -183,22 +190,22 @@ def _step_too_small(system: CompiledSystem, run: Integration) -> SimulationError
     name = element_name(system.states, int(worst[0]))
     return SimulationError(
         f"the step became as small as the rounding of the time at {run.time:.9g} s, and the error is still "
-        f"too large; its largest parts, over what is allowed: {share}; "
+        f"too large; its largest components, relative to the tolerance: {share}; "
         f"state '{name}' is {run.state[worst[0]]:.6g}",
         where=system.name,
-        allowed="solutions that stay bounded, and jumps only at known instants",
+        allowed="solutions that stay bounded, and derivatives that jump only at events and breakpoints",
         fix=f"check the input of '{name}': the state may grow without bound, or its derivative may jump",
     )
 
 
-def _crawling(system: CompiledSystem, run: Integration) -> SimulationError:
+def _minimum_step(system: CompiledSystem, run: Integration) -> SimulationError:
     name = element_name(system.states, int(np.argmax(run.weighted_changes())))
     left = (run.stop - run.time) / run.last_step
     needs_jacobian = run.integrator.tableau.needs_jacobian
     stiff = "" if needs_jacobian else f"; if it is stiff, solver='{STIFF.name}'"
     return SimulationError(
-        f"the run takes extremely short steps at {run.time:.6g} s: {run.last_step:.2g} s, with {left:.0e} "
-        f"more to go, mainly because of state '{name}'",
+        f"the run takes extremely short steps at {run.time:.6g} s: {run.last_step:.2g} s. It would need "
+        f"{left:.0e} more of them, mainly because of state '{name}'",
         where=system.name,
         allowed="equations that jump at events only",
         fix=f"check the input of '{name}' for a jump that depends on the state, such as dry friction or a "
@@ -220,7 +227,7 @@ def stiffness_hint(system: CompiledSystem, run: Integration, p: Array) -> str:
     x, t, rest = point.x, point.time, (point.z, point.w, p)
     if x.size == 0:
         return ""
-    slope = system.derivative(t, x, *rest)
+    derivative = system.derivative(t, x, *rest)
     with np.errstate(over="ignore"):
         size = 1e-7 * max(1.0, float(np.linalg.norm(x)))
     if not math.isfinite(size):
@@ -229,7 +236,7 @@ def stiffness_hint(system: CompiledSystem, run: Integration, p: Array) -> str:
     rate = 0.0
     for _ in range(30):
         direction *= size / np.linalg.norm(direction)
-        change = system.derivative(t, x + direction, *rest) - slope
+        change = system.derivative(t, x + direction, *rest) - derivative
         rate = float(np.linalg.norm(change)) / size
         if not np.isfinite(rate) or rate == 0.0:
             return ""

@@ -23,6 +23,7 @@ import csv
 import io
 import json
 import re
+import zipfile
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
@@ -141,10 +142,14 @@ def _column(values: Array) -> pa.Array:
 
 
 def _npz(result: RunData) -> bytes:
+    """The bytes of ``numpy.savez_compressed``, whose own parameters exclude some names of arrays."""
+    arrays = {slot.title or slot.name: result[slot.name] for slot in result.signals_layout}
+    arrays |= {"time": result.time, "run": np.array(json.dumps(description_of(result)))}
     buffer = io.BytesIO()
-    arrays = {name: result[name] for name in result.names}
-    description = np.array(json.dumps(description_of(result)))
-    np.savez_compressed(buffer, allow_pickle=False, time=result.time, run=description, **arrays)
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, values in arrays.items():
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as entry:
+                np.lib.format.write_array(entry, values, allow_pickle=False)
     return buffer.getvalue()
 
 
@@ -155,20 +160,21 @@ def _mat(result: RunData) -> bytes:
     contents: dict[str, Any] = {"time": result.time}
     blocks: dict[str, str] = {}
     paths: list[list[str]] = []
-    for name in result.names:
+    for slot in result.signals_layout:
+        name = slot.title or slot.name
         block, _, port = name.rpartition("/")
         if not block:
             variable = _identifier(name, {*contents, "run", "paths"})
-            contents[variable] = result[name]
-            paths.append([name, variable, result.units[name]])
+            contents[variable] = result[slot.name]
+            paths.append([name, variable, slot.unit])
             continue
         if block not in blocks:
             blocks[block] = _identifier(block, {*contents, "run", "paths"})
             contents[blocks[block]] = {}
         fields: dict[str, Any] = contents[blocks[block]]
         field = _identifier(port, set(fields))
-        fields[field] = result[name]
-        paths.append([name, f"{blocks[block]}.{field}", result.units[name]])
+        fields[field] = result[slot.name]
+        paths.append([name, f"{blocks[block]}.{field}", slot.unit])
     contents["run"] = {"name": result.name, **asdict(result.run)}
     contents["paths"] = np.array(paths, dtype=object).reshape(len(paths), 3)
     buffer = io.BytesIO()
@@ -176,13 +182,13 @@ def _mat(result: RunData) -> bytes:
     return buffer.getvalue()
 
 
-def _identifier(name: str, taken: set[str]) -> str:
+def _identifier(name: str, used: set[str]) -> str:
     """An unused MATLAB name (letters, digits, underscores, at most 63) similar to ``name``."""
     plain = re.sub(r"[^A-Za-z0-9_]", "_", name)[:56]
     if not plain or not plain[0].isalpha():
         plain = f"x{plain}"
     candidate, number = plain, 2
-    while candidate in taken:
+    while candidate in used:
         candidate, number = f"{plain}_{number}", number + 1
     return candidate
 
@@ -200,7 +206,7 @@ _NEEDS = {".parquet": ("pyarrow", "Parquet files"), ".mat": ("scipy", "MAT files
 
 
 class LogFile(ABC):
-    """A table that is written in pieces. It appears under its name when it is complete."""
+    """A table that is written in several parts. The file gets its name when it is complete."""
 
     def __init__(self, path: Path, columns: Sequence[str]) -> None:
         self.columns = ("time", *columns)
@@ -216,7 +222,7 @@ class LogFile(ABC):
         self._file.finish()
 
     def abandon(self) -> None:
-        """Leave nothing behind."""
+        """Delete the incomplete file."""
         self._file.abandon()
 
     @abstractmethod

@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 
 SHIFTS = (0.1, -0.1, 1.0, -1.0, 10.0, -10.0, 100.0, -100.0)
 """Numbers that are added to the guess, one after the other, until a solution is found."""
-TURNS = 50
+ITERATIONS = 50
 SINGULAR, FARTHEST = 1e12, 1e6
 """The Jacobian counts as singular above this condition number, and above this Newton step over ``1 +
 |w|``."""
@@ -37,7 +37,7 @@ def first_guess(compiled: CompiledSystem, start: RunPoint, p: Array) -> Array:
 
 
 def _solution(compiled: CompiledSystem, start: RunPoint, w: Array, p: Array) -> Array | None:
-    for _ in range(TURNS):
+    for _ in range(ITERATIONS):
         step = _step(compiled, start, w, p)
         if step is None:
             return None
@@ -61,11 +61,11 @@ def _step(compiled: CompiledSystem, start: RunPoint, w: Array, p: Array) -> Arra
         return None
     if np.linalg.cond(jacobian) > SINGULAR:
         return None
-    step = _solved(jacobian, here)
+    step = _solve(jacobian, here)
     return step if (np.abs(step) < FARTHEST * (1.0 + np.abs(w))).all() else None
 
 
-def _solved(matrix: Array, right: Array) -> Array:
+def _solve(matrix: Array, right: Array) -> Array:
     """The solution of linear equations by elimination with row pivoting.
 
     LAPACK's last bits depend on the processor, and the last bits of a guess change those of the run.

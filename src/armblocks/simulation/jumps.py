@@ -25,7 +25,7 @@ Places = NDArray[np.intp]
 
 MOST_NUMBERS = 20_000_000
 """Maximum number of doubles for the states and signals on both sides of the recorded instants, 160 MB."""
-SMALLEST = 1e-9
+SMALLEST_JUMP = 1e-9
 """A change is a jump if it exceeds this fraction of the largest absolute value of the signal so far. Rounding
 and the location of events cause smaller changes."""
 
@@ -42,7 +42,7 @@ class Side:
     states: Array
     signals: Array
 
-    def chosen(self, instants: Booleans, rows: slice | Places = slice(None)) -> Side:
+    def selected(self, instants: Booleans, rows: slice | Places = slice(None)) -> Side:
         """Some of the instants and rows of the signals."""
         return Side(states=self.states[instants], signals=self.signals[rows][:, instants])
 
@@ -63,14 +63,14 @@ class JumpTable:
         jumping = np.empty((signals, 0), dtype=np.bool_)
         return JumpTable(time=np.empty(0), before=nothing, after=nothing, jumping=jumping)
 
-    def only(self, rows: Places | slice, begin: float, end: float) -> JumpTable:
+    def selected(self, rows: Places | slice, begin: float, end: float) -> JumpTable:
         """The instants after ``begin`` up to ``end`` (s) at which one of some signals jumps."""
         jumping: Booleans = self.jumping[rows]
         instants: Booleans = jumping.any(axis=0) & (self.time > begin) & (self.time <= end)
         return JumpTable(
             time=self.time[instants],
-            before=self.before.chosen(instants, rows),
-            after=self.after.chosen(instants, rows),
+            before=self.before.selected(instants, rows),
+            after=self.after.selected(instants, rows),
             jumping=jumping[:, instants],
         )
 
@@ -87,7 +87,7 @@ class Jumps:
     ) -> None:
         self.layout = layout
         self._aliases = aliases
-        self._given = table
+        self._table = table
 
     def __reduce__(self) -> tuple[object, ...]:
         return Jumps, (self.layout, dict(self._aliases), self.table)
@@ -95,7 +95,7 @@ class Jumps:
     @cached_property
     def table(self) -> JumpTable:
         """Both sides of all signals."""
-        return self._given if isinstance(self._given, JumpTable) else self._given()
+        return self._table if isinstance(self._table, JumpTable) else self._table()
 
     @property
     def time(self) -> Array:
@@ -108,12 +108,12 @@ class Jumps:
     def __getitem__(self, name: str) -> tuple[Array, Array, Array]:
         path = signal_path(name, self.layout, self._aliases, "jumps")
         rows, table = self.layout.ranges[path], self.table
-        own = table.jumping[rows].any(axis=0)
+        instants = table.jumping[rows].any(axis=0)
         shape = self.layout[path].shape
         before, after = (
-            side.signals[rows][:, own].T.reshape(-1, *shape) for side in (table.before, table.after)
+            side.signals[rows][:, instants].T.reshape(-1, *shape) for side in (table.before, table.after)
         )
-        return table.time[own], before, after
+        return table.time[instants], before, after
 
     def __repr__(self) -> str:
         return f"<Jumps of {len(self.layout)} signals at {len(self)} instants>"
@@ -132,13 +132,6 @@ class InstantRows:
     sample: NDArray[np.int64]
     p: Array
     change: tuple[RunPoint, Array] | None = None
-
-    def between(self, begin: int, end: int) -> InstantRows:
-        """The instants that belong to samples ``begin`` to ``end - 1``: the sample at the instant, else the
-        next one."""
-        chosen = (self.sample[:, 0] >= begin) & (self.sample[:, 0] < end)
-        change = self.change if chosen.size and chosen[0] else None
-        return InstantRows(rows=self.rows[chosen], sample=self.sample[chosen], p=self.p, change=change)
 
     def sides(self, compiled: CompiledSystem) -> tuple[Side, Side]:
         """The left limits and the values."""
@@ -167,19 +160,18 @@ class JumpSearch:
         self._largest = np.zeros(compiled.signals_layout.size)
         """The largest absolute value of each signal in the previous parts."""
 
-    def found(
+    def find(
         self, parts: Sequence[InstantRows], begin: int, time: Array, signals: Array, previous: float
     ) -> JumpTable:
-        """The jumps of the samples from number ``begin`` on: ``time (N,)`` s and ``signals (ny, N)``.
+        """The jumps at the instants of samples ``begin`` to ``begin + N - 1``: ``time (N,)`` s and
+        ``signals (ny, N)``.
 
         ``previous`` is the time of the sample before them, s. An instant with a signal that is not finite is
         left out.
         """
-        parts = [
-            part for part in (part.between(begin, begin + time.size) for part in parts) if len(part.rows)
-        ]
+        parts = [part for part in parts if len(part.rows)]
         if not parts:
-            self._grow(signals)
+            self._update_largest(signals)
             return JumpTable.empty(len(signals), self._compiled.states.size)
         sides = [part.sides(self._compiled) for part in parts]
         before, after = (
@@ -195,8 +187,8 @@ class JumpSearch:
         instants = np.asarray(jumping.any(axis=0))
         return JumpTable(
             time=_times(rows[:, 1, 0], sample, time, previous)[instants],
-            before=before.chosen(instants),
-            after=after.chosen(instants),
+            before=before.selected(instants),
+            after=after.selected(instants),
             jumping=jumping[:, instants],
         )
 
@@ -210,11 +202,11 @@ class JumpSearch:
             sides = np.maximum(np.abs(before[row]), np.abs(after[row]))
             sides = np.maximum.accumulate(np.where(finite, sides, 0.0))
             largest = np.maximum(np.maximum(largest, sides), self._largest[row])
-            jumping[row] &= np.abs(after[row] - before[row]) > SMALLEST * largest
-        self._grow(signals)
+            jumping[row] &= np.abs(after[row] - before[row]) > SMALLEST_JUMP * largest
+        self._update_largest(signals)
         return jumping
 
-    def _grow(self, signals: Array) -> None:
+    def _update_largest(self, signals: Array) -> None:
         if signals.shape[1]:
             self._largest = np.fmax(self._largest, np.abs(signals).max(axis=1))
 
@@ -237,16 +229,16 @@ def merged(time: Array, signals: Array, jumps: JumpTable) -> tuple[Array, Array]
     A jump has two rows with the same time: the left limits, then the values. The second one is the sample at
     that time if there is one.
     """
-    order = _Order(time, jumps.time)
+    order = _TimeOrder(time, jumps.time)
     return order.times, order.merged(signals, jumps.before.signals, jumps.after.signals)
 
 
 def merged_states(time: Array, states: Array, jumps: JumpTable) -> Array:
     """States ``(R, nx)`` in the order of :func:`merged`."""
-    return _Order(time, jumps.time).merged(states.T, jumps.before.states.T, jumps.after.states.T).T
+    return _TimeOrder(time, jumps.time).merged(states.T, jumps.before.states.T, jumps.after.states.T).T
 
 
-class _Order:
+class _TimeOrder:
     """The order of samples and both sides of jumps by time."""
 
     def __init__(self, time: Array, jumps: Array) -> None:
@@ -254,8 +246,8 @@ class _Order:
         self._order: NDArray[np.intp] | None = None
         if not jumps.size:
             return
-        self._alone = time[np.minimum(np.searchsorted(time, jumps), time.size - 1)] != jumps
-        times = np.concatenate([time, jumps, jumps[self._alone]])
+        self._without_sample = time[np.minimum(np.searchsorted(time, jumps), time.size - 1)] != jumps
+        times = np.concatenate([time, jumps, jumps[self._without_sample]])
         left = np.zeros(times.size, dtype=np.bool_)
         left[time.size : time.size + jumps.size] = True
         self._order = np.lexsort((~left, times))
@@ -265,4 +257,4 @@ class _Order:
         """Columns of samples and of both sides of the jumps in this order."""
         if self._order is None:
             return samples
-        return np.concatenate([samples, before, after[:, self._alone]], axis=1)[:, self._order]
+        return np.concatenate([samples, before, after[:, self._without_sample]], axis=1)[:, self._order]

@@ -8,32 +8,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.integration.system import CompiledSystem
-from armblocks.simulation.stretch import Rows
+from armblocks.simulation.run_part import Rows
 
 Array = NDArray[np.float64]
 
-INSTANTS = 32
-"""Number of samples of each part of a run at which conditions are computed, with the first and the last."""
+CHECKED_SAMPLES = 32
+"""Number of samples of each part of a run at which conditions are computed, including the first and the
+last."""
 HALF_OF_THE_DIGITS = 1e8
 """Condition above which fewer than half of a double's 16 digits are correct."""
-ROUNDS = 12
+ITERATIONS = 12
 """Iterations of the power method; its two bounds then differ by a few per cent for most matrices."""
-NAMED = 3
+MOST_NAMES = 3
 
 
 def warnings_of_loops(system: CompiledSystem, parts: Sequence[Rows]) -> list[str]:
     """A warning for each linear loop with fewer than half of the digits correct, with its worst time."""
     worst = [(0.0, 0.0)] * len(system.loops)
     for rows in parts if system.loops else ():
-        chosen = np.unique(np.linspace(0, rows.time.size - 1, INSTANTS).astype(np.intp))
+        chosen = np.unique(np.linspace(0, rows.time.size - 1, CHECKED_SAMPLES).astype(np.intp))
         t, x, z, w = (part[chosen] for part in (rows.time, rows.states, rows.discrete, rows.algebraic))
         for loop, matrices in enumerate(system.loop_matrices(t, x, z, w, rows.p)):
             conditions = loop_conditions(matrices)
             place = int(np.argmax(conditions))
             worst[loop] = max(worst[loop], (float(conditions[place]), float(rows.time[chosen][place])))
     return [
-        f"the loop of {_listed(names)} has the condition {condition:.2g} at {time:.9g} s, so that its "
-        f"signals have about {max(0.0, 16.0 - np.log10(condition)):.0f} right digits"
+        f"the loop of {_listed(names)} has the condition number {condition:.2g} at {time:.9g} s, so that its "
+        f"signals have about {max(0.0, 16.0 - np.log10(condition)):.0f} correct digits"
         for names, (condition, time) in zip(system.loops, worst)
         if condition > HALF_OF_THE_DIGITS
     ]
@@ -56,14 +57,14 @@ def loop_conditions(matrices: Array) -> Array:
             continue
         growth = inverse @ (np.eye(n) + np.abs(matrix + np.eye(n)))
         vector = np.ones(n)
-        for _ in range(ROUNDS):
-            moved = growth @ vector
-            vector = np.sqrt(vector / vector.max() * moved / moved.max())
+        for _ in range(ITERATIONS):
+            product = growth @ vector
+            vector = np.sqrt(vector / vector.max() * product / product.max())
         bound = float(np.max(growth @ vector / vector))
         found[k] = bound if np.isfinite(bound) else 0.0
     return found
 
 
 def _listed(names: Sequence[str]) -> str:
-    shown = ", ".join(f"'{name}'" for name in names[:NAMED])
-    return shown if len(names) <= NAMED else f"{shown} and {len(names) - NAMED} more signals"
+    shown = ", ".join(f"'{name}'" for name in names[:MOST_NAMES])
+    return shown if len(names) <= MOST_NAMES else f"{shown} and {len(names) - MOST_NAMES} more signals"

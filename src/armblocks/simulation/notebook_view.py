@@ -1,7 +1,7 @@
 """The notebook view of a result: one small figure for each signal, in self-contained HTML and SVG.
 
-The page's own text colour and font are kept, so the view fits light and dark notebooks; traces are colours of
-Okabe and Ito (2008) that stand out on both.
+Text has the colour and font of the page, so that the view suits light and dark notebooks. Traces have colours
+of Okabe and Ito (2008) with sufficient contrast on both.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def result_html(result: RunData) -> str:
     end = float(result.time[-1]) if result.time.size else 0.0
     solver = "no solver needed" if report.solver == "none" else f"{report.solver}, {report.steps} steps"
     facts = (
-        f"{result.time.size} instants to {end:g} s · {solver} · "
+        f"{result.time.size} samples to {end:g} s · {solver} · "
         f"{_seconds(report.wall_time)} · {report.real_time_factor:,.0f} × real time"
     )
     parts = [f'<div class="ab-result"><style>{STYLE}</style><h3>{escape(result.name)}</h3><p>{facts}</p>']
@@ -73,34 +73,33 @@ def panels_html(time: Array, quantities: Sequence[tuple[Slot, Array]]) -> str:
 
 def _panel(time: Array, values: Array, slot: Slot) -> str:
     columns = values.reshape(time.size, slot.size)
-    chosen = _most_telling(columns)
+    drawn = _drawn_components(columns)
     angle = slot.unit == "rad" or slot.unit.startswith("rad/")
     unit = slot.unit.replace("rad", "deg", 1) if angle else slot.unit
-    shown = columns[:, chosen] * (180.0 / np.pi if angle else 1.0)
+    shown = columns[:, drawn] * (180.0 / np.pi if angle else 1.0)
     low, high = (float(shown.min()), float(shown.max())) if shown.size else (0.0, 0.0)
     what = " · ".join(part for part in (unit, "×".join(map(str, slot.shape))) if part)
-    if len(chosen) < slot.size:
-        what += f" · {len(chosen)} of {slot.size} drawn"
-    spoken = f"{slot.name}{f' in {unit}' if unit else ''}: from {_tick(low)} to {_tick(high)}"
-    caption = (
-        f"<figcaption>{escape(slot.name)} <span>{escape(what)}</span>{_legend(slot, chosen)}</figcaption>"
-    )
-    return f"<figure>{caption}{_svg(time, shown, low, high, spoken)}</figure>"
+    if len(drawn) < slot.size:
+        what += f" · {len(drawn)} of {slot.size} drawn"
+    title = slot.title or slot.name
+    label = f"{title}{f' in {unit}' if unit else ''}: from {_tick(low)} to {_tick(high)}"
+    caption = f"<figcaption>{escape(title)} <span>{escape(what)}</span>{_legend(slot, drawn)}</figcaption>"
+    return f"<figure>{caption}{_svg(time, shown, low, high, label)}</figure>"
 
 
-def _legend(slot: Slot, chosen: list[int]) -> str:
+def _legend(slot: Slot, drawn: list[int]) -> str:
     """The name or index of each component in the colour of its trace; nothing for a scalar."""
     if not slot.shape:
         return ""
     names = slot.entry_names
     labels = (
         f'<i style="color:{TRACES[k % len(TRACES)]}">{escape(names[component])}</i>'
-        for k, component in enumerate(chosen)
+        for k, component in enumerate(drawn)
     )
     return f" <b>{' '.join(labels)}</b>"
 
 
-def _most_telling(columns: Array) -> list[int]:
+def _drawn_components(columns: Array) -> list[int]:
     """The components to draw: all of them, or only those that change, at most the first ``MOST_TRACES``."""
     count = columns.shape[1]
     if count <= MOST_TRACES or columns.shape[0] == 0:
@@ -109,7 +108,7 @@ def _most_telling(columns: Array) -> list[int]:
     return (moving or list(range(count)))[:MOST_TRACES]
 
 
-def _svg(time: Array, columns: Array, low: float, high: float, spoken: str) -> str:
+def _svg(time: Array, columns: Array, low: float, high: float, label: str) -> str:
     # A constant is in the middle of its panel, with a range of half its value, or 1, on either side.
     margin = 0.06 * (high - low) if high > low else (0.5 * abs(high) or 1.0)
     bottom, top = low - margin, high + margin
@@ -122,7 +121,7 @@ def _svg(time: Array, columns: Array, low: float, high: float, spoken: str) -> s
 
     floor, right = HEIGHT - BOTTOM, WIDTH - RIGHT
     lines = [
-        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{escape(spoken, quote=True)}">',
+        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{escape(label, quote=True)}">',
         f'<path d="M{LEFT} {TOP}V{floor}H{right}" fill="none" stroke="currentColor" stroke-opacity=".3"/>',
     ]
     if bottom < 0.0 < top:
@@ -134,7 +133,7 @@ def _svg(time: Array, columns: Array, low: float, high: float, spoken: str) -> s
     lines.append(f'<text x="{LEFT}" y="{HEIGHT - 6}">{start:g}</text>')
     lines.append(f'<text x="{right}" y="{HEIGHT - 6}" text-anchor="end">{end:g} s</text>')
     for k in range(columns.shape[1]):
-        instants, values = _outline(time, columns[:, k])
+        instants, values = _envelope(time, columns[:, k])
         points = " ".join(
             f"{LEFT + (t - start) * across:.1f},{y(v):.1f}"
             for t, v in zip(instants.tolist(), values.tolist())
@@ -147,18 +146,17 @@ def _svg(time: Array, columns: Array, low: float, high: float, spoken: str) -> s
     return "".join(lines)
 
 
-def _outline(time: Array, values: Array, pieces: int = 110) -> tuple[Array, Array]:
-    """The lowest and highest point of each piece, in order of time. The figure looks the same with less
-    text."""
-    if time.size <= 2 * pieces:
+def _envelope(time: Array, values: Array, intervals: int = 110) -> tuple[Array, Array]:
+    """The lowest and highest point of each interval, in order of time: the same figure with less text."""
+    if time.size <= 2 * intervals:
         return time, values
-    edges = np.searchsorted(time, np.linspace(float(time[0]), float(time[-1]), pieces + 1)).tolist()
+    edges = np.searchsorted(time, np.linspace(float(time[0]), float(time[-1]), intervals + 1)).tolist()
     edges[-1] = time.size
-    chosen = {0, time.size - 1}
+    drawn = {0, time.size - 1}
     for a, b in itertools.pairwise(edges):
         if a < b:
-            chosen |= {a + int(np.argmin(values[a:b])), a + int(np.argmax(values[a:b]))}
-    places = np.array(sorted(chosen))
+            drawn |= {a + int(np.argmin(values[a:b])), a + int(np.argmax(values[a:b]))}
+    places = np.array(sorted(drawn))
     return time[places], values[places]
 
 

@@ -20,8 +20,8 @@ from armblocks.simulation.tableaux import DEFAULT, STIFF, TABLEAUX, find_tableau
 
 Array = NDArray[np.float64]
 
-DEFAULT_INSTANTS = 1000
-"""Number of recorded intervals without a sample time: for example 10 s in intervals of 10 ms."""
+DEFAULT_INTERVALS = 1000
+"""Number of recorded intervals if no sample time is given: for example 10 s in intervals of 10 ms."""
 MOST_STEPS = 1e11
 """Maximum number of fixed steps, or of ticks of a clock, in a run."""
 MOST_NUMBERS = 500_000_000
@@ -39,7 +39,7 @@ class LogRequest:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Instants:
+class SampleTimes:
     """The sample times of a run: ``start``, ``k sample_time`` for all integers ``k`` between, and ``stop``.
 
     Each time is computed as a product, so no error accumulates. A time within a billionth of a sample time of
@@ -54,7 +54,7 @@ class Instants:
     count: int
 
     @staticmethod
-    def between(start: float, stop: float, sample_time: float) -> Instants:
+    def between(start: float, stop: float, sample_time: float) -> SampleTimes:
         """The sample times of a run."""
         last, first = math.ceil(stop / sample_time - 1e-9), 1
         if start > 0.0:
@@ -62,17 +62,17 @@ class Instants:
             while first < last and first * sample_time <= start + 1e-9 * sample_time:
                 first += 1
         count = 1 if last == 0 else 1 + last - min(first, last) + 1
-        return Instants(start=start, stop=stop, sample_time=sample_time, first=first, count=count)
+        return SampleTimes(start=start, stop=stop, sample_time=sample_time, first=first, count=count)
 
     def part(self, begin: int, end: int) -> Array:
         """Sample times number ``begin`` to ``end - 1``, s."""
         numbers = np.arange(begin, end, dtype=np.float64) + (self.first - 1.0)
-        instants: Array = numbers * self.sample_time
+        times: Array = numbers * self.sample_time
         if begin == 0 < end:
-            instants[0] = self.start
+            times[0] = self.start
         if begin < end == self.count:
-            instants[-1] = self.stop
-        return instants
+            times[-1] = self.stop
+        return times
 
     def up_to(self, time: float) -> int:
         """Number of sample times up to and including a time (s)."""
@@ -86,14 +86,14 @@ class Instants:
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """The settings of one run, without open choices. ``tableau`` is the method, ``None`` for a system without
-    states. ``stiff`` is the method that replaces it if the system proves stiff, or ``None``."""
+    """The settings of one run, with all choices made. ``tableau`` is the method, ``None`` for a system
+    without states. ``stiff`` is the method that replaces it if the system proves stiff, or ``None``."""
 
     tableau: Tableau | None
     stiff: Tableau | None
     solver: str
     reason: str
-    instants: Instants
+    sample_times: SampleTimes
     step: float
     max_step: float
 
@@ -116,8 +116,8 @@ def make_plan(
             fix=f"for 1 s more, stop_time={start + 1.0:g}",
         )
     for period, _ in system.sizes.clocks:
-        _countable("the period of a sampled block", period, stop, system.name)
-    tableau, reason = _choose(system, options)
+        _check_step_count("the period of a sampled block", period, stop, system.name)
+    tableau, reason = _choose_method(system, options)
     fixed_step = None if tableau is None or tableau.adaptive else step
     sample_time = _sample_time(system, options, stop, fixed_step, logged=logged)
     max_step = math.inf if options.max_step is None else float(options.max_step)
@@ -127,7 +127,7 @@ def make_plan(
         stiff=STIFF if tableau is DEFAULT and options.solver.casefold() == "auto" else None,
         solver=solver,
         reason=reason,
-        instants=Instants.between(start, stop, sample_time),
+        sample_times=SampleTimes.between(start, stop, sample_time),
         step=step if step is not None else sample_time,
         max_step=max_step,
     )
@@ -149,8 +149,8 @@ def check_options(options: SimulationOptions, where: str) -> None:
                 allowed=f"above 0, at most the stop time {stop:g} s",
                 fix="choose a smaller step",
             )
-        _resolvable("step", step, stop, where)
-        _countable("step", step, stop, where)
+        _check_resolution("step", step, stop, where)
+        _check_step_count("step", step, stop, where)
     _check_solver(options.solver, where)
     if options.sample_time is not None:
         _number("sample_time", options.sample_time, where, "a time in s above 0", above=0.0)
@@ -159,7 +159,7 @@ def check_options(options: SimulationOptions, where: str) -> None:
         raise InputError(
             f"rtol is {options.rtol!r}",
             where=where,
-            allowed=f"{SMALLEST_RTOL:g} to 1: doubles carry 16 digits",
+            allowed=f"{SMALLEST_RTOL:g} to 1: a double has 16 digits",
             fix="1e-6 is a good start, 1e-10 is tight",
         )
     _number("atol", options.atol, where, "a number above 0, in the units of the states", above=0.0)
@@ -172,7 +172,7 @@ def check_options(options: SimulationOptions, where: str) -> None:
         )
     if options.max_step is not None:
         max_step = _number("max_step", options.max_step, where, "a time in s above 0", above=0.0)
-        _resolvable("max_step", max_step, stop, where)
+        _check_resolution("max_step", max_step, stop, where)
 
 
 def _check_solver(name: object, where: str) -> None:
@@ -182,7 +182,7 @@ def _check_solver(name: object, where: str) -> None:
         find_tableau(name, where)
 
 
-def _resolvable(name: str, step: float, stop: float, where: str) -> None:
+def _check_resolution(name: str, step: float, stop: float, where: str) -> None:
     """Raise ``InputError`` for a step that is too small for the resolution of times near the end."""
     least = 4.0 * math.ulp(stop)
     if step < least:
@@ -194,14 +194,14 @@ def _resolvable(name: str, step: float, stop: float, where: str) -> None:
         )
 
 
-def _countable(name: str, step: float, stop: float, where: str) -> None:
+def _check_step_count(name: str, step: float, stop: float, where: str) -> None:
     """Raise ``InputError`` for a step or period that occurs more than ``MOST_STEPS`` times in a run."""
     if stop > MOST_STEPS * step:
         raise InputError(
             f"{name} is {step:g} s, and the stop time {stop:g} s: {stop / step:.0e} steps",
             where=where,
             allowed=f"at most {MOST_STEPS:.0e}, which take hours",
-            fix="is it in seconds? Choose a longer one, or an earlier stop time",
+            fix="check that it is in seconds; choose a longer one, or an earlier stop time",
         )
 
 
@@ -222,18 +222,18 @@ def _number(
     raise InputError(f"{name} is {value!r}", where=where, allowed=allowed, fix=f"give another {name}")
 
 
-def _choose(system: CompiledSystem, options: SimulationOptions) -> tuple[Tableau | None, str]:
+def _choose_method(system: CompiledSystem, options: SimulationOptions) -> tuple[Tableau | None, str]:
     automatic = options.solver.casefold() == "auto"
     named = None if automatic else find_tableau(options.solver)
     if system.states.size == 0 and system.sizes.hybrid:
         # A step without states goes from instant to instant and evaluates the guards.
-        return EULER, "none needed: the system has no continuous states, only instants are worked out"
+        return EULER, "none needed: the system has no continuous states, only ticks and events"
     if system.states.size == 0:
-        return None, "none needed: the system has no states, every instant is evaluated directly"
+        return None, "none needed: the system has no states, each sample is evaluated directly"
     if named is None and options.step is not None:
         return RK4, "a step was given, so a fixed-step method of order 4"
     if named is None:
-        return DEFAULT, f"auto: {DEFAULT.title}, explicit, as nothing showed that the system is stiff"
+        return DEFAULT, f"auto: {DEFAULT.title}, explicit, because no stiffness was detected"
     if named.adaptive and options.step is not None:
         raise InputError(
             f"solver {named.name} chooses its own steps, and step is {options.step:g} s",
@@ -241,7 +241,7 @@ def _choose(system: CompiledSystem, options: SimulationOptions) -> tuple[Tableau
             allowed=f"step with a fixed-step solver: {', '.join(t.name for t in TABLEAUX if not t.adaptive)}",
             fix="use max_step to bound the steps, or solver='rk4' ('ros5' for a stiff system)",
         )
-    return named, f"asked for: {named.title}"
+    return named, f"requested: {named.title}"
 
 
 def _sample_time(
@@ -253,14 +253,14 @@ def _sample_time(
     elif fixed_step is not None and stop > 0.0:
         sample_time = fixed_step * max(1, math.ceil(stop / fixed_step / 10_000 * (1.0 - 1e-9)))
     else:
-        sample_time = stop / DEFAULT_INSTANTS if stop > 0.0 else 1.0
+        sample_time = stop / DEFAULT_INTERVALS if stop > 0.0 else 1.0
     width = 1 + system.states.size + system.signals_layout.size
     if not logged and stop / sample_time * width > MOST_NUMBERS:
-        instants = f"{stop / sample_time:.3g} instants of {width} numbers"
+        samples = f"{stop / sample_time:.3g} samples of {width} numbers"
         raise InputError(
-            f"a sample time of {sample_time:g} s over {stop:g} s records {instants}",
+            f"a sample time of {sample_time:g} s over {stop:g} s records {samples}",
             where=system.name,
-            allowed=f"at most {MOST_NUMBERS // width} instants, which take 4 GB",
+            allowed=f"at most {MOST_NUMBERS // width} samples, which take 4 GB",
             fix="choose a larger sample_time, which has no effect on the accuracy of the steps, "
             "or log the run to a file",
         )
@@ -287,7 +287,7 @@ def parameter_vector(system: CompiledSystem, given: Mapping[str, ArrayLike] | Ar
             fix="give a mapping by name instead",
         )
     # Infinite values are allowed if the diagram itself has them, such as infinite limits.
-    return _refuse(system, p, ~np.isfinite(p) & np.isfinite(system.parameter_values))
+    return _require_finite(system, p, ~np.isfinite(p) & np.isfinite(system.parameter_values))
 
 
 def changed_parameters(system: CompiledSystem, p: Array, given: Mapping[str, ArrayLike]) -> Array:
@@ -311,10 +311,10 @@ def changed_parameters(system: CompiledSystem, p: Array, given: Mapping[str, Arr
                 fix="give one number for each element",
             )
         p[layout.ranges[name]] = np.broadcast_to(array, slot.shape).ravel()
-    return _refuse(system, p, np.isnan(p))
+    return _require_finite(system, p, np.isnan(p))
 
 
-def _refuse(system: CompiledSystem, p: Array, bad: NDArray[np.bool_]) -> Array:
+def _require_finite(system: CompiledSystem, p: Array, bad: NDArray[np.bool_]) -> Array:
     """Return ``p``. Raises ``InputError`` that names the first parameter with an invalid number."""
     if bad.any():
         layout = system.parameters
@@ -323,6 +323,6 @@ def _refuse(system: CompiledSystem, p: Array, bad: NDArray[np.bool_]) -> Array:
             f"parameter '{name}' is {p[layout.ranges[name]].tolist()}",
             where=system.name,
             allowed="finite numbers",
-            fix="NaN and infinities cannot be simulated",
+            fix="give finite numbers: NaN and infinity cannot be simulated",
         )
     return p

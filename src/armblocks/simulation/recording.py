@@ -13,13 +13,13 @@ from armblocks.equations import Signature
 from armblocks.errors import SimulationError
 from armblocks.integration.native_integrator import Integration
 from armblocks.integration.system import CompiledSystem
-from armblocks.simulation.diagnosis import first_bad_signal
-from armblocks.simulation.jumps import Jumps, JumpSearch, JumpTable, merged, merged_states
-from armblocks.simulation.plan import Instants, LogRequest
+from armblocks.simulation.diagnosis import first_invalid_signal
+from armblocks.simulation.jumps import InstantRows, Jumps, JumpSearch, JumpTable, merged, merged_states
+from armblocks.simulation.plan import LogRequest, SampleTimes
 from armblocks.simulation.result import SimulationResult
 from armblocks.simulation.run_data import LoggedFile
+from armblocks.simulation.run_part import Consumer, Rows, RunPart
 from armblocks.simulation.signal_names import signal_path
-from armblocks.simulation.stretch import Consumer, Rows, Stretch
 
 if TYPE_CHECKING:
     from armblocks.simulation.run_log import RunLog
@@ -73,14 +73,14 @@ class Recording:
     """The parts of a run with constant parameters, and the log file of a logged run."""
 
     def __init__(
-        self, compiled: CompiledSystem, instants: Instants, log: LogRequest | None, layout: Signature
+        self, compiled: CompiledSystem, sample_times: SampleTimes, log: LogRequest | None, layout: Signature
     ) -> None:
         """Raises the errors of opening a log."""
         self._compiled = compiled
         self._layout = layout
         self._search = JumpSearch(compiled)
         """The search of a logged run, from window to window."""
-        self.stretches: list[Stretch] = []
+        self.parts: list[RunPart] = []
         self.window: int | None = None
         """Number of samples in memory of a logged run."""
         self._log: RunLog | None = None
@@ -89,18 +89,18 @@ class Recording:
             from armblocks.simulation.run_log import RunLog, window_rows
 
             states = compiled.states.size
-            self._log = RunLog(log, layout, compiled.aliases, states, instants.count)
+            self._log = RunLog(log, layout, compiled.aliases, states, sample_times.count)
             self.window = window_rows(1 + states + layout.size)
 
     @property
     def recorded(self) -> int:
         """Number of samples recorded so far."""
-        return self.stretches[-1].recorded if self.stretches else 0
+        return self.parts[-1].recorded if self.parts else 0
 
     @property
     def integrations(self) -> list[Integration]:
         """The native loops, one for each part of a run that is integrated."""
-        return [part.integration for part in self.stretches if part.integration is not None]
+        return [part.integration for part in self.parts if part.integration is not None]
 
     @property
     def file(self) -> LoggedFile | None:
@@ -113,12 +113,14 @@ class Recording:
         not finite."""
         return None if self._log is None else self._write
 
-    def hand_over(self) -> None:
-        """Write the remaining samples of the last part to the log. Raises the errors of the
-        :attr:`consumer`."""
-        if self._log is not None and self.stretches:
-            self.stretches[-1].settle()
-            self._write(self.stretches[-1].rows())
+    def write_remaining(self) -> None:
+        """Write the remaining samples of the last part to the log.
+
+        Raises the errors of the :attr:`consumer`.
+        """
+        if self._log is not None and self.parts:
+            self.parts[-1].undo_interrupted_chunk()
+            self._write(self.parts[-1].rows())
 
     def samples(self, begin: int) -> Samples:
         """Signals of the samples from number ``begin`` on that are in memory."""
@@ -135,18 +137,18 @@ class Recording:
             jumps=self._jumps(parts, time, signals),
         )
 
-    def good(self) -> Recorded:
+    def valid_samples(self) -> Recorded:
         """All samples before the first signal that is not finite; of a logged run, the view in memory."""
         compiled = self._compiled
         if self._log is not None:
             time, states, signals = self._log.view(compiled.signals_layout.size)
             return Recorded(time=time, states=states, signals=signals, jumps=self._jumps([], time, signals))
-        parts = self._rows(0) or [self.stretches[-1].rows()]
+        parts = self._rows(0) or [self.parts[-1].rows()]
         time = _joined([rows.time for rows in parts])
         states = _joined([rows.states for rows in parts])
         signals = _joined([rows.signals(compiled) for rows in parts], axis=1)
-        bad = first_bad_signal(compiled, time, signals, _joined([rows.algebraic for rows in parts]))
-        failure, count = (None, time.size) if bad is None else bad
+        error = first_invalid_signal(compiled, time, signals, _joined([rows.algebraic for rows in parts]))
+        failure, count = (None, time.size) if error is None else error
         time, states, signals = time[:count], states[:count], signals[:, :count]
         jumps = self._jumps(parts, time, signals)
         return Recorded(time=time, states=states, signals=signals, jumps=jumps, failure=failure)
@@ -159,12 +161,17 @@ class Recording:
             if not parts:
                 return JumpTable.empty(compiled.signals_layout.size, compiled.states.size)
             first = parts[0]
-            instants = [part.instants() for part in parts]
-            return JumpSearch(compiled).found(instants, first.begin, time, signals, first.previous)
+            instants = self._instants(first.begin, time.size)
+            return JumpSearch(compiled).find(instants, first.begin, time, signals, first.previous)
 
         return Jumps(self._layout, compiled.aliases, table)
 
-    def held(self) -> list[Rows]:
+    def _instants(self, begin: int, count: int) -> list[InstantRows]:
+        """The instants of ``count`` samples. Those just before a change of parameters belong to the first
+        sample of the next part."""
+        return [part.instants(begin, begin + count) for part in self.parts]
+
+    def in_memory(self) -> list[Rows]:
         """The rows that are in memory."""
         return self._rows(0)
 
@@ -174,7 +181,7 @@ class Recording:
             self._log.finish(result)
 
     def _rows(self, begin: int) -> list[Rows]:
-        return [rows for rows in (part.rows(begin) for part in self.stretches) if rows.time.size]
+        return [rows for rows in (part.rows(begin) for part in self.parts) if rows.time.size]
 
     def _write(self, rows: Rows) -> None:
         """Write a window to the log, without the rows that were written before an interruption."""
@@ -183,15 +190,16 @@ class Recording:
         if not rows.time.size:
             return
         signals = rows.signals(self._compiled)
-        bad = first_bad_signal(self._compiled, rows.time, signals, rows.algebraic)
-        good = rows.time.size if bad is None else bad[1]
-        time, states, signals = rows.time[:good], rows.states[:good], signals[:, :good]
-        jumps = self._search.found([rows.instants()], rows.begin, time, signals, rows.previous)
+        error = first_invalid_signal(self._compiled, rows.time, signals, rows.algebraic)
+        valid = rows.time.size if error is None else error[1]
+        time, states, signals = rows.time[:valid], rows.states[:valid], signals[:, :valid]
+        instants = self._instants(rows.begin, valid)
+        jumps = self._search.find(instants, rows.begin, time, signals, rows.previous)
         states = merged_states(time, states, jumps)
         time, signals = merged(time, signals, jumps)
-        self._log.append(time, states, signals, samples=good)
-        if bad is not None:
-            raise bad[0]
+        self._log.append(time, states, signals, samples=valid)
+        if error is not None:
+            raise error[0]
 
 
 def _joined(parts: Sequence[Array], axis: int = 0) -> Array:

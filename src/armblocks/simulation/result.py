@@ -47,11 +47,11 @@ class SimulationResult(RunData):
         end = f"{self.time[-1]:g} s" if self.time.size else "nothing"
         solver = "no solver needed" if report.solver == "none" else f"{report.solver}, {report.steps} steps"
         head = (
-            f"{self.name}: {self.time.size} instants to {end}, {len(self.names)} signals, {solver}, "
+            f"{self.name}: {self.time.size} samples to {end}, {len(self.names)} signals, {solver}, "
             f"{report.wall_time:.3g} s ({report.real_time_factor:.3g} x real time)"
         )
         if self.log is not None:
-            head += f", all {self.log.rows} instants in {self.log.path}"
+            head += f", all {self.log.rows} rows in {self.log.path}"
         lines = [f"<SimulationResult {head}{'' if report.complete else ', INCOMPLETE'}>"]
         if report.message:
             lines.append(f"  {report.message}")

@@ -159,15 +159,15 @@ class RunData:
             signals=np.concatenate(places)[:, rows] if places else np.empty((0, self.time[rows].size)),
             states=self.states[rows],
             aliases={},
-            given_jumps=self._some_jumps(slots, names.values(), self.time[rows]),
+            given_jumps=self._selected_jumps(slots, names.values(), self.time[rows]),
         )
 
-    def _some_jumps(self, slots: list[Slot], paths: Iterable[str], time: Array) -> Jumps:
+    def _selected_jumps(self, slots: list[Slot], paths: Iterable[str], time: Array) -> Jumps:
         """The jumps of some signals between the first and the last of some samples."""
         jumps, ranges = self.jumps, [self.signals_layout.ranges[self.resolve(path)] for path in paths]
         chosen = np.array([k for part in ranges for k in range(part.start, part.stop)], dtype=np.intp)
         begin, end = (float(time[0]), float(time[-1])) if time.size else (0.0, 0.0)
-        return Jumps(Signature(tuple(slots)), {}, lambda: jumps.table.only(chosen, begin, end))
+        return Jumps(Signature(tuple(slots)), {}, lambda: jumps.table.selected(chosen, begin, end))
 
     def columns(self) -> tuple[str, ...]:
         """A name for each scalar of ``signals``: ``clock/y``, ``rne/tau[link2]``, ``fkine/T[0,3]``.

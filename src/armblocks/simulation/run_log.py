@@ -1,8 +1,8 @@
-"""Runs that write their signals to a file during the run, and keep a view of them in memory.
+"""The log of a run: its file, which is written during the run, and a view in memory.
 
-Independent of the duration, the memory contains one window of samples, the data being written, and the view,
-which has enough rows for figures without visible differences. The view has complete rows: of each interval
-the first row, and the rows in which some signal has its minimum or maximum.
+The size of the memory does not depend on the duration. The memory contains one window of samples, the data
+being written, and the view. Figures of the view look like figures of all rows. The view has complete rows: of
+each interval the first row, and the rows in which some signal has its minimum or maximum.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ WINDOW_NUMBERS = 2_000_000
 
 
 def window_rows(width: int) -> int:
-    """Number of samples with ``width`` numbers each that are kept in memory."""
+    """Number of samples with ``width`` numbers each in the window."""
     return max(256, min(65_536, WINDOW_NUMBERS // width))
 
 
@@ -40,41 +40,42 @@ class View:
     argument."""
 
     def __init__(self, total: int, watched: Sequence[int]) -> None:
-        """``total`` is the number of rows to expect; the extremes of the ``watched`` quantities are kept."""
+        """``total`` is the number of rows to expect; the view has the extremes of the ``watched``
+        quantities."""
         self._watched = list(watched)
-        self._length = max(1, math.ceil(total * (1 + 2 * len(self._watched)) / VIEW_ROWS))
-        self._kept: list[Array] = []
+        self._interval = max(1, math.ceil(total * (1 + 2 * len(self._watched)) / VIEW_ROWS))
+        self._selected: list[Array] = []
         self._pending: list[Array] = []
-        self._seen = 0
+        self._rows_in_interval = 0
 
     def append(self, columns: Array) -> None:
         """More rows, ``(quantities, N)``."""
         start, count = 0, columns.shape[1]
         while start < count:
-            end = min(count, start + self._length - self._seen)
+            end = min(count, start + self._interval - self._rows_in_interval)
             self._pending.append(self._extremes(columns[:, start:end]))
-            self._seen += end - start
+            self._rows_in_interval += end - start
             start = end
-            if self._seen == self._length:
+            if self._rows_in_interval == self._interval:
                 self._flush()
 
     def rows(self) -> Array:
         """The selected rows, ``(quantities, rows)``."""
-        parts = [*self._kept, *self._pending]
+        parts = [*self._selected, *self._pending]
         return np.concatenate(parts, axis=1) if parts else np.empty((0, 0))
 
     def _flush(self) -> None:
         joined = np.concatenate(self._pending, axis=1)
-        self._kept.append(self._extremes(joined) if len(self._pending) > 1 else joined)
-        self._pending, self._seen = [], 0
-        if sum(part.shape[1] for part in self._kept) > MOST_VIEW_ROWS:
+        self._selected.append(self._extremes(joined) if len(self._pending) > 1 else joined)
+        self._pending, self._rows_in_interval = [], 0
+        if sum(part.shape[1] for part in self._selected) > MOST_VIEW_ROWS:
             # More rows than expected, because of jumps: double the intervals.
-            self._length *= 2
-            pairs = [self._kept[k : k + 2] for k in range(0, len(self._kept), 2)]
-            self._kept = [self._extremes(np.concatenate(pair, axis=1)) for pair in pairs]
+            self._interval *= 2
+            pairs = [self._selected[k : k + 2] for k in range(0, len(self._selected), 2)]
+            self._selected = [self._extremes(np.concatenate(pair, axis=1)) for pair in pairs]
 
     def _extremes(self, columns: Array) -> Array:
-        if columns.shape[1] <= 1 or self._length == 1:
+        if columns.shape[1] <= 1 or self._interval == 1:
             return columns.copy()
         watched = columns[self._watched]
         places = {0, *watched.argmin(axis=1).tolist(), *watched.argmax(axis=1).tolist()}
@@ -95,12 +96,12 @@ class RunLog:
         """Number of samples written."""
         self.rows = 0
         """Number of rows: the samples and both sides of the jumps."""
-        self._places = np.array([k for name in names for k in range(*_span(layout, name))], dtype=np.intp)
-        self._all = len(self._places) == layout.size
+        self._indices = np.array([k for name in names for k in range(*_range(layout, name))], dtype=np.intp)
+        self._all = len(self._indices) == layout.size
         columns = [column for name in names for column in element_names(layout[name])]
         self._file = open_log(request.path, columns)
         self._states = states
-        self._view = View(instants, [1 + states + k for k in self._places.tolist()])
+        self._view = View(instants, [1 + states + k for k in self._indices.tolist()])
         self._thread = ThreadPoolExecutor(1)
         self._writing: Future[None] | None = None
 
@@ -113,7 +114,7 @@ class RunLog:
         self._wait()
         self.rows += time.size
         self.samples += samples
-        chosen = signals if self._all else signals[self._places]
+        chosen = signals if self._all else signals[self._indices]
         self._writing = self._thread.submit(self._file.append, time.copy(), chosen)
         self._view.append(np.concatenate([time[np.newaxis], states.T, signals]))
 
@@ -139,13 +140,13 @@ class RunLog:
         except OSError as error:
             self._file.abandon()
             raise FormatError(
-                f"the log cannot be written any more ({error.strerror or error})",
+                f"writing to the log failed ({error.strerror or error})",
                 where=str(self.path),
-                fix="make room on the disk, or log fewer signals with a longer sample time",
+                fix="free space on the disk, or log fewer signals with a longer sample time",
             ) from error
         self._writing = None
 
 
-def _span(layout: Signature, name: str) -> tuple[int, int]:
+def _range(layout: Signature, name: str) -> tuple[int, int]:
     place = layout.ranges[name]
     return place.start, place.stop

@@ -12,12 +12,12 @@ from armblocks.equations import SimulationOptions
 from armblocks.errors import SimulationError
 from armblocks.integration.native_integrator import Integration, NativeIntegrator
 from armblocks.integration.rosenbrock_tableau import Tableau
-from armblocks.integration.run_point import Checkpoint, RunPoint
+from armblocks.integration.run_point import Checkpoint, RunPoint, fits
 from armblocks.integration.system import CompiledSystem
 from armblocks.simulation.first_guess import first_guess
 from armblocks.simulation.jumps import most_sides
-from armblocks.simulation.plan import DEFAULT_INSTANTS, Plan
-from armblocks.simulation.run_state import RunState, settings_text
+from armblocks.simulation.plan import DEFAULT_INTERVALS, Plan
+from armblocks.simulation.run_state import RunState, damaged_state, settings_text
 
 Array = NDArray[np.float64]
 
@@ -38,12 +38,12 @@ class RunMethod:
         self._initial_state = initial_state
         self._tableau = plan.tableau
         self._reason = plan.reason
-        self._resumption = ""
+        self._start_reason = ""
         self._changed = False
         self.solver = plan.solver
-        """The method's name, or the names of all that were used."""
+        """The name of the method, or the names of all methods of the run."""
         self.settings = ""
-        """Method and numbers that must be equal for a run to continue from a checkpoint."""
+        """Identifies the method and numbers. A run continues from a checkpoint only if they are equal."""
         self.checkpoint: Checkpoint | None = None
         """The checkpoint of the loop before a change of the method, which belongs to the same part of the
         run."""
@@ -55,10 +55,10 @@ class RunMethod:
     @property
     def reason(self) -> str:
         """The reason for the method, the times at which the method changed, and the start of the run."""
-        return self._reason + self._resumption
+        return self._reason + self._start_reason
 
-    def begin(self, p: Array, instants: Array, before: Integration | None) -> Integration | None:
-        """A loop for parameters ``p`` that records first at ``instants``; None for a system without
+    def begin(self, p: Array, sample_times: Array, before: Integration | None) -> Integration | None:
+        """A loop for parameters ``p`` that records first at ``sample_times``; None for a system without
         integration.
 
         It starts at the present point of the loop ``before``, else from the initial state, else from the
@@ -76,23 +76,23 @@ class RunMethod:
         if before is not None:
             start = dataclasses.replace(before.point, begun=True)
         elif self._initial_state is not None:
-            start, checkpoint = self._resumed(self._initial_state)
+            start, checkpoint = self._continued_from(self._initial_state)
         else:
             start = _starting_point(compiled, p)
-        return self._prepared(self._tableau).begin(
+        return self._integrator(self._tableau).begin(
             start,
             p,
-            instants,
+            sample_times,
             compiled.breakpoints(p),
             step=plan.step,
             rtol=options.rtol,
             atol=options.atol,
             max_step=plan.max_step,
             checkpoint=checkpoint,
-            watch_stiffness=plan.stiff is not None,
-            stop=plan.instants.stop,
+            detect_stiffness=plan.stiff is not None,
+            stop=plan.sample_times.stop,
             # Independent of the stop time, so that a shorter run has bitwise the same samples.
-            span=DEFAULT_INSTANTS * plan.instants.sample_time,
+            span=DEFAULT_INTERVALS * plan.sample_times.sample_time,
             jumps=most_sides(compiled) if options.record_jumps else 0,
         )
 
@@ -101,42 +101,48 @@ class RunMethod:
         first, stiff = self._plan.tableau, self._plan.stiff
         assert first is not None and stiff is not None
         following = first if self._tableau is stiff else stiff
-        native = self._prepared(following)
+        native = self._integrator(following)
         self.checkpoint = integration.checkpoint
         when, step = f"{integration.time:.4g} s", f"{integration.last_step:.2g} s"
         if following is first:
-            self._reason += f"; from {when} {first.title}, as steps of {step} are stable now"
+            self._reason += f"; from {when} {first.title}, because steps of {step} are stable now"
         elif self._changed:
             self._reason += f"; from {when} {stiff.title}"
         else:
             self._reason = (
                 f"auto: {first.title} until {when}, then {stiff.title}, because the system is "
-                f"stiff: stability, not accuracy, held the explicit steps at {step}"
+                f"stiff: stability, not accuracy, limited the explicit steps to {step}"
             )
         self.solver += f", then {following.name}"
         self._tableau, self._changed = following, True
-        return native.take_over(integration)
+        return native.continue_run(integration)
 
-    def _resumed(self, state: RunState) -> tuple[RunPoint, Checkpoint | None]:
+    def _continued_from(self, state: RunState) -> tuple[RunPoint, Checkpoint | None]:
         """The end point of another run, and its checkpoint if the settings of this run are the same."""
         stiff = self._plan.stiff
         checkpoint = state.checkpoint if state.settings == self.settings else None
         if stiff is not None and checkpoint is not None and checkpoint.method == stiff.name:
             self._tableau, self.solver, self._changed = stiff, stiff.name, True
-            self._reason = f"auto: {stiff.title}, because the previous run found the system stiff"
-        how = "exactly as the previous run" if checkpoint is not None else "with a restart of the solver"
-        self._resumption = f"; continues from {state.time:g} s, {how}"
+            self._reason = f"auto: {stiff.title}, because the previous run detected stiffness"
+        if checkpoint is not None:
+            assert self._tableau is not None  # the settings name a method
+            own = checkpoint.method == self._tableau.name
+            native = self._integrator(self._tableau)
+            if not own or not fits(checkpoint, native.workspace, native.sizes):
+                raise damaged_state(state, self._compiled.name)
+        accuracy = "exactly as the previous run" if checkpoint is not None else "with a restart of the solver"
+        self._start_reason = f"; continues from {state.time:g} s, {accuracy}"
         start = RunPoint(
             time=state.time,
             x=state.states,
             z=state.discrete,
             w=state.algebraic,
-            past=state.past,
+            history=state.past,
             begun=True,
         )
         return start, checkpoint
 
-    def _prepared(self, tableau: Tableau) -> NativeIntegrator:
+    def _integrator(self, tableau: Tableau) -> NativeIntegrator:
         """The native loop of a method; the time to create it counts as preparation."""
         started = perf_counter()
         native = self._compiled.integrator(tableau)

@@ -23,8 +23,9 @@ from numpy.typing import NDArray
 from armblocks.equations import Signature
 from armblocks.errors import FormatError, InputError
 from armblocks.files import read_bounded, write_atomically
-from armblocks.integration.run_point import Checkpoint
+from armblocks.integration.run_point import Checkpoint, is_history
 from armblocks.integration.system import CompiledSystem
+from armblocks.integration.workspace import Count, Scalar
 
 Array = NDArray[np.float64]
 
@@ -124,30 +125,43 @@ def slot_names(system: CompiledSystem) -> tuple[tuple[str, ...], tuple[str, ...]
 
 
 def check_state(system: CompiledSystem, state: RunState) -> None:
-    """Raise ``InputError`` if a state does not fit a system: other variables or sizes, or values not
-    finite."""
+    """Raise ``InputError`` if a state has other variables or sizes than a system, values that are not finite,
+    or damaged arrays."""
     layouts: tuple[Signature, ...] = (system.states, system.discrete, system.algebraic)
     for layout, names, values in zip(layouts, state.names, (state.states, state.discrete, state.algebraic)):
         other = sorted(set(layout.names) ^ set(names))
         if other or layout.names != names or values.shape != (layout.size,):
             named = f"'{other[0]}' is only in one of them" if other else "their variables differ"
             raise InputError(
-                f"the state of '{state.name}' at {state.time:g} s does not fit: {named}",
+                f"the state of '{state.name}' at {state.time:g} s belongs to another system: {named}",
                 where=system.name,
                 allowed="a state of the same diagram",
-                fix="run the diagram anew, or load the diagram that the state belongs to",
+                fix="start a new run, or load the diagram that the state belongs to",
             )
         if not (np.isfinite(values).all() and np.isfinite(state.past).all()):
             raise InputError(
-                f"the state of '{state.name}' at {state.time:g} s is not all finite numbers",
+                f"the state of '{state.name}' at {state.time:g} s has values that are not finite",
                 where=system.name,
                 fix="use the state of a run that did not fail",
             )
+    if state.past.size and not is_history(state.past, 2 + 2 * len(system.sizes.delays)):
+        raise damaged_state(state, system.name)
+
+
+def damaged_state(state: RunState, where: str) -> InputError:
+    """The error for a state whose arrays do not have the sizes of the system ``where``."""
+    return InputError(
+        f"the state of '{state.name}' at {state.time:g} s is damaged: its arrays have other sizes or indices",
+        where=where,
+        allowed="the final_state of a result, or what RunState.load read",
+        fix="save the state again: result.final_state.save(path)",
+    )
 
 
 def settings_text(key: tuple[str, ...], numbers: tuple[float, ...], p: Array) -> str:
     """The settings that must be equal for two runs to take the same steps, as text."""
     import hashlib
 
-    content = repr((key, [float(number).hex() for number in numbers], p.tobytes()))
+    layout = (*Count.__members__, *Scalar.__members__)
+    content = repr((layout, key, [float(number).hex() for number in numbers], p.tobytes()))
     return hashlib.sha256(content.encode()).hexdigest()

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from armblocks.equations import Signature, Slot
 from armblocks.errors import UnknownNameError
 
 
 def element_names(slot: Slot) -> tuple[str, ...]:
-    """A name for each scalar of a quantity."""
-    return slot.elements
+    """A name for each scalar of a quantity; a signal that the user has named has this name."""
+    return replace(slot, name=slot.title).elements if slot.title else slot.elements
 
 
 def signal_path(name: str, layout: Signature, aliases: Mapping[str, str], where: str) -> str:

@@ -28,8 +28,8 @@ from armblocks.simulation.recording import Recording, Samples
 from armblocks.simulation.result import SimulationResult
 from armblocks.simulation.run_data import ParameterChange, RunReport
 from armblocks.simulation.run_method import RunMethod
+from armblocks.simulation.run_part import Change, RunPart, first_window
 from armblocks.simulation.run_state import RunState, check_state, slot_names
-from armblocks.simulation.stretch import Change, Stretch, first_window
 
 Array = NDArray[np.float64]
 
@@ -76,33 +76,33 @@ class Simulation:
         self._method = RunMethod(compiled, options, self._plan, initial_state)
         self.signals_layout = signals_layout or compiled.signals_layout
         """The layout of the compiled system, or one like it that also names entries of signals."""
-        self._recording = Recording(compiled, self._plan.instants, log, self.signals_layout)
+        self._recording = Recording(compiled, self._plan.sample_times, log, self.signals_layout)
         self._message = ""
         self._stopped = False
         self._failure: SimulationError | None = None
         self._changed = False
         self._changes: tuple[ParameterChange, ...] = ()
         self._chunk = 1000
-        self._spent = 0.0
+        self._wall_time = 0.0
 
     # Present state.
 
     @property
     def stop_time(self) -> float:
         """Time at which the run is complete, s."""
-        return self._plan.instants.stop
+        return self._plan.sample_times.stop
 
     @property
     def time(self) -> float:
         """Time that is reached, s: the end of the last step."""
-        return self._stretches[-1].time if self._stretches else self._plan.instants.start
+        return self._parts[-1].time if self._parts else self._plan.sample_times.start
 
     @property
     def finished(self) -> bool:
         """Whether the run has ended: complete, stopped or failed."""
         if self._stopped or self._failure is not None:
             return True
-        return bool(self._stretches) and not self._changed and self._stretches[-1].status is not Status.PAUSED
+        return bool(self._parts) and not self._changed and self._parts[-1].status is not Status.PAUSED
 
     @property
     def recorded(self) -> int:
@@ -112,12 +112,12 @@ class Simulation:
     @property
     def planned(self) -> int:
         """The number of samples of the whole run, unless it ends early."""
-        return self._plan.instants.count
+        return self._plan.sample_times.count
 
     @property
     def wall_time(self) -> float:
         """Time that the run has taken so far, without pauses, s."""
-        return self._spent
+        return self._wall_time
 
     @property
     def parameters(self) -> Mapping[str, Array]:
@@ -138,7 +138,7 @@ class Simulation:
         (s).
 
         The first of these limits applies; without limits the run continues to its end. Steps are not
-        shortened, so the reached time may exceed ``until`` by part of a step; the samples are the same as
+        shortened, so the reached time may exceed ``until`` by part of a step; the samples are those of a run
         without the pause. ``exactly`` ends a step at ``until`` and restarts the integration there, as at a
         jump of a source.
 
@@ -148,36 +148,37 @@ class Simulation:
         if self.finished:
             return
         began, prepared = perf_counter(), self._method.preparation_time
-        stretch = self._current()
+        part = self._current()
         pause = np.inf if until is None else float(until)
-        if exactly and stretch.integration is not None and self.time < pause < self.stop_time:
-            stretch.integration.cut_at(pause)
+        if exactly and part.integration is not None and self.time < pause < self.stop_time:
+            part.integration.end_step_at(pause)
         try:
             try:
-                self._take(stretch, steps, pause, np.inf if wall_time is None else began + wall_time)
+                deadline = np.inf if wall_time is None else began + wall_time
+                self._advance_in_chunks(part, steps, pause, deadline)
             finally:
-                self._spent += perf_counter() - began - (self._method.preparation_time - prepared)
-            self._look_at_end(stretch)
+                self._wall_time += perf_counter() - began - (self._method.preparation_time - prepared)
+            self._check_end(part)
         except SimulationError as failure:
             self._fail(failure)
 
-    def _take(self, stretch: Stretch, steps: int | None, pause: float, deadline: float) -> None:
+    def _advance_in_chunks(self, part: RunPart, steps: int | None, pause: float, deadline: float) -> None:
         """Take steps in chunks until one of three limits: number of steps, simulated time, wall time."""
         left = np.inf if steps is None else max(0, steps)
         budget = deadline - perf_counter()
-        while stretch.status is Status.PAUSED and left >= 1:
-            if stretch.integration is not None and stretch.wants_other:
-                stretch.integration = self._method.change(stretch.integration)
-            started, taken = perf_counter(), stretch.taken
-            chunk = int(min(self._chunk_of(stretch), left))
+        while part.status is Status.PAUSED and left >= 1:
+            if part.integration is not None and part.other_method_faster:
+                part.integration = self._method.change(part.integration)
+            started, taken = perf_counter(), part.steps_taken
+            chunk = int(min(self._chunk_of(part), left))
             if self._calls is None:
-                stretch.advance(chunk, pause, self._recording.consumer)
+                part.advance(chunk, pause, self._recording.consumer)
             else:
-                self._calls.advance(stretch, chunk, pause, self._recording.consumer)
+                self._calls.advance(part, chunk, pause, self._recording.consumer)
             now = perf_counter()
-            taken = stretch.taken - taken
+            taken = part.steps_taken - taken
             left -= taken
-            if taken < chunk and not stretch.wants_other:
+            if taken < chunk and not part.other_method_faster:
                 break  # the pause or the end is reached
             # At most twice as many steps as before, so that the time of a chunk grows gradually.
             growth = min(2.0, min(CHUNK_SECONDS, budget) / max(now - started, 1e-6))
@@ -185,24 +186,24 @@ class Simulation:
             if now >= deadline:
                 break
 
-    def _look_at_end(self, stretch: Stretch) -> None:
+    def _check_end(self, part: RunPart) -> None:
         """Report the block that ended the run. Raises ``SimulationError`` for a failed run."""
-        integration = stretch.integration
-        if integration is None or stretch.status in (Status.PAUSED, Status.DONE):
+        integration = part.integration
+        if integration is None or part.status in (Status.PAUSED, Status.DONE):
             return
-        if stretch.status is not Status.STOPPED:
-            raise integration_failure(self.compiled, integration, stretch.p)
+        if part.status is not Status.STOPPED:
+            raise integration_failure(self.compiled, integration, part.p)
         ended = ended_by_block(self.compiled, integration)
         if isinstance(ended, SimulationError):
             raise ended
-        self._note(ended)
+        self._add_message(ended)
 
-    def _chunk_of(self, stretch: Stretch) -> int:
+    def _chunk_of(self, part: RunPart) -> int:
         """Number of steps of the next chunk; with a window, at most about as many as fill half of it."""
-        if stretch.window is None:
+        if part.window is None:
             return self._chunk
-        recorded = max(1, stretch.recorded - stretch.first)
-        return max(1, min(self._chunk, int(stretch.window // 2 * max(1, stretch.taken) / recorded)))
+        recorded = max(1, part.recorded - part.first)
+        return max(1, min(self._chunk, int(part.window // 2 * max(1, part.steps_taken) / recorded)))
 
     def set(self, parameters: Mapping[str, ArrayLike]) -> None:
         """Change tunable parameters, ``block.parameter``, from the present time on.
@@ -223,9 +224,9 @@ class Simulation:
         if p.tobytes() == self._p.tobytes():
             return
         self._p = p
-        if self._stretches and self._stretches[-1].recorded == 0:
-            self._stretches.pop()  # the run has not started: begin with the new values
-        if self._stretches:
+        if self._parts and self._parts[-1].recorded == 0:
+            self._parts.pop()  # the run has not started: begin with the new values
+        if self._parts:
             self._changed = True
             values = {name: np.asarray(value, dtype=np.float64) for name, value in parameters.items()}
             self._changes += (ParameterChange(time=self.time, values=values),)
@@ -245,7 +246,7 @@ class Simulation:
     def state(self) -> RunState:
         """The present state, from which another run can continue."""
         compiled = self.compiled
-        integration = self._stretches[-1].integration if self._stretches else None
+        integration = self._parts[-1].integration if self._parts else None
         checkpoint = None
         if integration is None:
             point = RunPoint(time=self.time, x=np.empty(0))
@@ -253,7 +254,8 @@ class Simulation:
             point = integration.point
             checkpoint = self._method.checkpoint or integration.checkpoint
             if checkpoint is None and integration.status is Status.PAUSED:
-                checkpoint = integration.now()  # paused between two steps: the next run continues here
+                # The run is paused between two steps; the next run continues here.
+                checkpoint = integration.present_checkpoint()
         return RunState(
             name=compiled.name,
             time=point.time,
@@ -263,7 +265,7 @@ class Simulation:
             names=slot_names(compiled),
             settings=self._method.settings,
             checkpoint=checkpoint,
-            past=point.past,
+            past=point.history,
         )
 
     def result(self) -> SimulationResult:
@@ -273,9 +275,9 @@ class Simulation:
         """
         if self._failure is not None:
             raise self._failure
-        if not self._stretches:
+        if not self._parts:
             self._current()
-        self._hand_over()
+        self._write_remaining()
         result = self._result(None)
         if self._failure is not None:
             raise self._failure
@@ -284,23 +286,23 @@ class Simulation:
     # Internal.
 
     @property
-    def _stretches(self) -> list[Stretch]:
-        return self._recording.stretches
+    def _parts(self) -> list[RunPart]:
+        return self._recording.parts
 
-    def _current(self) -> Stretch:
+    def _current(self) -> RunPart:
         """The present part of the run, created at the start and after a change of parameters."""
-        if self._stretches and not self._changed:
-            return self._stretches[-1]
-        instants, begin, window = self._plan.instants, self.recorded, self._recording.window
-        before = self._stretches[-1].integration if self._stretches else None
-        integration = self._method.begin(self._p, first_window(instants, begin, window), before)
-        self._hand_over()
-        change = self._changed_from(self._stretches[-1]) if self._stretches else None
+        if self._parts and not self._changed:
+            return self._parts[-1]
+        sample_times, begin, window = self._plan.sample_times, self.recorded, self._recording.window
+        before = self._parts[-1].integration if self._parts else None
+        integration = self._method.begin(self._p, first_window(sample_times, begin, window), before)
+        self._write_remaining()
+        change = self._end_of_part(self._parts[-1]) if self._parts else None
         breakpoints = self.compiled.breakpoints(self._p) if integration is None else NO_NUMBERS
         recorded = self.options.record_jumps
-        self._stretches.append(
-            Stretch(
-                instants,
+        self._parts.append(
+            RunPart(
+                sample_times,
                 begin,
                 self._p,
                 integration,
@@ -310,16 +312,16 @@ class Simulation:
             )
         )
         self._changed = False
-        return self._stretches[-1]
+        return self._parts[-1]
 
-    def _changed_from(self, before: Stretch) -> Change:
+    def _end_of_part(self, before: RunPart) -> Change:
         """The end point and the parameters of the part before a change of parameters."""
         run = before.integration
         return RunPoint(time=before.time, x=NO_NUMBERS) if run is None else run.point, before.p
 
-    def _hand_over(self) -> None:
+    def _write_remaining(self) -> None:
         try:
-            self._recording.hand_over()
+            self._recording.write_remaining()
         except SimulationError as failure:
             self._fail(failure)
 
@@ -332,34 +334,34 @@ class Simulation:
     def _result(self, failure: SimulationError | None) -> SimulationResult:
         """The present result; ``_failure`` is the error, with the result as its ``partial``."""
         began = perf_counter()
-        good, compiled = self._recording.good(), self.compiled
+        samples, compiled = self._recording.valid_samples(), self.compiled
         integrations = self._recording.integrations
         if integrations:
-            self._note(_jumps_left_out(integrations))
-            self._note(stiffness_hint(compiled, integrations[-1], self._stretches[-1].p))
+            self._add_message(_missing_jumps(integrations))
+            self._add_message(stiffness_hint(compiled, integrations[-1], self._parts[-1].p))
             for warning in warnings_of_blocks(compiled, integrations[-1]):
-                self._note(warning)
-        for warning in warnings_of_loops(compiled, self._recording.held()):
-            self._note(warning)
-        self._failure = failure = good.failure or failure
+                self._add_message(warning)
+        for warning in warnings_of_loops(compiled, self._recording.in_memory()):
+            self._add_message(warning)
+        self._failure = failure = samples.failure or failure
         if failure is not None:
             self._message = " ".join(part for part in (failure.what + ".", self._message) if part)
-        self._spent += perf_counter() - began
+        self._wall_time += perf_counter() - began
         result = SimulationResult(
             name=compiled.name,
-            time=good.time,
+            time=samples.time,
             signals_layout=self.signals_layout,
-            signals=good.signals,
+            signals=samples.signals,
             states_layout=compiled.states,
-            states=good.states,
+            states=samples.states,
             parameters_layout=compiled.parameters,
             parameter_values=self._p,
             parameter_changes=self._changes,
             aliases=compiled.aliases,
-            run=self._report(float(good.time[-1]) if good.time.size else 0.0),
+            run=self._report(float(samples.time[-1]) if samples.time.size else 0.0),
             final_state=None if failure is not None else self.state(),
             log=self._recording.file,
-            given_jumps=good.jumps,
+            given_jumps=samples.jumps,
         )
         if self.finished:
             self._recording.finish(result)
@@ -370,7 +372,7 @@ class Simulation:
     def _report(self, reached: float) -> RunReport:
         """The statistics of the run until the time ``reached``, s."""
         runs, method, calls = self._recording.integrations, self._method, self._calls
-        costs = "" if calls is None else calls.told(self._spent)
+        costs = "" if calls is None else calls.summary(self._wall_time)
         return RunReport(
             solver=method.solver,
             reason=method.reason,
@@ -380,20 +382,20 @@ class Simulation:
             ticks=sum(run.instants for run in runs),
             events=sum(run.events for run in runs),
             preparation_time=method.preparation_time,
-            wall_time=self._spent,
-            real_time_factor=reached / self._spent,
+            wall_time=self._wall_time,
+            real_time_factor=reached / self._wall_time,
             complete=self._failure is None and self.finished and not self._stopped,
             calls=0 if calls is None else calls.count,
             call_time=0.0 if calls is None else calls.seconds,
             message=". ".join(part for part in (self._message, costs) if part),
         )
 
-    def _note(self, hint: str) -> None:
-        if hint and hint not in self._message:
-            self._message = f"{self._message}. {hint}" if self._message else hint
+    def _add_message(self, text: str) -> None:
+        if text and text not in self._message:
+            self._message = f"{self._message}. {text}" if self._message else text
 
 
-def _jumps_left_out(integrations: Sequence[Integration]) -> str:
+def _missing_jumps(integrations: Sequence[Integration]) -> str:
     """A remark for the user if a run had too many jumps to record all of them."""
     for run in integrations:
         if run.jumps.end is not None:

@@ -14,13 +14,13 @@ from armblocks.simulation.methods.rosenbrock import RODAS5P
 from armblocks.simulation.methods.runge_kutta import RK45
 
 
-def _place(tableau: Tableau) -> tuple[bool, bool, int]:
+def _sort_key(tableau: Tableau) -> tuple[bool, bool, int]:
     """Sort key: explicit methods first, fixed-step before adaptive ones, then by ascending order."""
     return isinstance(tableau, RosenbrockTableau), tableau.adaptive, tableau.order
 
 
 TABLEAUX: tuple[Tableau, ...] = tuple(
-    sorted(values_in("armblocks.simulation.methods", (ButcherTableau, RosenbrockTableau)), key=_place)
+    sorted(values_in("armblocks.simulation.methods", (ButcherTableau, RosenbrockTableau)), key=_sort_key)
 )
 """All integrators: the explicit ones, then those for stiff systems."""
 

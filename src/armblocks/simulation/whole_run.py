@@ -31,7 +31,8 @@ def simulate(
 
     With an ``initial_state`` (the ``final_state`` of another run) the run continues from there to
     ``stop_time``. If solver, settings and parameters are the same, the result is bitwise that of one
-    uninterrupted run, else the integration restarts from the values of the state; ``run.reason`` tells which.
+    uninterrupted run, else the integration restarts from the values of the state. ``run.reason`` says which
+    of the two happened.
 
     ``parameters`` changes tunable parameters: a mapping from ``block.parameter``, or the flat vector
     ``(np,)``. ``progress(time, fraction, real_time_factor)`` is called at most about 16 times a second, and
@@ -39,12 +40,12 @@ def simulate(
 
     With ``solver="auto"`` a system without states is evaluated directly at all sample times. Other systems
     are integrated with RK4 if ``step`` is given, else with Dormand-Prince 5(4). When stability, not accuracy,
-    has limited some thousand of its steps, Rodas5P takes over. Without a ``sample_time`` the stop time is
+    has limited some thousand of its steps, Rodas5P replaces it. Without a ``sample_time`` the stop time is
     divided into 1000 intervals (10 s into intervals of 10 ms). With a fixed step every step is recorded, or
     every n-th step so that there are at most 10 000 rows.
 
     With a ``log`` the signals are written to a file during the run. The memory does not grow with the length
-    of the run, and the result has those rows that include all extremes.
+    of the run, and the result has a selection of the rows with all extremes of the signals.
 
     Ctrl-C ends the run early: the result so far is returned, with ``run.complete`` false.
 
@@ -62,15 +63,15 @@ def run_to_the_end(run: Simulation, progress: Progress | None = None) -> Simulat
         while not run.finished:
             run.advance(wall_time=None if progress is None else PROGRESS_SECONDS)
             if progress is not None and not run.finished:
-                _tell(progress, run)
+                _report_progress(progress, run)
     except KeyboardInterrupt:
         run.stop(f"stopped by Ctrl-C at {run.time:g} s of {run.stop_time:g} s")
     result = run.result()
     if progress is not None and result.run.complete:
-        _tell(progress, run)
+        _report_progress(progress, run)
     return result
 
 
-def _tell(progress: Progress, run: Simulation) -> None:
+def _report_progress(progress: Progress, run: Simulation) -> None:
     stop = run.stop_time
     progress(run.time, run.time / stop if stop > 0.0 else 1.0, run.time / max(run.wall_time, 1e-9))

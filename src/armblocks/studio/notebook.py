@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from anywidget import AnyWidget
 
 HEIGHT = 460
-SHOWN = ("scopes", "robot")
-SHOWN_KINDS = (ViewKind.TRACES, ViewKind.PATH, ViewKind.ROBOT)
+PARTS = ("scopes", "robot")
+DISPLAYED_KINDS = (ViewKind.TRACES, ViewKind.PATH, ViewKind.ROBOT)
 SCRIPT = Path(__file__).parent / "notebook_widget.js"
 DRAWING_SIZE = (480, 360)
 
@@ -46,14 +46,14 @@ def run_widget(
     result share a time cursor; ``widget.time`` (s) reads and sets it. Raises ``InputError`` if the diagram
     has nothing to show, ``MissingLibraryError`` if anywidget is not installed.
     """
-    if show not in (None, *SHOWN):
+    if show not in (None, *PARTS):
         raise InputError(
             f"show is {show!r}",
             where="run_widget",
             allowed="'scopes', 'robot', or None for both",
             fix="leave it out for both",
         )
-    views = [(name, view) for name, view in diagram_views(diagram) if view.kind in SHOWN_KINDS]
+    views = [(name, view) for name, view in diagram_views(diagram) if view.kind in DISPLAYED_KINDS]
     robots = [(name, view.subject) for name, view in views if isinstance(view.subject, Robot)]
     arm = _arm(*robots[0]) if robots and show != "scopes" else None
     scopes = show != "robot" and any(view.kind is not ViewKind.ROBOT for _, view in views)
@@ -92,15 +92,21 @@ def _arm(path: str, robot: Robot, q: ArrayLike | None = None) -> dict[str, Any]:
 def _record(views: Sequence[tuple[str, View]], result: SimulationResult) -> tuple[str, dict[str, Any], bytes]:
     """Key, description and rows of the signals in the views, with jumps, in the format of the front end."""
     result = result.with_jumps()
-    wanted = [f"{name}/{signal}" for name, view in views for signal in view.signals]
-    aliases = {name: result.resolve(name) for name in wanted}
+    signal_names = [f"{name}/{signal}" for name, view in views for signal in view.signals]
+    aliases = {name: result.resolve(name) for name in signal_names}
     names = list(dict.fromkeys(aliases.values()))
     values = [np.asarray(result[name], dtype=np.float64) for name in names]
     signals = np.concatenate([value.reshape(result.time.size, -1).T for value in values])
     run = {
         "stopTime": float(result.time[-1]),
         "channels": [
-            {"name": slot.name, "shape": list(slot.shape), "unit": slot.unit, "entries": list(slot.entries)}
+            {
+                "name": slot.name,
+                "shape": list(slot.shape),
+                "unit": slot.unit,
+                "entries": list(slot.entries),
+                "title": slot.title,
+            }
             for slot in (result.signals_layout[name] for name in names)
         ],
         "views": [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable
 
@@ -31,15 +32,40 @@ def block(page: Page, name: str) -> Locator:
     return page.locator(f'.react-flow__node[data-id="{name}"]')
 
 
+def edge(page: Page, wire: str) -> Locator:
+    """A wire on the sheet."""
+    return page.locator(f'.react-flow__edge[data-id="{wire}"]')
+
+
+def middle(found: Locator) -> tuple[float, float]:
+    """The centre of an element after it is drawn; wires are drawn after their blocks."""
+    box = None
+
+    def drawn() -> bool:
+        nonlocal box
+        box = found.bounding_box()
+        return box is not None
+
+    wait_until(found.page, drawn)
+    assert box is not None
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+
 def keep_view(page: Page) -> None:
     """Fix the view of the sheet: without user input, the sheet fits itself into its panel."""
     page.locator(".canvas").dispatch_event("wheel")
 
 
+def choose_in_menu(page: Page, entry: str | re.Pattern[str]) -> None:
+    """Choose an entry of the main menu."""
+    page.get_by_role("button", name="Menu").click()
+    page.get_by_role("menuitem", name=entry).click()
+    expect(page.get_by_role("menu")).to_be_hidden()
+
+
 def new_diagram(page: Page) -> None:
     """Start with an empty sheet."""
-    page.get_by_role("button", name="Menu").click()
-    page.get_by_role("menuitem", name="New diagram").click()
+    choose_in_menu(page, "New diagram")
     expect(page.get_by_text("Type to add a block")).to_be_visible()
 
 
@@ -79,11 +105,6 @@ def wire(page: Page, source: str, target: str) -> None:
         name, _, end = port.partition("/")
         return block(page, name).locator(f'[data-handleid="{end}"]')
 
-    def middle(port: str) -> tuple[float, float]:
-        box = handle(port).bounding_box()
-        assert box is not None
-        return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-
     def is_free(port: str) -> bool:
         """Whether the mouse can reach the handle: it is on the sheet and not covered."""
         return handle(port).evaluate(UPPERMOST)
@@ -91,7 +112,7 @@ def wire(page: Page, source: str, target: str) -> None:
     if not (is_free(source) and is_free(target)):  # the sheet has panned while earlier wires were drawn
         page.get_by_role("button", name="Fit View").click()
         wait_until(page, lambda: is_free(source) and is_free(target))
-    x, y = middle(source)
+    x, y = middle(handle(source))
     page.mouse.move(x, y)
     page.mouse.down()
     page.mouse.move(x + 4, y, steps=2)
@@ -99,7 +120,7 @@ def wire(page: Page, source: str, target: str) -> None:
     reached = handle(target).and_(page.locator(".connectingto"))
 
     def reach() -> bool:
-        page.mouse.move(*middle(target), steps=5)
+        page.mouse.move(*middle(handle(target)), steps=5)
         return reached.count() == 1
 
     wait_until(page, reach)
@@ -127,20 +148,36 @@ def select_block(page: Page, name: str) -> None:
     wait_until(page, is_selected)
 
 
-def copied_text(page: Page, part: str) -> str:
-    """Wait until the clipboard contains a text with this part, and return the text.
+def copied_names(page: Page, copy: Callable[[], None]) -> list[str]:
+    """Names of the blocks that an action copies. The clipboard belongs to the browser, not to the page.
 
     Playwright's ``wait_for_function`` does not await promises, and ``readText`` returns one.
     """
+    page.evaluate("navigator.clipboard.writeText('')")
+    copy()
     text = ""
 
     def is_there() -> bool:
         nonlocal text
         text = page.evaluate("navigator.clipboard.readText()")
-        return part in text
+        return bool(text)
 
     wait_until(page, is_there)
-    return text
+    return list(json.loads(text)["blocks"])
+
+
+def open_fresh_example(page: Page) -> None:
+    """Show a new copy of the example with a PID controller.
+
+    The title is not sufficient: the document of the previous test has the same title.
+    """
+    page.keyboard.press("Escape")
+    before = page.evaluate("sessionStorage.getItem('armblocks-shown')")
+    choose_in_menu(page, re.compile("^van_der_pol_pid a van der Pol"))
+    page.wait_for_function("before => sessionStorage.getItem('armblocks-shown') !== before", arg=before)
+    expect(page.locator(".title")).to_have_text("van_der_pol_pid")
+    expect(block(page, "PID")).to_be_visible()
+    keep_view(page)
 
 
 def expect_focus_inside(found: Locator) -> None:

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from building import keep_view
+from building import add, block, keep_view, new_diagram
 from playwright.sync_api import Browser, Locator, Page, expect
 
 from conftest import Studio, new_context
@@ -36,10 +36,7 @@ class Session:
     def begin(self) -> Page:
         """Open an empty drawing and add a gain."""
         page = self.page
-        page.get_by_role("button", name="Menu").click()
-        page.get_by_role("menuitem", name="New diagram").click()
-        expect(page.get_by_text("Type to add a block")).to_be_visible()
-        expect(page.get_by_role("menu")).to_be_hidden()
+        new_diagram(page)
         add(page, "gain")
         expect(block(page, "Gain")).to_be_visible()
         return page
@@ -77,18 +74,6 @@ class Session:
 
 def silence(page: Page) -> Locator:
     return page.get_by_text("The studio does not answer")
-
-
-def block(page: Page, name: str) -> Locator:
-    return page.locator(f'.react-flow__node[data-id="{name}"]')
-
-
-def add(page: Page, typed: str) -> None:
-    page.keyboard.press(typed[0])
-    box = page.get_by_role("textbox", name="Add a block")
-    box.press_sequentially(typed[1:])
-    box.press("Enter")
-    expect(box).to_be_hidden()
 
 
 def place(page: Page, name: str) -> tuple[float, float]:

@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from accessibility import axe
-from building import copied_text, keep_view, wait_until
-from playwright.sync_api import Locator, Page, expect
+from building import (
+    block,
+    choose_in_menu,
+    copied_names,
+    edge,
+    middle,
+    open_fresh_example,
+    run,
+    select_block,
+    wait_until,
+)
+from playwright.sync_api import Page, expect
 
 from armblocks.blocks import BLOCKS
 from armblocks.diagram import DiagramBlock
@@ -28,46 +38,10 @@ def shared(open_studio: Callable[[str], Page]) -> Page:
 
 
 @pytest.fixture
-def sheet(shared: Page) -> Iterator[Page]:
+def sheet(shared: Page) -> Page:
     """The page shared by this file, with a fresh copy of an example."""
-    page = shared
-    page.keyboard.press("Escape")
-    before = page.evaluate("sessionStorage.getItem('armblocks-shown')")
-    menu(page, re.compile("^van_der_pol_pid a van der Pol"))
-    # The title is not sufficient: the document of the previous test has the same title.
-    page.wait_for_function("before => sessionStorage.getItem('armblocks-shown') !== before", arg=before)
-    expect(page.locator(".title")).to_have_text("van_der_pol_pid")
-    expect(block(page, "PID")).to_be_visible()
-    keep_view(page)
-    yield page
-
-
-def menu(page: Page, entry: str | re.Pattern[str]) -> None:
-    page.get_by_role("button", name="Menu").click()
-    page.get_by_role("menuitem", name=entry).click()
-    expect(page.get_by_role("menu")).to_be_hidden()
-
-
-def block(page: Page, name: str) -> Locator:
-    return page.locator(f'.react-flow__node[data-id="{name}"]')
-
-
-def edge(page: Page, wire: str) -> Locator:
-    return page.locator(f'.react-flow__edge[data-id="{wire}"]')
-
-
-def middle(found: Locator) -> tuple[float, float]:
-    """The centre of an element after it is drawn; wires are drawn after their blocks."""
-    box = None
-
-    def drawn() -> bool:
-        nonlocal box
-        box = found.bounding_box()
-        return box is not None
-
-    wait_until(found.page, drawn)
-    assert box is not None
-    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    open_fresh_example(shared)
+    return shared
 
 
 def command(page: Page, typed: str) -> None:
@@ -117,6 +91,59 @@ def test_a_user_drawn_route_follows_its_block_and_can_be_reset(sheet: Page) -> N
     assert sheet.evaluate(shown) == sheet.evaluate(AS_RGB, accent.strip())
     sheet.get_by_role("button", name="Reset the route").click()
     expect(line).to_have_attribute("d", before or "")
+
+
+def test_blocks_are_commented_out_and_through_by_key(sheet: Page) -> None:
+    select_block(sheet, "PID")
+    sheet.keyboard.press("Control+Shift+X")
+    expect(block(sheet, "PID")).to_have_accessible_name(re.compile("commented out$"))
+    expect(block(sheet, "PID").locator(".face")).to_contain_text("%")
+    run(sheet)
+    expect(sheet.locator('.wire-value[data-path="PID/y"]')).to_have_count(0)
+    edge(sheet, "PID/y -> u/u1").locator(".piece").first.hover(force=True)
+    expect(sheet.locator('.wire-value[data-path="PID/y"]')).to_have_text("0")
+    select_block(sheet, "PID")
+    sheet.keyboard.press("Control+Shift+Y")
+    expect(block(sheet, "PID")).to_have_accessible_name(re.compile("commented through$"))
+    sheet.keyboard.press("Control+Shift+Y")
+    expect(block(sheet, "PID")).not_to_have_accessible_name(re.compile("commented"))
+    expect(sheet.get_by_role("button", name="Undo uncomment PID (Ctrl+Z)")).to_be_enabled()
+
+
+def test_a_double_click_on_a_wire_names_its_signal(sheet: Page) -> None:
+    wire = edge(sheet, "x2/y -> x1/u").locator(".piece").first
+    wire.dblclick(force=True)
+    field = sheet.get_by_role("textbox", name="Name of the signal of x2/y")
+    expect(field).to_be_focused()
+    field.fill("PID")
+    field.press("Enter")
+    expect(sheet.locator(".notices")).to_contain_text("like the block 'PID'")
+    wire.dblclick(force=True)
+    field.fill("velocity")
+    field.press("Enter")
+    expect(sheet.locator(".signal-name")).to_have_text("velocity")
+    wire.click(force=True)
+    sheet.get_by_role("toolbar", name="Wire from x2/y").get_by_role("button", name="Log").click()
+    run(sheet)
+    expect(sheet.locator('.chart[data-view="x2"] figcaption')).to_contain_text("velocity")
+    wire.click(button="right", force=True)
+    sheet.get_by_role("menuitem", name="Name the signal …").click()
+    expect(field).to_have_value("velocity")
+    field.press("Escape")
+    sheet.keyboard.press("Control+z")
+    sheet.keyboard.press("Control+z")
+    expect(sheet.locator(".signal-name")).to_have_count(0)
+
+
+def test_unconnected_ports_are_grounded_and_terminated_in_one_step(sheet: Page) -> None:
+    edge(sheet, "x2/y -> x1/u").locator(".piece").first.click(force=True)
+    sheet.keyboard.press("Delete")
+    expect(block(sheet, "x1").locator(".port.unconnected")).to_have_count(1)
+    command(sheet, "Ground and terminate unconnected ports")
+    expect(edge(sheet, "Ground/y -> x1/u")).to_have_count(1)
+    expect(sheet.locator(".port.unconnected")).to_have_count(0)
+    sheet.keyboard.press("Control+z")
+    expect(block(sheet, "Ground")).to_have_count(0)
 
 
 def test_a_block_dropped_on_a_wire_is_inserted_into_it(sheet: Page) -> None:
@@ -222,8 +249,7 @@ def test_copies_keep_routes_and_the_contents_of_subsystems(sheet: Page) -> None:
     block(sheet, "PID 2").click()
     sheet.keyboard.press("Control+g")
     expect(block(sheet, "Subsystem")).to_have_class(re.compile("selected"))
-    sheet.keyboard.press("Control+c")
-    copied_text(sheet, '"diagram"')
+    assert copied_names(sheet, lambda: sheet.keyboard.press("Control+c")) == ["Subsystem"]
     sheet.keyboard.press("Control+v")
     expect(block(sheet, "Subsystem 2")).to_have_class(re.compile("selected"))
     sheet.keyboard.press("Enter")
@@ -364,7 +390,7 @@ def test_search_opens_the_sheet_of_a_block_and_the_explorer_marks_it(sheet: Page
 
 
 def test_an_empty_sheet_offers_examples_and_the_tour_completes(sheet: Page) -> None:
-    menu(sheet, "New diagram")
+    choose_in_menu(sheet, "New diagram")
     cards = sheet.locator(".gallery button")
     expect(cards).not_to_have_count(0)
     picture = cards.first.locator("img")
@@ -397,6 +423,19 @@ def test_the_sheet_and_the_report_of_a_run_are_exported(sheet: Page) -> None:
     report.close()
 
 
+def test_a_theme_is_chosen_by_button_or_command_and_remembered(sheet: Page) -> None:
+    html = sheet.locator("html")
+    sheet.get_by_role("button", name="Theme: system").click()
+    sheet.get_by_role("menuitemradio", name="Dark").click()
+    expect(html).to_have_attribute("data-mantine-color-scheme", "dark")
+    sheet.reload()
+    expect(sheet.get_by_role("button", name="Theme: dark")).to_be_visible()
+    expect(html).to_have_attribute("data-mantine-color-scheme", "dark")
+    command(sheet, "theme of the system")
+    expect(html).to_have_attribute("data-mantine-color-scheme", "light")
+    expect(sheet.get_by_role("button", name="Theme: system")).to_be_visible()
+
+
 def picture(page: Page, title: str) -> str:
     """The exported SVG picture of a scope."""
     page.get_by_role("button", name=f"Export {title}").click()
@@ -413,9 +452,6 @@ def test_the_value_axis_of_a_scope_is_zoomed_panned_and_reset(sheet: Page) -> No
     block(sheet, "Scope").dblclick()
     expect(chart).to_have_class(re.compile("marked"))
     expect(sheet.get_by_role("dialog")).to_be_hidden()
-    for typed, shown in (("dark theme", "dark"), ("theme of the system", "light")):
-        command(sheet, typed)
-        expect(sheet.locator("html")).to_have_attribute("data-mantine-color-scheme", shown)
     axis = sheet.locator(".chart .values-axis").first
     title = sheet.locator(".chart figcaption b").first.inner_text()
     shown_whole = sheet.get_by_role("button", name=f"Show all values of {title}")
@@ -513,7 +549,7 @@ OPENINGS = """async () => {
 
 
 def test_every_block_of_the_library_is_dropped_opened_and_saved(sheet: Page, shared_folder: Path) -> None:
-    menu(sheet, "New diagram")
+    choose_in_menu(sheet, "New diagram")
     expect(sheet.get_by_text("Type to add a block")).to_be_visible()
     for family in sheet.locator(".palette .family[aria-expanded=false]").all()[::-1]:
         family.click()
@@ -528,16 +564,16 @@ def test_every_block_of_the_library_is_dropped_opened_and_saved(sheet: Page, sha
     sheet.get_by_text("Tune", exact=True).click()  # software rendering of an arm takes long
     assert sorted(sheet.evaluate(DROPS)) == sorted(BLOCKS)
     expect(nodes).to_have_count(len(BLOCKS))
-    asked = sheet.evaluate(OPENINGS)
+    requested = sheet.evaluate(OPENINGS)
     sheet.keyboard.press("Control+s")
     sheet.get_by_role("combobox", name="File").fill("every block.json")
     sheet.get_by_role("button", name="Save", exact=True).click()
     expect(sheet.locator(".title")).to_have_text("every block")
     data = (shared_folder / "every block.json").read_bytes()
     saved = diagram_from_bytes(data, "every block.json", BLOCKS, load_robot, draft=True)
-    assert sorted(block.type_name() for block in saved.blocks.values()) == sorted(BLOCKS)
-    for name, block in saved.blocks.items():
-        if isinstance(block, DiagramBlock):
-            assert name not in asked
+    assert sorted(loaded.type_name() for loaded in saved.blocks.values()) == sorted(BLOCKS)
+    for name, loaded in saved.blocks.items():
+        if isinstance(loaded, DiagramBlock):
+            assert name not in requested
         else:
-            assert asked[name] == [rule.name for rule in block.parameters()], name
+            assert requested[name] == [rule.name for rule in loaded.parameters()], name

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -13,7 +12,7 @@ from accessibility import axe
 from building import (
     add,
     block,
-    copied_text,
+    copied_names,
     drag_from_library,
     expect_no_frames,
     new_diagram,
@@ -145,6 +144,16 @@ def test_a_diagram_is_built_with_the_keyboard_alone_and_undone_completely(page: 
         expect(page.get_by_role("dialog")).to_be_hidden()
     expect(page.locator(".react-flow__edge")).to_have_count(2)
     run(page)
+    page.keyboard.press("Control+f")
+    find = page.get_by_role("textbox", name="Find")
+    find.fill("Scope")
+    expect(page.get_by_role("listbox", name="Found").get_by_role("option")).to_have_count(1)
+    find.press("Enter")
+    expect(find).to_be_hidden()
+    expect(block(page, "Scope")).to_be_focused()
+    block(page, "Scope").press("Enter")
+    expect(page.locator('.chart[data-view="Scope"]')).to_have_class(re.compile("marked"))
+    expect(page.get_by_role("dialog")).to_be_hidden()
     for _ in range(5):
         page.keyboard.press("Control+z")
     expect(page.locator(".react-flow__node")).to_have_count(0)
@@ -189,8 +198,7 @@ def test_a_run_is_paused_stepped_resumed_and_stopped(page: Page) -> None:
 
 def test_blocks_are_copied_as_text(page: Page) -> None:
     select_block(page, "PID")
-    page.keyboard.press("Control+c")
-    assert list(json.loads(copied_text(page, '"blocks"'))["blocks"]) == ["PID"]
+    assert copied_names(page, lambda: page.keyboard.press("Control+c")) == ["PID"]
     page.keyboard.press("Control+v")
     expect(block(page, "PID 2")).to_be_visible()
 

@@ -53,10 +53,10 @@ def names(key: str, ways: list[str]) -> bool:
 
 
 def test_the_sources_are_read() -> None:
-    heard = listeners()
-    assert {"Enter", "Delete", "?", " ", "Escape"} <= heard["canvas/sheet_keys.ts"]
-    assert {"ArrowUp", "ArrowDown", "Enter"} <= heard["robot/editor/table.tsx"]
-    assert {"s", "z", "y", "?"} <= heard["robot/editor/robot_editor.tsx"]
+    received = listeners()
+    assert {"Enter", "Delete", "?", " ", "Escape"} <= received["canvas/sheet_keys.ts"]
+    assert {"ArrowUp", "ArrowDown", "Enter"} <= received["robot/editor/table.tsx"]
+    assert {"s", "z", "y", "?"} <= received["robot/editor/robot_editor.tsx"]
     assert names("z", ["Ctrl+Z"])
     assert not names("z", ["Ctrl+Y"])
 
@@ -71,6 +71,6 @@ def test_every_key_is_in_the_list_of_keys(source: str) -> None:
 
 
 def test_the_list_names_existing_source_files() -> None:
-    heard = listeners()
+    received = listeners()
     for sources, _ in listed():
-        assert set(sources) <= set(heard)
+        assert set(sources) <= set(received)

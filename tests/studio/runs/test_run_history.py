@@ -30,13 +30,13 @@ def test_a_run_continued_after_going_back_equals_the_original_run(name: str) -> 
     whole = model.simulate()
     history = RunHistory(model)
     history.run.advance(0.3 * history.run.stop_time)
-    history.mark()
+    history.add_snapshot()
     for _ in range(5):
         history.step()
     before = history.recorded
-    history.back_to(before - 1)
+    history.return_to_sample(before - 1)
     assert before - 20 < history.recorded < before, "one step back is at most one step of the solver"
-    history.back_to(before // 2)
+    history.return_to_sample(before // 2)
     kept = history.recorded
     assert 0.8 * before // 2 < kept <= before // 2
     history.run.advance()
@@ -53,10 +53,10 @@ def test_every_instant_is_reachable_with_a_bounded_number_of_checkpoints(
     history = RunHistory(CompiledDiagram(load_diagram("falling_pendulum", BLOCKS)))
     for _ in range(200):
         history.step()
-    marks = history._marks  # pyright: ignore[reportPrivateUsage]
+    marks = history._snapshots  # pyright: ignore[reportPrivateUsage]
     assert len(marks) < 100
     for wanted in (150, 77, 3):
-        history.back_to(wanted)
+        history.return_to_sample(wanted)
         assert wanted - 5 < history.recorded <= wanted
 
 
@@ -64,12 +64,12 @@ def test_tuned_values_apply_from_the_instant_of_return() -> None:
     model = CompiledDiagram(load_diagram("van_der_pol_pid", BLOCKS))
     history = RunHistory(model)
     history.run.advance(2.0)
-    history.mark()
+    history.add_snapshot()
     count, state = history.recorded, history.run.state()
     history.run.advance(4.0)
     history.tune("PID.P", 7.0)
     history.run.advance(5.0)
-    history.back_to(count)
+    history.return_to_sample(count)
     assert history.recorded == count
     assert history.run.parameters["PID.P"] == 7.0
     history.run.advance()
@@ -122,36 +122,36 @@ class Listener:
 
 def test_a_run_in_a_process_is_tuned_rewound_and_finished() -> None:
     async def going() -> None:
-        heard = Listener()
-        run = RunProcess("r", "d", Worker(), heard.notify)
+        received = Listener()
+        run = RunProcess("r", "d", Worker(), received.notify)
         source = diagram_to_bytes(load_diagram("van_der_pol_pid", BLOCKS), load_robot).decode()
         run.start({"diagram": source, "folder": ".", "speed": 5.0, "tuned": {"PID.I": "1/2"}})
-        begun = await heard.until(run_messages.RunStarted)
+        begun = await received.until(run_messages.RunStarted)
         assert {t.path: t.value for t in begun.tunables}["PID.I"] == 0.5, "trial values apply from the start"
-        while len(heard.times) < 100:
+        while len(received.times) < 100:
             await asyncio.sleep(0.02)
         run.obey(run_messages.Control(run="r", action="pause"))
-        await heard.until(
+        await received.until(
             run_messages.RunProgress, lambda event: event.state == "paused"
         )  # after the last samples
-        reached = len(heard.times)
+        reached = len(received.times)
         run.obey(run_messages.Tune(run="r", parameter="PID.P", value="2*3"))
-        assert (await heard.until(run_messages.RunTuned)).parameter == "PID.P"
+        assert (await received.until(run_messages.RunTuned)).parameter == "PID.P"
         run.obey(run_messages.Tune(run="r", parameter="PID.P", value="six"))
-        assert "six" in (await heard.until(run_messages.RunProgress, lambda event: event.fault)).message
+        assert "six" in (await received.until(run_messages.RunProgress, lambda event: event.fault)).message
         run.obey(run_messages.Control(run="r", action="back"))
-        assert (await heard.until(run_messages.RunRewound)).count < reached
-        heard.events.clear()
+        assert (await received.until(run_messages.RunRewound)).count < reached
+        received.events.clear()
         run.obey(run_messages.Rewind(run="r", time=0.5))
-        rewound = await heard.until(run_messages.RunRewound)
-        assert heard.times[-1] <= 0.5
-        assert rewound.count == len(heard.times)
+        rewound = await received.until(run_messages.RunRewound)
+        assert received.times[-1] <= 0.5
+        assert rewound.count == len(received.times)
         run.obey(run_messages.SetSpeed(run="r", speed=None))
         run.obey(run_messages.Control(run="r", action="resume"))
-        end = await heard.until(run_messages.RunProgress, lambda event: event.state == "done")
+        end = await received.until(run_messages.RunProgress, lambda event: event.state == "done")
         assert end.solver
         assert "auto" in end.reason
-        assert np.all(np.diff(heard.times) > 0)
+        assert np.all(np.diff(received.times) > 0)
         with pytest.raises(ArmblocksError, match="the run has ended"):
             run.obey(run_messages.Control(run="r", action="back"))
         run.end()

@@ -97,7 +97,7 @@ def crash(pipe: Connection) -> None:
     def fault(_: RunHistory) -> None:
         ctypes.string_at(0)
 
-    RunHistory.mark = fault
+    RunHistory.add_snapshot = fault
     run_worker.work(pipe)
 
 
@@ -106,7 +106,7 @@ def hang_in_python(pipe: Connection) -> None:
         while True:
             pass
 
-    RunHistory.mark = forever
+    RunHistory.add_snapshot = forever
     run_worker.work(pipe)
 
 
@@ -114,7 +114,7 @@ def hang_in_native_code(pipe: Connection) -> None:
     def forever(_: RunHistory) -> None:
         ctypes.PyDLL(None).pause()  # Python's global lock is held meanwhile
 
-    RunHistory.mark = forever
+    RunHistory.add_snapshot = forever
     run_worker.work(pipe)
 
 
@@ -125,7 +125,7 @@ def use_up_memory(pipe: Connection) -> None:
             kept.append(bytes(64 * 2**20))
 
     run_worker.MOST_MEMORY = 4 * 2**30
-    RunHistory.mark = more
+    RunHistory.add_snapshot = more
     run_worker.work(pipe)
 
 
@@ -138,7 +138,7 @@ def fail_unforeseen(pipe: Connection) -> None:
     def defect(_: RunHistory) -> None:
         raise KeyError("something")
 
-    RunHistory.mark = defect
+    RunHistory.add_snapshot = defect
     run_worker.work(pipe)
 
 

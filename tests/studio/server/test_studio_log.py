@@ -31,9 +31,9 @@ class NoRedirect(urllib.request.HTTPRedirectHandler):
 
 def status(address: str, headers: dict[str, str]) -> tuple[int, str]:
     """Return status and cookie of a response."""
-    asked = urllib.request.Request(address, headers=headers)
+    requested = urllib.request.Request(address, headers=headers)
     try:
-        with urllib.request.build_opener(NoRedirect).open(asked, timeout=PATIENCE_MS / 1000) as answer:
+        with urllib.request.build_opener(NoRedirect).open(requested, timeout=PATIENCE_MS / 1000) as answer:
             return answer.status, answer.headers.get("set-cookie", "")
     except urllib.error.HTTPError as refused:
         with refused:

@@ -124,11 +124,19 @@ MAKERS: dict[type[do.DiagramEdit], Callable[[Sheet], do.DiagramEdit]] = {
     do.KeepTuned: keep_tuned,
     do.ArrangeBlocks: lambda s: do.ArrangeBlocks(),
     do.LogSignal: lambda s: do.LogSignal(port=s.one(s.outputs), logged=s.chance.random() < 0.7),
+    do.CommentBlocks: lambda s: do.CommentBlocks(
+        blocks=s.some(s.blocks), comment=s.one(("out", "out", "through", ""))
+    ),
+    do.NameSignal: lambda s: do.NameSignal(port=s.one(s.outputs), name=s.one(("speed", "error", "ä b", ""))),
+    do.GroundPorts: lambda s: do.GroundPorts(blocks=s.some(s.blocks)),
     do.GroupBlocks: lambda s: do.GroupBlocks(blocks=s.some(s.blocks), name=s.one(NEW_NAMES)),
     do.BreakLink: lambda s: do.BreakLink(block=s.one(s.insides)),
     do.SetSettings: lambda s: do.SetSettings(values={"stop_time": s.chance.random() + 0.1}),
     do.Describe: lambda s: do.Describe(text=s.one(("words", "other words"))),
 }
+
+SELDOM_VALID = (do.KeepTuned, do.KeepTuned)
+"""Edits that are made more often: a value is kept only in a model that can run."""
 
 
 def random_edit(document: Document, chance: random.Random) -> tuple[list[str], do.DiagramEdit]:
@@ -144,4 +152,4 @@ def random_edit(document: Document, chance: random.Random) -> tuple[list[str], d
         name = chance.choice(sorted(inner))
         path.append(name)
         diagram = inner[name]
-    return path, MAKERS[chance.choice(list(MAKERS))](Sheet(diagram, chance))
+    return path, MAKERS[chance.choice([*MAKERS, *SELDOM_VALID])](Sheet(diagram, chance))

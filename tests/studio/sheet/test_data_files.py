@@ -46,20 +46,20 @@ def called(name: str, function: str, kind: str = "PythonFunction") -> dict[str, 
     }
 
 
-async def findings(told: Events, since: int) -> list[dict[str, Any]]:
+async def findings(message: Events, since: int) -> list[dict[str, Any]]:
     """The findings of the next check after a number of messages."""
     async with asyncio.timeout(PATIENCE_SECONDS):
         while True:
-            for event in told[since:]:
+            for event in message[since:]:
                 if event["kind"] == "checked":
                     return event["findings"]
             await asyncio.sleep(0.01)
 
 
-async def end_of_run(told: Events, since: int) -> dict[str, Any]:
+async def end_of_run(message: Events, since: int) -> dict[str, Any]:
     async with asyncio.timeout(PATIENCE_SECONDS):
         while True:
-            for event in told[since:]:
+            for event in message[since:]:
                 if event["kind"] == "run_progress" and event["state"] in ("done", "failed"):
                     return event
             await asyncio.sleep(0.01)
@@ -70,7 +70,7 @@ def test_a_file_is_previewed_and_its_columns_are_chosen(tmp_path: Path) -> None:
     (tmp_path / "data" / "drive.csv").write_text(ROWS)
     (tmp_path / "other.txt").write_text(ROWS)
 
-    async def talking(_: Hub, ask: Ask, told: Events) -> None:
+    async def talking(_: Hub, ask: Ask, message: Events) -> None:
         assert [file["path"] for file in await ask("data_files", holds="table")] == ["data/drive.csv"]
         shown = await ask("preview_table", file="data/drive.csv")
         assert shown["time"] == "time [ms]"
@@ -90,20 +90,20 @@ def test_a_file_is_previewed_and_its_columns_are_chosen(tmp_path: Path) -> None:
             with pytest.raises(ArmblocksError):
                 await ask("preview_table", file=path)
         document = await ask("new", document_kind="diagram")
-        since = len(told)
+        since = len(message)
         await ask("change", document=document, key="0", edit=played("all", file="data/drive.csv"))
-        (found,) = await findings(told, since)  # as on the command line: all columns contain one with text
+        (found,) = await findings(message, since)  # as on the command line: all columns contain one with text
         assert "the column 'word' has no numbers: line 2 contains 'a'" in found["what"]
         await ask("undo", document=document)
         edit = played("drive", file="data/drive.csv", time="time [ms]", columns=["x"])
-        since = len(told)
+        since = len(message)
         await ask("change", document=document, key="1", edit=edit)
-        assert await findings(told, since) == []
+        assert await findings(message, since) == []
         await ask("save", document=document, path="models/model.json")
         document = (await ask("open", path="models/model.json"))[0]
-        since = len(told)
+        since = len(message)
         await ask("run", document=document, speed=None, tuned={})
-        assert (await end_of_run(told, since))["fault"] is None
+        assert (await end_of_run(message, since))["fault"] is None
 
     talk(tmp_path, talking, runs=True)
     block = json.loads((tmp_path / "models" / "model.json").read_text())["blocks"]["drive"]
@@ -117,35 +117,35 @@ def test_a_file_is_previewed_and_its_columns_are_chosen(tmp_path: Path) -> None:
 def test_a_table_that_cannot_be_read_is_a_finding_at_its_block(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("time,x\n0,1\n1,2\n")
 
-    async def talking(_: Hub, ask: Ask, told: Events) -> None:
+    async def talking(_: Hub, ask: Ask, message: Events) -> None:
         document = await ask("new", document_kind="diagram")
         await ask("change", document=document, key="1", edit=played("a", file="a.csv"))
         await ask("save", document=document, path="m.json")
         await ask("close", document=document)
         (tmp_path / "a.csv").write_text("time,x\n0,1\n0,2\n0,3\n")
-        since = len(told)
+        since = len(message)
         document = (await ask("open", path="m.json"))[0]
-        (found,) = await findings(told, since)
+        (found,) = await findings(message, since)
         assert (found["block"], "row 3 of the table is 0, as in the two rows before" in found["what"]) == (
             "a",
             True,
         )
         # the file is corrected: the run reads it as it is then
         (tmp_path / "a.csv").write_text("time,x\n0,1\n1,5\n")
-        since = len(told)
+        since = len(message)
         edit = {"kind": "parameters", "block": "a", "values": {"data": {"file": "a.csv"}}}
         await ask("change", document=document, key="2", edit=edit)
-        assert await findings(told, since) == []
+        assert await findings(message, since) == []
         (tmp_path / "a.csv").unlink()
-        since = len(told)
+        since = len(message)
         await ask("undo", document=document)
-        assert "there is no such file" in (await findings(told, since))[0]["what"]
+        assert "there is no such file" in (await findings(message, since))[0]["what"]
 
     talk(tmp_path, talking, runs=True)
 
 
 def test_a_dropped_table_is_stored_and_replaced_only_on_request(tmp_path: Path) -> None:
-    async def talking(_: Hub, ask: Ask, told: Events) -> None:
+    async def talking(_: Hub, ask: Ask, message: Events) -> None:
         def content(text: str) -> str:
             return base64.b64encode(text.encode()).decode()
 
@@ -184,7 +184,7 @@ LAW = f"{MARK}\n\ndef law(u, t, gain=2.0):\n    return gain * u\n"
 def test_code_runs_only_after_its_content_was_trusted(tmp_path: Path) -> None:
     (tmp_path / "law.py").write_text(LAW)
 
-    async def talking(_: Hub, ask: Ask, told: Events) -> None:
+    async def talking(_: Hub, ask: Ask, message: Events) -> None:
         assert [file["path"] for file in await ask("data_files", holds="function")] == ["law.py"]
         source = await ask("read_source", file="law.py")
         assert source["text"] == LAW
@@ -196,35 +196,35 @@ def test_code_runs_only_after_its_content_was_trusted(tmp_path: Path) -> None:
         }
         assert not source["trusted"]
         document = await ask("new", document_kind="diagram")
-        since = len(told)
+        since = len(message)
         await ask("change", document=document, key="1", edit=called("f", "law.py:law"))
-        (found,) = await findings(told, since)
+        (found,) = await findings(message, since)
         assert (found["block"], "the code of law.py is not trusted" in found["what"]) == ("f", True)
-        since = len(told)
+        since = len(message)
         await ask("run", document=document, speed=None, tuned={})
-        assert "not trusted" in (await end_of_run(told, since))["fault"]["what"]
+        assert "not trusted" in (await end_of_run(message, since))["fault"]["what"]
         assert not (tmp_path / "ran").exists()
         with pytest.raises(ArmblocksError, match="the file has changed since it was shown"):
             await ask("trust_source", file="law.py", digest="0" * 64, trusted=True)
-        since = len(told)
+        since = len(message)
         await ask("trust_source", file="law.py", digest=source["digest"], trusted=True)
-        assert await findings(told, since) == []
+        assert await findings(message, since) == []
         assert (tmp_path / "ran").exists()
-        since = len(told)
+        since = len(message)
         await ask("run", document=document, speed=None, tuned={})
-        assert (await end_of_run(told, since))["fault"] is None
+        assert (await end_of_run(message, since))["fault"] is None
         # every change of the file requires trust again
         (tmp_path / "ran").unlink()
         (tmp_path / "law.py").write_text(LAW.replace("gain * u", "gain / 0 * u"))
         source = await ask("read_source", file="law.py")
         assert not source["trusted"]
-        since = len(told)
+        since = len(message)
         await ask("run", document=document, speed=None, tuned={})
-        assert "not trusted" in (await end_of_run(told, since))["fault"]["what"]
+        assert "not trusted" in (await end_of_run(message, since))["fault"]["what"]
         assert not (tmp_path / "ran").exists()
-        since = len(told)
+        since = len(message)
         await ask("trust_source", file="law.py", digest=source["digest"], trusted=True)
-        (found,) = await findings(told, since)
+        (found,) = await findings(message, since)
         assert found["block"] == "f"
         assert "law.py, line 6: ZeroDivisionError" in found["what"]
 
@@ -234,20 +234,20 @@ def test_code_runs_only_after_its_content_was_trusted(tmp_path: Path) -> None:
 def test_ports_follow_the_arguments_after_a_reload(tmp_path: Path) -> None:
     (tmp_path / "law.py").write_text("def law(u):\n    return u\n")
 
-    async def talking(_: Hub, ask: Ask, told: Events) -> None:
+    async def talking(_: Hub, ask: Ask, message: Events) -> None:
         document = await ask("new", document_kind="diagram")
         await ask(
             "change", document=document, key="1", edit=called("f", "law.py:law", "CalledPythonFunction")
         )
         (tmp_path / "law.py").write_text("def law(u, v):\n    return u\n")
-        since = len(told)
+        since = len(message)
         edit = {"kind": "parameters", "block": "one", "values": {"value": 3.0}}
         await ask("change", document=document, key="2", edit=edit)
-        assert "the arguments of law are others" in (await findings(told, since))[0]["what"]
+        assert "the arguments of law are others" in (await findings(message, since))[0]["what"]
         edit = {"kind": "parameters", "block": "f", "values": {"function": "law.py:law"}}
-        since = len(told)
+        since = len(message)
         await ask("change", document=document, key="3", edit=edit)
-        changed = next(event for event in told[since:] if event["kind"] == "changed")
+        changed = next(event for event in message[since:] if event["kind"] == "changed")
         ports = changed["change"]["sheet"]["blocks"]["f"]["inputs"]
         assert [port["name"] for port in ports] == ["u", "v"]
         (tmp_path / "law.py").write_text("def law(u, v):\n    return u +\n")
@@ -263,7 +263,7 @@ def test_hidden_characters_of_a_source_are_shown(tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text("def law(u):\n    return u  # \u202e } \u200b\n")
     (tmp_path / "b.py").write_bytes(b"# -*- coding: utf-7 -*-\n#+AAo-def law(u): return u\n")
 
-    async def talking(_: Hub, ask: Ask, told: Events) -> None:
+    async def talking(_: Hub, ask: Ask, message: Events) -> None:
         source = await ask("read_source", file="a.py")
         assert source["hidden"] == 2
         assert "\\u202e" in source["text"]

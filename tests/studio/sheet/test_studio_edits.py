@@ -16,6 +16,7 @@ from armblocks.formats import diagram_from_bytes, diagram_to_bytes, load_diagram
 from armblocks.studio.protocol.messages.sheet_edits import (
     AddBlocks,
     BendWires,
+    CommentBlocks,
     Connect,
     Describe,
     DiagramEdit,
@@ -41,7 +42,7 @@ from armblocks.studio.sheet.nesting import inside
 from armblocks.studio.sheet.outline import find, outline
 from armblocks.studio.sheet.parameter_values import parameter_value
 from armblocks.studio.sheet.placing import placed
-from armblocks.studio.sheet.shown import sheet
+from armblocks.studio.sheet.shown import sheet, sheet_change
 
 NAMES = ["sine", "gain", "scope", "Gain 2", "ä"]
 TYPES = ["SineWave", "Gain", "Scope", "Sum", "JTraj", "Integrator"]
@@ -333,6 +334,39 @@ def test_a_logged_signal_follows_renaming_and_is_removed_with_its_block() -> Non
     assert content(document) == before
     wrong = before.replace(b'"connections":', b'"logged": ["PID"], "connections":')
     with pytest.raises(FormatError, match="'PID' is not an output"):
+        diagram_from_bytes(wrong, "wrong", BLOCKS, load_robot)
+
+
+def test_a_comment_follows_its_block_and_is_checked_again_in_the_file() -> None:
+    document = Document(placed(load_diagram("van_der_pol_pid", BLOCKS)), load_robot)
+    before, plain = content(document), document.diagram
+    document.edit(CommentBlocks(blocks=["PID", "damping"], comment="through"))
+    assert document.undo_title == "comment through 2 blocks"
+    shown = sheet_change(plain, document.diagram).blocks
+    assert {name for name, block in shown.items() if block and block.comment} == {"PID", "damping"}
+    document.edit(Rename(block="PID", name="controller"))
+    document.edit(CommentBlocks(blocks=["damping"], comment="out"))
+    assert document.diagram.commented == {"controller": "through", "damping": "out"}
+    again = diagram_from_bytes(content(document), "again", BLOCKS, load_robot)
+    assert again == document.diagram
+    text = clipped(again, ["controller"], [], load_robot)
+    document.edit(PasteBlocks(text=text, names={"controller": "copy"}))
+    assert document.diagram.commented["copy"] == "through"
+    document.edit(GroupBlocks(blocks=["controller", "damping"], name="inner"))
+    assert inside(document.diagram, ["inner"]).commented == again.commented
+    assert document.diagram.commented == {"copy": "through"}
+    document.edit(RemoveBlocks(blocks=["copy"]))
+    assert document.diagram.commented == {}
+    for _ in range(5):
+        document.undo()
+    assert document.diagram.commented["PID"] == "through"
+    document.edit(CommentBlocks(blocks=["PID", "damping"], comment=""))
+    assert content(document) == before
+    scope = next(name for name, block in plain.blocks.items() if not block.output_ports())
+    with pytest.raises(ArmblocksError, match="0 outputs is commented through"):
+        document.edit(CommentBlocks(blocks=[scope], comment="through"))
+    wrong = before.replace(b'"damping": {', b'"damping": {"commented": "away",')
+    with pytest.raises(FormatError, match="'away' is not a comment"):
         diagram_from_bytes(wrong, "wrong", BLOCKS, load_robot)
 
 

@@ -3,8 +3,8 @@ import { useState } from 'react'
 import type { LinkRow } from '../../protocol'
 import { atRest, cellText, setJoints, useDesk, type Joints } from './desk'
 
-const WHOLE_TURN = Math.PI
-const WITHOUT_RANGE = 1
+const HALF_TURN = Math.PI
+const DEFAULT_RANGE = 1
 
 /** The displayed quantity of the joints: position, speed, acceleration. */
 const KINDS = [
@@ -119,9 +119,9 @@ function NumberField({
 /** The range of a slider: that of the joint, otherwise ±π rad or ±1 m; for speeds the speed limit. */
 function range(link: LinkRow, kind: keyof Joints): [number, number] {
   const { lowest, highest, speed } = link.cells
-  const most = typeof speed === 'number' ? speed : link.turns ? WHOLE_TURN : WITHOUT_RANGE
-  if (kind === 'qd') return [-most, most]
-  if (kind === 'qdd') return [-2 * most, 2 * most]
+  const limit = typeof speed === 'number' ? speed : link.turns ? HALF_TURN : DEFAULT_RANGE
+  if (kind === 'qd') return [-limit, limit]
+  if (kind === 'qdd') return [-2 * limit, 2 * limit]
   if (typeof lowest === 'number' && typeof highest === 'number' && lowest < highest) return [lowest, highest]
-  return link.turns ? [-WHOLE_TURN, WHOLE_TURN] : [-WITHOUT_RANGE, WITHOUT_RANGE]
+  return link.turns ? [-HALF_TURN, HALF_TURN] : [-DEFAULT_RANGE, DEFAULT_RANGE]
 }

@@ -18,7 +18,7 @@ from armblocks.blocks.external_resets import (
     reset_ports,
     side_of,
 )
-from armblocks.blocks.switching import JUST, limits_in_order
+from armblocks.blocks.switching import THRESHOLD_OFFSET, limits_in_order
 from armblocks.diagram import (
     Block,
     Guard,
@@ -63,7 +63,9 @@ class ResettableIntegrator(Block):
         0.0, kind=ParameterKind.ARRAY, doc="the output at t = 0 and at a reset, if no port gives it"
     )
     state_port: bool = parameter(False, doc="whether an output gives the state before a reset")
-    limit_output: bool = parameter(False, doc="whether the output is held between lower and upper")
+    limit_output: bool = parameter(
+        False, doc="whether the output is limited to the range from lower to upper"
+    )
     lower: ArrayLike = parameter(
         -1.0, kind=ParameterKind.ARRAY, finite=False, doc="lower limit of the output"
     )
@@ -141,7 +143,7 @@ class ResettableIntegrator(Block):
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         found = _limit_guard_values(x, u, p) if self.limit_output else {}
         if self.external_reset != "none":
-            found["reset"] = (self._level(u) if self._by_level else u["reset"]) - JUST
+            found["reset"] = (self._level(u) if self._by_level else u["reset"]) - THRESHOLD_OFFSET
         if self.initial_condition_source == "external":
             found["begins"] = 0.5 - x["begun"]
         return found
@@ -268,8 +270,8 @@ def _limit_guard_values(x: Signals, u: Signals, p: Signals) -> dict[str, SX]:
     return {
         "upper": x["x"] - p["upper"],
         "lower": x["x"] - p["lower"],
-        "rises": u["u"] - JUST,
-        "falls": u["u"] + JUST,
+        "rises": u["u"] - THRESHOLD_OFFSET,
+        "falls": u["u"] + THRESHOLD_OFFSET,
     }
 
 

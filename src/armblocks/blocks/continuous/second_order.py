@@ -12,7 +12,7 @@ from casadi import SX, fmax, fmin, if_else, logic_and, logic_not, logic_or
 from numpy.typing import ArrayLike
 
 from armblocks.blocks.elementwise import parameters_shape
-from armblocks.blocks.switching import JUST, limits_in_order
+from armblocks.blocks.switching import THRESHOLD_OFFSET, limits_in_order
 from armblocks.diagram import (
     Block,
     Guard,
@@ -188,8 +188,8 @@ class SecondOrderIntegratorLimited(Block):
             "lower": x["x"] - p["lower"],
             "upper_speed": x["dx"] - p["upper_speed"],
             "lower_speed": x["dx"] - p["lower_speed"],
-            "rises": u["u"] - JUST,
-            "falls": u["u"] + JUST,
+            "rises": u["u"] - THRESHOLD_OFFSET,
+            "falls": u["u"] + THRESHOLD_OFFSET,
         }
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:

@@ -24,7 +24,8 @@ from armblocks.diagram.signs import FaceSign, Lines
 class StateSpace(LinearBlock):
     """A linear system: x' = A x + B u, y = C x + D u, x(0) = initial.
 
-    D is not tunable: where D is zero the output has no feedthrough, and the block may close a loop.
+    D is not tunable: where D is zero the output has no feedthrough, and the block may be part of a feedback
+    loop.
     """
 
     title: ClassVar[str] = "State-Space"

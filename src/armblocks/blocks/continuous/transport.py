@@ -161,7 +161,10 @@ class VariableTransportDelay(Block):
         limits_in_order(self, "shortest", "longest")
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "what enters"), Port("T", "the transit time at the inlet, above 0", "s", shape=()))
+        return (
+            Port("u", "the signal that enters"),
+            Port("T", "the transit time at the inlet, above 0", "s", shape=()),
+        )
 
     def output_ports(self) -> tuple[Port, ...]:
         return (

@@ -10,7 +10,7 @@ from casadi import SX, floor, fmax, fmin, if_else
 from numpy.typing import ArrayLike
 
 from armblocks.blocks.switching import (
-    JUST,
+    THRESHOLD_OFFSET,
     beyond,
     cell_of,
     limits_in_order,
@@ -36,7 +36,7 @@ from armblocks.diagram.signs import DEAD_ZONE, SATURATION, FaceSign, graph, stai
 
 @dataclass(frozen=True, kw_only=True)
 class Saturation(Block):
-    """The input held between two limits: y = min(max(u, lower), upper)."""
+    """The input limited to a range: y = min(max(u, lower), upper)."""
 
     memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "Saturation"
@@ -68,7 +68,11 @@ class Saturation(Block):
         return {"y": inputs["u"]}
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("mode", self.output_shapes(inputs)["y"], "-1 at the lower limit, 1 at the upper, 0"),)
+        return (
+            State(
+                "mode", self.output_shapes(inputs)["y"], "-1 at the lower limit, 1 at the upper limit, else 0"
+            ),
+        )
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         shape = self.output_shapes(inputs)["y"]
@@ -182,7 +186,10 @@ class Relay(Block):
         return {"y": if_else(x["mode"] > 0.0, p["on_value"], p["off_value"])}
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"on": u["u"] - p["on_point"] + JUST, "off": u["u"] - p["off_point"] - JUST}
+        return {
+            "on": u["u"] - p["on_point"] + THRESHOLD_OFFSET,
+            "off": u["u"] - p["off_point"] - THRESHOLD_OFFSET,
+        }
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         sides = self.guard_values(t, x, u, p)
@@ -229,7 +236,7 @@ class Quantizer(Block):
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         within = u["u"] / p["interval"] - x["step"]
-        return {"up": within - 0.5 + JUST, "down": within + 0.5 + 1e-9}
+        return {"up": within - 0.5 + THRESHOLD_OFFSET, "down": within + 0.5 + 1e-9}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         now = floor(u["u"] / p["interval"] + 0.5)

@@ -9,7 +9,7 @@ from typing import ClassVar
 from casadi import SX, fabs, fmax, fmin, if_else, logic_and, logic_or, sign
 from numpy.typing import ArrayLike
 
-from armblocks.blocks.switching import JUST, SMALLEST_JUMP, limits_in_order, same_instant
+from armblocks.blocks.switching import SMALLEST_JUMP, THRESHOLD_OFFSET, limits_in_order, same_instant
 from armblocks.diagram import (
     Block,
     Guard,
@@ -63,7 +63,7 @@ class CoulombFriction(Block):
         return {"y": x["mode"] * p["offset"] + p["gain"] * u["u"]}
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"forward": u["u"] - JUST, "backward": u["u"] + JUST}
+        return {"forward": u["u"] - THRESHOLD_OFFSET, "backward": u["u"] + THRESHOLD_OFFSET}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"mode": sign(u["u"])}
@@ -106,7 +106,7 @@ class Backlash(Block):
         return {"y": inputs["u"]}
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        doc = "the output just before the latest instant, or before the latest event at it"
+        doc = "the output just before the latest instant, or before the latest event at that instant"
         return (State("rest", inputs["u"], doc, remembers=True),)
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
@@ -130,8 +130,8 @@ class Backlash(Block):
         # At rest, reversals of u have no effect; while driven, the ends of the play have none.
         free = x["mode"] == 0.0
         return {
-            "upper": if_else(free, ahead - p["width"] / 2.0 - JUST, -1.0),
-            "lower": if_else(free, ahead + p["width"] / 2.0 + JUST, 1.0),
+            "upper": if_else(free, ahead - p["width"] / 2.0 - THRESHOLD_OFFSET, -1.0),
+            "lower": if_else(free, ahead + p["width"] / 2.0 + THRESHOLD_OFFSET, 1.0),
             "turn": if_else(free, 0.0, u["u'"]),
         }
 
@@ -230,8 +230,8 @@ class StickSlipFriction(Block):
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {
             "stop": x["v"],
-            "forwards": u["F"] - p["static"] - JUST,
-            "backwards": u["F"] + p["static"] + JUST,
+            "forwards": u["F"] - p["static"] - THRESHOLD_OFFSET,
+            "backwards": u["F"] + p["static"] + THRESHOLD_OFFSET,
         }
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:

@@ -50,7 +50,7 @@ class MovingLimits(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class SaturationDynamic(MovingLimits):
-    """The input held between two signals: y = min(max(u, lower), upper)."""
+    """The input limited by two signals: y = min(max(u, lower), upper)."""
 
     title: ClassVar[str] = "Saturation Dynamic"
     sign: ClassVar[FaceSign] = SATURATION
@@ -143,8 +143,10 @@ class HitCrossing(Block):
         parameters={"offset": 0.5},
     )
 
-    offset: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="level whose crossings count")
-    direction: str = parameter("either", choices=("rising", "falling", "either"), doc="which crossings count")
+    offset: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="level whose crossings are counted")
+    direction: str = parameter(
+        "either", choices=("rising", "falling", "either"), doc="direction of the counted crossings"
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the signal"),)
@@ -159,7 +161,7 @@ class HitCrossing(Block):
         shape = self.output_shapes(inputs)["count"]
         return (
             State("count", shape, "number of crossings so far"),
-            State("last", shape, "time of the last", "s"),
+            State("last", shape, "time of the last crossing", "s"),
         )
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:

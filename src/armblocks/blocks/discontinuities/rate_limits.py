@@ -61,7 +61,7 @@ class RateLimiting(Block):
             self.output_shapes(inputs)["y"],
             "left limit of the output at the latest tick, event or breakpoint",
         )
-        return (kept, State("kept_at", (), "that instant", "s"))
+        return (kept, State("kept_at", (), "time of the latest tick, event or breakpoint", "s"))
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
         doc = "1 at the rising limit, -1 at the falling limit, 0 following u"

@@ -158,7 +158,7 @@ class Delay(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class ResettableDelay(Block):
-    """A delay with reset: y(k) = u(k - length), or initial where k - length is before it.
+    """A delay with reset: y(k) = u(k - length), or initial if no input has been stored length ticks ago.
 
     It corresponds to Simulink's Delay with its ports. At the tick of a reset y and all values in the delay
     buffer become the initial value. With ``enable_port`` the block holds its state and output at ticks at

@@ -24,7 +24,8 @@ from armblocks.diagram.signs import FaceSign, Lines
 class DiscreteStateSpace(LinearBlock):
     """A linear sampled system: x(k+1) = A x(k) + B u(k), y(k) = C x(k) + D u(k), x(0) = initial.
 
-    D is not tunable: where D is zero the output has no feedthrough, and the block may close a loop.
+    D is not tunable: where D is zero the output has no feedthrough, and the block may be part of a feedback
+    loop.
     """
 
     title: ClassVar[str] = "Discrete State-Space"

@@ -276,7 +276,7 @@ class IntervalTestDynamic(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class CombinatorialLogic(Block):
-    """A truth table: y = the row with the binary number of the conditions, the first one the highest digit.
+    """A truth table: the conditions are the binary digits of a row number, and y is that row.
 
     For conditions (u1, …, um) the row is 1 + u1 2^(m-1) + … + um, of 2^m rows. A table of one column gives
     a scalar. The default is AND of two.
@@ -411,8 +411,8 @@ class TruthTable(Block):
         rows: list[list[float]] = np.asarray(self.decisions, dtype=np.float64).tolist()
         action, true = p["actions"][len(rows) - 1, :].T, _truth(x, "u")
         for k in reversed(range(len(rows) - 1)):
-            asked = [true[i] == want for i, want in enumerate(rows[k]) if want >= 0.0]
-            action = if_else(reduce(logic_and, asked, SX(1.0)), p["actions"][k, :].T, action)
+            requested = [true[i] == want for i, want in enumerate(rows[k]) if want >= 0.0]
+            action = if_else(reduce(logic_and, requested, SX(1.0)), p["actions"][k, :].T, action)
         return {"y": action}
 
 

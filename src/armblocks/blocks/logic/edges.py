@@ -71,7 +71,7 @@ class EdgeDetection(Block):
         return Words(_EDGE_SIGNS[self.edge])
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "what is watched"),)
+        return (Port("u", "signal whose changes are detected"),)
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "1 at the edge, else 0"),)
@@ -157,7 +157,7 @@ class DFlipFlop(Block):
     sample_time: ArrayLike = sample_time_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("D", "what is taken"), Port("CLK", "the clock", shape=()))
+        return (Port("D", "the value that Q takes at the edge"), Port("CLK", "the clock", shape=()))
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("Q", "the state"), Port("not_Q", "1 where Q is 0, else 0"))
@@ -258,11 +258,14 @@ class Counter(Block):
         inputs={"u": _PULSES, "reset": made("Step", time=8.0).named("reset")},
     )
 
-    initial: float = parameter(0.0, doc="where it begins")
+    initial: float = parameter(0.0, doc="the count at the start and after a reset")
     sample_time: ArrayLike = sample_time_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "signal whose edges count"), Port("reset", "resets while not 0", shape=()))
+        return (
+            Port("u", "signal whose rising edges are counted"),
+            Port("reset", "resets while not 0", shape=()),
+        )
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the count"),)

@@ -14,7 +14,7 @@ from armblocks.blocks.integer_steps import BlockWithSteps, IntegerSteps
 from armblocks.blocks.interpolation import EXTRAPOLATIONS, cells, contract
 from armblocks.blocks.long_tables import is_long
 from armblocks.blocks.switching import zero_crossing_parameter
-from armblocks.blocks.table_axes import BlockWithAxes, by_element, numbers_of, read, rising
+from armblocks.blocks.table_axes import BlockWithAxes, ascending_positions, elementwise, numbers_of, read
 from armblocks.diagram import (
     Block,
     Port,
@@ -50,7 +50,7 @@ class Prelookup(BlockWithAxes):
     zero_crossing: bool = zero_crossing_parameter()
 
     def check(self) -> None:
-        rising("Prelookup", "positions", self.positions, *shape_of(self.positions))
+        ascending_positions("Prelookup", "positions", self.positions, *shape_of(self.positions))
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the position"),)
@@ -77,7 +77,7 @@ class Prelookup(BlockWithAxes):
                 return free
             return if_else(cell == 0.0, 0.0, if_else(cell == float(n), 1.0, free))
 
-        return {"k": by_element([cell], interval), "f": by_element([u["u"], cell], fraction)}
+        return {"k": elementwise([cell], interval), "f": elementwise([u["u"], cell], fraction)}
 
     def _is_long(self) -> bool:
         return is_long(shape_of(self.positions), "linear")
@@ -87,10 +87,10 @@ class Prelookup(BlockWithAxes):
             return read_entry(points, place)
         return sum((if_else(place == float(k), points[k], 0.0) for k in range(points.numel())), SX(0.0))
 
-    def _along(self) -> Mapping[str, list[float]]:
+    def _positions_by_input(self) -> Mapping[str, list[float]]:
         return {"u": numbers_of(self, "positions")}
 
-    def _read_along(self, p: Signals) -> Mapping[str, SX]:
+    def _run_positions(self, p: Signals) -> Mapping[str, SX]:
         return {"u": p["positions"]}
 
     @property
@@ -153,7 +153,7 @@ class InterpolationUsingPrelookup(Block):
                 return read(entries, shape, [_corners(*place) for place in places])
             return contract(p["table"], shape, [_weights(*place) for place in places])
 
-        return {"y": by_element([*u.values()], value)}
+        return {"y": elementwise([*u.values()], value)}
 
 
 def _corners(k: SX, f: SX, n: int) -> list[tuple[SX, SX]]:
@@ -212,4 +212,6 @@ class DirectLookup(BlockWithSteps):
             axes = [cells(u, [float(k) for k in range(1, n)]) for u, n in zip(indices, shape)]
             return contract(p["table"], shape, axes)
 
-        return {"y": by_element([x[f"index {name}"] if self.zero_crossing else u[name] for name in u], entry)}
+        return {
+            "y": elementwise([x[f"index {name}"] if self.zero_crossing else u[name] for name in u], entry)
+        }

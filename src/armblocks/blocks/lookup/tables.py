@@ -15,7 +15,7 @@ from armblocks.blocks.elementwise import numbered_ports
 from armblocks.blocks.interpolation import EXTRAPOLATIONS, METHODS
 from armblocks.blocks.long_tables import is_long
 from armblocks.blocks.switching import zero_crossing_parameter
-from armblocks.blocks.table_axes import Axes, BlockWithAxes, axis, numbers_of, rising
+from armblocks.blocks.table_axes import Axes, BlockWithAxes, ascending_positions, axis, numbers_of
 from armblocks.diagram import (
     Block,
     Guard,
@@ -56,7 +56,7 @@ class LookupTable1D(BlockWithAxes):
     zero_crossing: bool = zero_crossing_parameter()
 
     def check(self) -> None:
-        rising("LookupTable1D", "positions", self.positions, *shape_of(self.table))
+        ascending_positions("LookupTable1D", "positions", self.positions, *shape_of(self.table))
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the position"),)
@@ -70,10 +70,10 @@ class LookupTable1D(BlockWithAxes):
     def _is_long(self) -> bool:
         return is_long(shape_of(self.table), self.method)
 
-    def _along(self) -> Mapping[str, list[float]]:
+    def _positions_by_input(self) -> Mapping[str, list[float]]:
         return {"u": numbers_of(self, "positions")}
 
-    def _read_along(self, p: Signals) -> Mapping[str, SX]:
+    def _run_positions(self, p: Signals) -> Mapping[str, SX]:
         return {"u": p["positions"]}
 
 
@@ -106,8 +106,8 @@ class LookupTable2D(BlockWithAxes):
 
     def check(self) -> None:
         rows, columns = shape_of(self.table)
-        rising("LookupTable2D", "positions1", self.positions1, rows)
-        rising("LookupTable2D", "positions2", self.positions2, columns)
+        ascending_positions("LookupTable2D", "positions1", self.positions1, rows)
+        ascending_positions("LookupTable2D", "positions2", self.positions2, columns)
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u1", "the position along the rows"), Port("u2", "the position along the columns"))
@@ -121,10 +121,10 @@ class LookupTable2D(BlockWithAxes):
     def _is_long(self) -> bool:
         return is_long(shape_of(self.table), self.method)
 
-    def _along(self) -> Mapping[str, list[float]]:
+    def _positions_by_input(self) -> Mapping[str, list[float]]:
         return {"u1": numbers_of(self, "positions1"), "u2": numbers_of(self, "positions2")}
 
-    def _read_along(self, p: Signals) -> Mapping[str, SX]:
+    def _run_positions(self, p: Signals) -> Mapping[str, SX]:
         return {"u1": p["positions1"], "u2": p["positions2"]}
 
 
@@ -167,8 +167,8 @@ class LookupTableND(BlockWithAxes):
                 allowed=f"{sum(shape)}: {' + '.join(map(str, shape))}",
                 fix="list the positions of all axes, axis after axis",
             )
-        for k, along in enumerate(self._along().values(), 1):
-            rising("LookupTableND", f"axis {k} of positions", along, shape[k - 1])
+        for k, along in enumerate(self._positions_by_input().values(), 1):
+            ascending_positions("LookupTableND", f"axis {k} of positions", along, shape[k - 1])
 
     def input_ports(self) -> tuple[Port, ...]:
         return numbered_ports("u", len(shape_of(self.table)), "position along axis")
@@ -182,11 +182,11 @@ class LookupTableND(BlockWithAxes):
     def _is_long(self) -> bool:
         return is_long(shape_of(self.table), self.method)
 
-    def _along(self) -> Mapping[str, list[float]]:
+    def _positions_by_input(self) -> Mapping[str, list[float]]:
         points = numbers_of(self, "positions")
         return {port: points[part] for port, part in self._parts().items()}
 
-    def _read_along(self, p: Signals) -> Mapping[str, SX]:
+    def _run_positions(self, p: Signals) -> Mapping[str, SX]:
         return {port: p["positions"][part] for port, part in self._parts().items()}
 
     def _parts(self) -> dict[str, slice]:

@@ -213,7 +213,7 @@ class Divide(Block):
     )
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("dividend", "dividend"), Port("divisor", "by what"))
+        return (Port("dividend", "dividend"), Port("divisor", "divisor"))
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the quotient"),)

@@ -67,7 +67,7 @@ class MatrixGain(Block):
 
     title: ClassVar[str] = "Matrix Gain"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows=("A rotation by 90 degrees: the first output is minus the second input, the second the first."),
+        shows=("A rotation by 90 degrees: the outputs are minus the second input and the first input."),
         parameters={"gain": ((0.0, -1.0), (1.0, 0.0))},
         inputs={"u": made("SineWave", amplitude=(1.0, 0.5))},
     )
@@ -246,7 +246,7 @@ _TRIGONOMETRY: Mapping[str, Callable[[SX], SX]] = {
 class MathFunction(BlockWithSteps):
     """An elementary function of every element: y = f(u), with f one of abs, exp, log, sqrt, square, …
 
-    ``floor``, ``ceil``, ``sign`` and ``abs`` switch at located events.
+    The jumps and corners of ``floor``, ``ceil``, ``sign`` and ``abs`` are events.
     """
 
     title: ClassVar[str] = "Math Function"
@@ -273,8 +273,8 @@ class MathFunction(BlockWithSteps):
     def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
         above = Condition("positive", inputs["u"], "1 where u > 0", closed=False)
         below = Condition("negative", inputs["u"], "1 where u < 0", closed=False)
-        asked = {"sign": (above, below), "abs": (below,)}
-        return located(self, *asked.get(self.function, ()))
+        requested = {"sign": (above, below), "abs": (below,)}
+        return located(self, *requested.get(self.function, ()))
 
     def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"positive": u["u"], "negative": -u["u"]}
@@ -379,7 +379,7 @@ class MinMax(Block):
         return Words(self.function, italic=True)
 
     def input_ports(self) -> tuple[Port, ...]:
-        return numbered_ports("u", self.inputs, "candidate")
+        return numbered_ports("u", self.inputs, "input")
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the minimum or maximum"),)

@@ -72,7 +72,8 @@ class ProductOfElements(Block):
 class Extremum(Block):
     """The least or the greatest element and its index: y = u(index), index from 1.
 
-    Of several equal elements the first counts. Indices of a matrix are in column-major order.
+    If several elements are equal, the index is that of the first. Indices of a matrix are in column-major
+    order.
     """
 
     title: ClassVar[str] = "MinMax of Elements"
@@ -203,7 +204,7 @@ class Norm(Block):
         inputs={"u": made("SineWave", amplitude=(2.0, 1.0), phase=(pi / 2, 0.0))},
     )
 
-    norm: str = parameter("2", choices=("2", "1", "inf", "fro"), doc="which norm")
+    norm: str = parameter("2", choices=("2", "1", "inf", "fro"), doc="the norm")
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "vector or matrix"),)

@@ -17,7 +17,7 @@ from armblocks.blocks.integer_steps import (
     rounding_edges,
     step_after,
 )
-from armblocks.blocks.switching import JUST, beyond, cell_of, zero_crossing_parameter
+from armblocks.blocks.switching import THRESHOLD_OFFSET, beyond, cell_of, zero_crossing_parameter
 from armblocks.diagram import (
     Block,
     Guard,
@@ -44,7 +44,7 @@ class Rounding(BlockWithSteps):
         inputs={"u": made("SineWave", amplitude=3.0)},
     )
 
-    function: str = parameter("floor", choices=tuple(ROUNDINGS), doc="which way")
+    function: str = parameter("floor", choices=tuple(ROUNDINGS), doc="the rounding rule")
     zero_crossing: bool = zero_crossing_parameter()
 
     def face_sign(self) -> FaceSign:
@@ -166,8 +166,8 @@ def turn_guard_values(function: str, u: SX, v: SX, turns: SX) -> Signals:
     edge, owned = rounding_edges(rule, turns)
     below, below_owned = rounding_edges(rule, -turns, mirrored=True)
     found = {
-        "up": (u - edge * v) * sign(v) + if_else(owned, JUST, -JUST),
-        "down": (u + below * v) * sign(v) - if_else(below_owned, JUST, -JUST),
+        "up": (u - edge * v) * sign(v) + if_else(owned, THRESHOLD_OFFSET, -THRESHOLD_OFFSET),
+        "down": (u + below * v) * sign(v) - if_else(below_owned, THRESHOLD_OFFSET, -THRESHOLD_OFFSET),
     }
     # With a divisor of zero, n is 0 and no event occurs.
     return {name: if_else(v == 0.0, 0.0, value) for name, value in found.items()}

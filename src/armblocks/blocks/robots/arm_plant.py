@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from armblocks.blocks.robots.ports import check_joint_values, q_port, qd_port, qdd_port, tau_port
 from armblocks.blocks.robots.robot_field import RobotField
-from armblocks.blocks.switching import JUST
+from armblocks.blocks.switching import THRESHOLD_OFFSET
 from armblocks.diagram import (
     Block,
     Guard,
@@ -214,16 +214,16 @@ class ArmPlant(Block):
             forward, backward = (p["breakaway"] * SX(side) for side in (dry.forward, dry.backward))
             held, rigid = mode == 0.0, self._rigid(contact)
             free_forwards, free_backwards = logic_and(held, rigid <= 0.0), logic_and(held, rigid >= 0.0)
-            values["forwards"] = if_else(free_forwards, unbalanced - forward - JUST, -1.0)
-            values["backwards"] = if_else(free_backwards, unbalanced - backward + JUST, 1.0)
+            values["forwards"] = if_else(free_forwards, unbalanced - forward - THRESHOLD_OFFSET, -1.0)
+            values["backwards"] = if_else(free_backwards, unbalanced - backward + THRESHOLD_OFFSET, 1.0)
         over, under = q - self._limits(1), q - self._limits(0)
         if self.stops == "elastic":
             drag = p["damping"] * qd
-            values["upper"] = fmin(over, p["stiffness"] * over + drag) - JUST
-            values["lower"] = fmax(under, p["stiffness"] * under + drag) + JUST
+            values["upper"] = fmin(over, p["stiffness"] * over + drag) - THRESHOLD_OFFSET
+            values["lower"] = fmax(under, p["stiffness"] * under + drag) + THRESHOLD_OFFSET
         else:
-            values["upper"] = if_else(contact > 0.0, -1.0, over - JUST)
-            values["lower"] = if_else(contact < 0.0, 1.0, under + JUST)
+            values["upper"] = if_else(contact > 0.0, -1.0, over - THRESHOLD_OFFSET)
+            values["lower"] = if_else(contact < 0.0, 1.0, under + THRESHOLD_OFFSET)
         names = [guard.name for guard in self.guards({})]
         return {name: values[name][list(self._joints_of(name))] for name in names}
 

@@ -69,8 +69,8 @@ class JointPD(Block):
 
     def input_ports(self) -> tuple[Port, ...]:
         return (
-            Port("qr", "wanted coordinates"),
-            Port("qdr", "wanted speeds"),
+            Port("qr", "desired coordinates"),
+            Port("qdr", "desired speeds"),
             Port("q", "coordinates"),
             Port("qd", "speeds"),
         )
@@ -93,7 +93,7 @@ class GravityCompensation(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="From rest to a desired posture: gravity is compensated, so that no error remains.",
         inputs={
-            "qr": made("Constant", value=(1.0, -0.5)).named("wanted"),
+            "qr": made("Constant", value=(1.0, -0.5)).named("desired"),
             "q": made("ForwardDynamics").named("arm").by(tau="tau").at("q"),
             "qd": made("ForwardDynamics").named("arm").by(tau="tau").at("qd"),
         },
@@ -156,15 +156,15 @@ class ComputedTorque(Block):
 
     def input_ports(self) -> tuple[Port, ...]:
         robot = self.robot
-        wanted = (q_port(robot, "qr"), qd_port(robot, "qdr"), qdd_port(robot, "qddr"))
-        return *wanted, q_port(robot), qd_port(robot)
+        reference = (q_port(robot, "qr"), qd_port(robot, "qdr"), qdd_port(robot, "qddr"))
+        return *reference, q_port(robot), qd_port(robot)
 
     def output_ports(self) -> tuple[Port, ...]:
         return (tau_port(self.robot, "torque or force at the joints"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        wanted = u["qddr"] + p["Kd"] * (u["qdr"] - u["qd"]) + p["Kp"] * (u["qr"] - u["q"])
-        return {"tau": apply_traced(dynamics.trace_rne(self.robot), u["q"], u["qd"], wanted)}
+        acceleration = u["qddr"] + p["Kd"] * (u["qdr"] - u["qd"]) + p["Kp"] * (u["qr"] - u["q"])
+        return {"tau": apply_traced(dynamics.trace_rne(self.robot), u["q"], u["qd"], acceleration)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -196,8 +196,8 @@ class FeedForward(Block):
 
     def input_ports(self) -> tuple[Port, ...]:
         robot = self.robot
-        wanted = (q_port(robot, "qr"), qd_port(robot, "qdr"), qdd_port(robot, "qddr"))
-        return *wanted, q_port(robot), qd_port(robot)
+        reference = (q_port(robot, "qr"), qd_port(robot, "qdr"), qdd_port(robot, "qddr"))
+        return *reference, q_port(robot), qd_port(robot)
 
     def output_ports(self) -> tuple[Port, ...]:
         return (tau_port(self.robot, "torque or force at the joints"),)

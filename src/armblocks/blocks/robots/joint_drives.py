@@ -29,7 +29,7 @@ from armblocks.diagram import (
 
 @dataclass(frozen=True, kw_only=True)
 class MotorDrive(Block):
-    """Torque limits of a drive: y = u, limited by the current (peak) and the voltage (stall (1 -+ w / w0)).
+    """The torque u of a drive within its limits: current (peak) and voltage (stall (1 -+ w / w0)).
 
     The voltage limit is the torque-speed line of a DC motor: ``stall`` at rest, 0 at ``no_load_speed`` w0,
     for driving torques. Beyond w0 the drive can only brake.
@@ -42,7 +42,7 @@ class MotorDrive(Block):
             "voltage limit reduces the torque to 0."
         ),
         inputs={
-            "u": made("Constant", value=15.0).named("wanted"),
+            "u": made("Constant", value=15.0).named("torque command"),
             "w": made("Ramp", slope=12.0).named("speed"),
         },
         shown=("u", "y"),
@@ -56,7 +56,7 @@ class MotorDrive(Block):
     zero_crossing: bool = zero_crossing_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "wanted torque", "N m"), Port("w", "speed", "rad/s"))
+        return (Port("u", "commanded torque", "N m"), Port("w", "speed", "rad/s"))
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "torque", "N m"),)

@@ -93,7 +93,7 @@ class Trapezoidal(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class MultiSegment(Block):
-    """Linear segments through points with blended corners: segment k takes durations(k), a corner blend.
+    """Linear segments through points with blended corners; segment k lasts durations(k), a corner blend.
 
     This is the toolbox's ``mstraj`` for given times. The speed of a segment is constant, and changes linearly
     within blend / 2 of the time of each point. The path passes exactly through the first and last point and

@@ -31,8 +31,8 @@ from armblocks.diagram import (
 from armblocks.equations import Shape
 
 _PORTS = (
-    Port("qr", "wanted coordinates"),
-    Port("qdr", "wanted speeds"),
+    Port("qr", "desired coordinates"),
+    Port("qdr", "desired speeds"),
     Port("q", "coordinates"),
     Port("qd", "speeds"),
 )
@@ -101,7 +101,7 @@ class JointPID(JointPidBlock):
         return (State("integral", self._shape(inputs), "the integral action"),)
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("mode", self._shape(inputs), "-1 at the lower limit, 1 at the upper limit, 0"),)
+        return (State("mode", self._shape(inputs), "-1 at the lower limit, 1 at the upper limit, else 0"),)
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         shape = self._shape(inputs)

@@ -79,7 +79,7 @@ class Selector(Block):
     )
 
     indices: ArrayLike = parameter(
-        (1.0,), kind=ParameterKind.ARRAY, dimensions=(0, 1), tunable=False, doc="which elements"
+        (1.0,), kind=ParameterKind.ARRAY, dimensions=(0, 1), tunable=False, doc="indices of the elements"
     )
     counting: str = parameter("one-based", choices=COUNTING, doc="whether the first index is 1 or 0")
 
@@ -220,7 +220,7 @@ class IndexVector(Block):
     counting: str = parameter("zero-based", choices=COUNTING[::-1], doc="whether the first index is 1 or 0")
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("index", "which element", shape=()), Port("u", "the vector"))
+        return (Port("index", "index of the element", shape=()), Port("u", "the vector"))
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the element", shape=()),)

@@ -12,7 +12,7 @@ from casadi import SX, if_else
 from armblocks.blocks.elementwise import common_unit, numbered_ports
 from armblocks.blocks.routing.selection import COUNTING
 from armblocks.blocks.switching import (
-    JUST,
+    THRESHOLD_OFFSET,
     located,
     zero_crossing_parameter,
 )
@@ -56,7 +56,7 @@ class Switch(Block):
         return (
             Port("u1", "output where the criterion is met"),
             Port("u2", "the control"),
-            Port("u3", "given elsewhere"),
+            Port("u3", "output where the criterion is not met"),
         )
 
     def bus_inputs(self) -> tuple[str, ...]:
@@ -78,7 +78,11 @@ class Switch(Block):
         return {"y": if_else(x["mode"] > 0.0, u["u1"], u["u3"])}
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"control": u["u2"] - p["threshold"] + (JUST if self.criterion == ">=" else -JUST)}
+        return {
+            "control": u["u2"]
+            - p["threshold"]
+            + (THRESHOLD_OFFSET if self.criterion == ">=" else -THRESHOLD_OFFSET)
+        }
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"mode": self.guard_values(t, x, u, p)["control"] > 0.0}
@@ -112,7 +116,7 @@ class MultiportSwitch(Block):
     zero_crossing: bool = zero_crossing_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("index", "which input", shape=()), *numbered_ports("u", self.inputs, "candidate"))
+        return (Port("index", "index of the input", shape=()), *numbered_ports("u", self.inputs, "input"))
 
     def bus_inputs(self) -> tuple[str, ...]:
         return tuple(f"u{k}" for k in range(1, self.inputs + 1))
@@ -162,7 +166,7 @@ class ManualSwitch(Block):
     position: float = parameter(1.0, minimum=1.0, maximum=2.0, doc="1 or 2")
 
     def input_ports(self) -> tuple[Port, ...]:
-        return numbered_ports("u", 2, "candidate")
+        return numbered_ports("u", 2, "input")
 
     def bus_inputs(self) -> tuple[str, ...]:
         return ("u1", "u2")

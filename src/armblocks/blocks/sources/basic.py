@@ -70,7 +70,7 @@ class Step(Block):
     )
 
     time: float = parameter(1.0, doc="time of the step", unit="s")
-    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="value before it")
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="value before the start")
     final: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="value from the step on")
 
     def check(self) -> None:
@@ -102,7 +102,7 @@ class Ramp(Block):
 
     slope: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="slope", unit="1/s")
     start: float = parameter(0.0, doc="start time of the ramp", unit="s")
-    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="value before it")
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="value before the start")
 
     def check(self) -> None:
         parameters_shape(self, "slope", "initial")

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from armblocks.blocks.interpolation import cells, weights
 from armblocks.blocks.switching import counted, since
-from armblocks.blocks.table_axes import rising
+from armblocks.blocks.table_axes import ascending_positions
 from armblocks.diagram import (
     Block,
     Guard,
@@ -203,7 +203,7 @@ class RepeatingSequenceInterpolated(Block):
         _check_times(self, self.times, shape_of(self.values)[0])
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the course", shape=()),)
+        return (Port("y", "the interpolated sequence", shape=()),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         times = _numbers(self.times)
@@ -246,7 +246,7 @@ class RepeatingSequenceStair(Block):
 
 
 def _check_times(block: Block, times: ArrayLike, count: int) -> None:
-    first = rising(block.type_name(), "times", times, count)[0]
+    first = ascending_positions(block.type_name(), "times", times, count)[0]
     if first != 0.0:
         raise InputError(
             f"the first of the times is {first}",

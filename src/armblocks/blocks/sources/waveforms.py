@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from armblocks.blocks.elementwise import parameters_shape
 from armblocks.blocks.interpolation import weights
 from armblocks.blocks.long_tables import inputs_with, interval_of, is_long, is_spline, line
-from armblocks.blocks.splines import spline_corners, with_slopes
-from armblocks.blocks.table_axes import rising
+from armblocks.blocks.splines import spline_corners, with_derivatives
+from armblocks.blocks.table_axes import ascending_positions
 from armblocks.diagram import (
     Block,
     Parameter,
@@ -28,13 +28,14 @@ from armblocks.diagram import (
 )
 from armblocks.diagram.signs import FaceSign, Words, graph, swing
 from armblocks.equations import last_at_or_below, read_entry
+from armblocks.errors import InputError
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Ground(Block):
-    """Ground: y = 0, for unused inputs."""
+    """Ground: y = 0, for unused inputs; a scalar, or a vector or matrix of zeros."""
 
     title: ClassVar[str] = "Ground"
     sign: ClassVar[FaceSign] = Words("0")
@@ -42,11 +43,35 @@ class Ground(Block):
         shows="Zero at all times.",
     )
 
+    dimensions: ArrayLike = parameter(
+        1.0,
+        kind=ParameterKind.ARRAY,
+        dimensions=(0, 1),
+        minimum=1.0,
+        maximum=1e4,
+        tunable=False,
+        doc="shape of the output: 1 a scalar, n a vector, (m, n) a matrix",
+    )
+
+    def check(self) -> None:
+        given = np.atleast_1d(np.asarray(self.dimensions, dtype=np.float64))
+        if given.size > 2 or bool(np.any(given != np.floor(given))):
+            raise InputError(
+                f"the dimensions are {given.tolist()}",
+                where="Ground.dimensions",
+                allowed="1 (a scalar), n (a vector), or (m, n) (a matrix)",
+                fix="give one or two integers",
+            )
+
+    def _shape(self) -> tuple[int, ...]:
+        given = np.atleast_1d(np.asarray(self.dimensions, dtype=np.float64)).tolist()
+        return () if given == [1.0] else tuple(int(size) for size in given)
+
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "zero", shape=()),)
+        return (Port("y", "zero", shape=self._shape()),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": SX(0.0)}
+        return {"y": SX.zeros(*(self._shape() or (1,)))}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,13 +152,15 @@ class FromTable(Block):
         parameters={"times": (0.0, 2.0, 5.0, 8.0), "values": (0.0, 1.0, -1.0, 0.5), "method": "cubic"},
     )
 
-    times: ArrayLike = parameter((0.0, 1.0), dimensions=(1,), tunable=False, doc="instants (n,)", unit="s")
+    times: ArrayLike = parameter(
+        (0.0, 1.0), dimensions=(1,), tunable=False, doc="sample times (n,)", unit="s"
+    )
     values: ArrayLike = parameter((0.0, 1.0), dimensions=(1, 2), doc="values at the times, (n,) or (n, m)")
     method: str = parameter("linear", choices=("linear", "flat", "cubic"), doc="interpolation method")
     outside: str = parameter("hold", choices=("hold", "linear", "zero"), doc="extrapolation method")
 
     def check(self) -> None:
-        rising("FromTable", "times", self.times, shape_of(self.values)[0])
+        ascending_positions("FromTable", "times", self.times, shape_of(self.values)[0])
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the signal: a scalar, or a vector (m,)"),)
@@ -194,7 +221,7 @@ class FromTable(Block):
     @property
     def spline(self) -> Array:
         """The values and derivatives of a long cubic table, row by row."""
-        return with_slopes((tuple(self._times()),), self.values)
+        return with_derivatives((tuple(self._times()),), self.values)
 
     def _times(self) -> list[float]:
         return [float(time) for time in np.ravel(cast("Any", self.times))]

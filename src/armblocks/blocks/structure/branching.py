@@ -13,13 +13,13 @@ from armblocks.diagram import Block, Guard, Port, Shapes, Signals, State, Worked
 from armblocks.errors import InputError
 from armblocks.matlab.formula import Formula
 
-JUST = 1e-300
+THRESHOLD_OFFSET = 1e-300
 """An offset below the resolution of any signal, which assigns the border itself to one side."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class If(Block):
-    """Activates one action subsystem by conditions: the first whose condition is true, else the last.
+    """Activates the action subsystem of the first condition that is true, else the last subsystem.
 
     The conditions are formulas over the inputs (``u``, or ``u1``, ``u2``, … where there are several), written
     as in the Expression block and separated by semicolons: ``u > 0.5; u > 0``. The output of the active
@@ -102,7 +102,7 @@ class If(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class SwitchCase(Block):
-    """Activates one action subsystem by an integer: the case that contains u truncated to an integer.
+    """Activates the action subsystem whose case contains the integer part of u.
 
     Cases are separated by semicolons, and a case may have several numbers: ``1; 2 3; 4``. The output of the
     case with that number is 1. If no case has it, the output ``default`` is 1.
@@ -123,9 +123,9 @@ class SwitchCase(Block):
         wrong = [text for text in found if not text.removeprefix("-").isdecimal() or not text.isascii()]
         twice = [text for text in found if found.count(text) > 1]
         if wrong or twice or not all(self._texts()):
-            said = f"'{(wrong or twice)[0]}' is not allowed" if wrong or twice else "a case has no number"
+            message = f"'{(wrong or twice)[0]}' is not allowed" if wrong or twice else "a case has no number"
             raise InputError(
-                f"the cases are '{self.cases}': {said}",
+                f"the cases are '{self.cases}': {message}",
                 where="SwitchCase.cases",
                 allowed="distinct integers, such as 1; 2 3; 4",
                 fix="correct the list",
@@ -177,7 +177,7 @@ class SwitchCase(Block):
         return {
             "borders": vertcat(
                 *(
-                    u["u"] - edge + (JUST if edge > 0.0 else -JUST)
+                    u["u"] - edge + (THRESHOLD_OFFSET if edge > 0.0 else -THRESHOLD_OFFSET)
                     for edges in self._edges()
                     for edge in edges
                 )

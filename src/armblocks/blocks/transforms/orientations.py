@@ -309,7 +309,7 @@ class QuaternionNormalize(Block):
         return (Port("u", f"a quaternion, {_QUATERNION}", shape=(4,)),)
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", f"of unit length, {_QUATERNION}", shape=(4,)),)
+        return (Port("y", f"the quaternion of unit length, {_QUATERNION}", shape=(4,)),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": u["u"] / sqrt(dot(u["u"], u["u"]))}

@@ -292,7 +292,7 @@ class PoseIntegration(Block):
     )
 
     axes: str = parameter("body", choices=_FRAMES, doc="the axes of the velocity")
-    position: ArrayLike = parameter((0.0, 0.0, 0.0), dimensions=(1,), doc="at t = 0 (3,)", unit="m")
+    position: ArrayLike = parameter((0.0, 0.0, 0.0), dimensions=(1,), doc="position at t = 0 (3,)", unit="m")
     quaternion: ArrayLike = parameter(
         (1.0, 0.0, 0.0, 0.0), dimensions=(1,), doc="orientation at t = 0, scalar first (4,), of any length"
     )

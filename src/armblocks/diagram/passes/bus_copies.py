@@ -1,8 +1,8 @@
 """Pass: a block that passes signals on unchanged is copied for each signal of a bus.
 
 A Switch between two buses selects each pair of their signals; a Unit Delay delays each signal. The elements
-of a bus are propagated along the connections from Bus Creators; in a loop through a delay they come from the
-bus that enters the loop.
+of a bus are propagated along the connections from Bus Creators and commented blocks; in a loop through a
+delay they come from the bus that enters the loop.
 
 Takes: blocks with ``bus_inputs`` that may receive buses; replacements for all virtual blocks.
 
@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 from armblocks.diagram.block import Block
 from armblocks.diagram.bus import Bus, Carried
+from armblocks.diagram.grounded import Bypass
 from armblocks.diagram.passes.contents import Contents
 from armblocks.diagram.passes.netlist import Netlist, Replacement, Replacements
 from armblocks.diagram.port import PortRef
@@ -31,7 +32,7 @@ def copy_for_buses(net: Netlist) -> Netlist:
 
     The replacements of the originals raise ``DiagramError`` where the buses at two inputs differ.
     """
-    if not any(isinstance(block, BusCreator) for block in net.blocks.values()):
+    if not any(isinstance(block, BusCreator | Bypass) for block in net.blocks.values()):
         return net
     copied = _copied(net)
     blocks = {path: block for path, block in net.blocks.items() if path not in copied}
@@ -132,11 +133,11 @@ class _CopiedBlock:
             found = carried.element(element)
             if there == set(self.elements) and found is not None:
                 return found
-            said = f"a bus with {_listed(path for path, _ in carried.leaves())}"
+            text = f"a bus with {_listed(path for path, _ in carried.leaves())}"
         else:
-            said = f"the single signal '{carried}'"
+            text = f"the single signal '{carried}'"
         raise DiagramError(
-            f"input '{self.given}' is a bus with {_listed(self.elements)}, but input '{port}' is {said}",
+            f"input '{self.given}' is a bus with {_listed(self.elements)}, but input '{port}' is {text}",
             where=f"block '{self.path}' ({self.block.title})",
             allowed="buses with the same names of elements at all of these inputs",
             fix="make them alike with Bus Creators, or take single signals with Bus Selectors",

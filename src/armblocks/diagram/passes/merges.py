@@ -15,6 +15,7 @@ from armblocks.diagram.conditional import Merge
 from armblocks.diagram.conditional_equations import RESTART
 from armblocks.diagram.controls import HeldOutput, MergedOutput
 from armblocks.diagram.diagram import Gate
+from armblocks.diagram.grounded import Grounded
 from armblocks.diagram.passes.netlist import Netlist
 from armblocks.diagram.port import PortRef
 from armblocks.errors import DiagramError
@@ -26,7 +27,8 @@ def resolve_merges(net: Netlist) -> Netlist:
     if not merges:
         return net
     blocks: dict[str, Block] = dict(net.blocks)
-    drivers, gates = dict(net.drivers), dict(net.gates)
+    drivers, gates, origins = dict(net.drivers), dict(net.gates), dict(net.origins)
+    carried = dict(net.carried)
     for path, block in merges.items():
         outer: Gate = gates.pop(path, {})
         anew = RESTART in outer
@@ -34,13 +36,22 @@ def resolve_merges(net: Netlist) -> Netlist:
         if anew:
             drivers[PortRef(path, "anew")] = outer[RESTART]
         for number in range(1, block.inputs + 1):
-            drivers[PortRef(path, f"works{number}")] = _works(net, path, f"u{number}")
-    return dataclasses.replace(net, blocks=blocks, drivers=drivers, gates=gates)
+            works = _works(net, path, f"u{number}")
+            if works is None:  # a subsystem that is commented out
+                never = f"{path}.works{number}"
+                blocks[never], origins[never] = Grounded.of({"y": ()}), path
+                works = carried[PortRef(never, "y")] = PortRef(never, "y")
+            drivers[PortRef(path, f"works{number}")] = works
+    return dataclasses.replace(
+        net, blocks=blocks, drivers=drivers, gates=gates, origins=origins, carried=carried
+    )
 
 
-def _works(net: Netlist, path: str, port: str) -> PortRef:
-    """The signal that is 1 while the subsystem of an input is active."""
+def _works(net: Netlist, path: str, port: str) -> PortRef | None:
+    """The signal that is 1 while the subsystem of an input is active; ``None`` if it never is."""
     carried = net.at(path, port)
+    if isinstance(carried, PortRef) and isinstance(net.blocks[carried.block], Grounded):
+        return None
     if isinstance(carried, PortRef) and isinstance(net.blocks[carried.block], HeldOutput):
         return net.drivers[PortRef(carried.block, "works")]
     source = f"'{carried}'" if isinstance(carried, PortRef) else "a bus"

@@ -41,6 +41,23 @@ Replacements = Mapping[str, Replacement]
 
 
 @dataclass(frozen=True, kw_only=True)
+class KnownSignals:
+    """Contents and shapes of the signals of the model without comments, as far as they are known."""
+
+    carried: Mapping[PortRef, Carried] = field(default_factory=dict[PortRef, Carried])
+    shapes: Mapping[PortRef, Shape] = field(default_factory=dict[PortRef, Shape])
+
+    def at(self, ref: PortRef) -> Carried:
+        """The signal or bus at an output port of the hierarchy."""
+        return self.carried.get(ref, ref)
+
+    def shape(self, ref: PortRef) -> Shape | None:
+        """The shape at an output port of the hierarchy; ``None`` for a bus and an unknown shape."""
+        carried = self.at(ref)
+        return self.shapes.get(carried) if isinstance(carried, PortRef) else None
+
+
+@dataclass(frozen=True, kw_only=True)
 class Netlist:
     """Blocks by path and their connections, in any state between the hierarchy and the flat diagram.
 
@@ -55,6 +72,11 @@ class Netlist:
     """Every block by path, level by level, and then the blocks that passes have added."""
     drivers: Mapping[PortRef, PortRef]
     """The output port that is connected to each input port."""
+    commented: Mapping[str, str] = field(default_factory=dict[str, str])
+    """The outermost commented blocks by path, see :mod:`armblocks.diagram.comments`; empty after their
+    pass."""
+    without_comments: KnownSignals = field(default_factory=KnownSignals)
+    """The signals of the same model without comments."""
     replaced: Mapping[str, Replacements] = field(default_factory=dict[str, Replacements])
     """The blocks that the last pass removes, by path, with the contents of their output ports."""
     gates: Mapping[str, Gate] = field(default_factory=dict[str, Gate])
@@ -114,7 +136,11 @@ class Netlist:
         )
 
 
-def netlist(levels: Mapping[str, Diagram]) -> Netlist:
+def netlist(
+    levels: Mapping[str, Diagram],
+    commented: Mapping[str, str] | None = None,
+    without_comments: KnownSignals | None = None,
+) -> Netlist:
     """The netlist of a hierarchy before all passes; ``levels`` has the top first."""
     blocks: dict[str, Block] = {}
     drivers: dict[PortRef, PortRef] = {}
@@ -124,4 +150,11 @@ def netlist(levels: Mapping[str, Diagram]) -> Netlist:
         for wire in diagram.connections:
             source = PortRef(joined(level, wire.source.block), wire.source.port)
             drivers[PortRef(joined(level, wire.target.block), wire.target.port)] = source
-    return Netlist(top=levels[""], levels=levels, blocks=blocks, drivers=drivers)
+    return Netlist(
+        top=levels[""],
+        levels=levels,
+        blocks=blocks,
+        drivers=drivers,
+        commented=commented or {},
+        without_comments=without_comments or KnownSignals(),
+    )

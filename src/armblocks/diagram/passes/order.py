@@ -8,22 +8,23 @@ ports. A pass that reads signals comes after ``resolve_signals``.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
-from armblocks.diagram.diagram import Diagram
 from armblocks.diagram.passes.bus_copies import copy_for_buses
 from armblocks.diagram.passes.buses import resolve_buses
+from armblocks.diagram.passes.comments import resolve_comments
 from armblocks.diagram.passes.conditional_subsystems import resolve_conditional_subsystems
 from armblocks.diagram.passes.displays import resolve_displays
 from armblocks.diagram.passes.merges import resolve_merges
 from armblocks.diagram.passes.names import resolve_names
-from armblocks.diagram.passes.netlist import Netlist, netlist
+from armblocks.diagram.passes.netlist import Netlist
 from armblocks.diagram.passes.signals import resolve_signals
 from armblocks.diagram.passes.subsystems import resolve_subsystems
 from armblocks.diagram.passes.tags import resolve_tags
 from armblocks.diagram.passes.virtual_blocks import remove_virtual_blocks
 
 PASSES: tuple[Callable[[Netlist], Netlist], ...] = (
+    resolve_comments,
     resolve_conditional_subsystems,
     resolve_subsystems,
     resolve_tags,
@@ -37,9 +38,8 @@ PASSES: tuple[Callable[[Netlist], Netlist], ...] = (
 )
 
 
-def flat_netlist(levels: Mapping[str, Diagram]) -> Netlist:
-    """The netlist of a hierarchy after all passes. Raises ``DiagramError``."""
-    net = netlist(levels)
+def resolved(net: Netlist) -> Netlist:
+    """A netlist after all passes. Raises ``DiagramError``."""
     for resolve in PASSES:
         net = resolve(net)
     return net

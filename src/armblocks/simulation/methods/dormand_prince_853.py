@@ -287,7 +287,7 @@ DOP853 = ButcherTableau(
         -0.022355307863886294,
         0.0,
     ),
-    stretched_error=(
+    second_error=(
         -0.18980075407240762,
         0.0,
         0.0,

@@ -1,8 +1,9 @@
 """The objects that an edit changes, for the detection of conflicts between concurrent edits.
 
 An aspect is a tuple: the names of the enclosing subsystems and of the block, followed by the changed part of
-the block. The part is ``""`` (the block was added or removed), ``place``, ``u <- wire``, ``u <- bends`` or
-the name of a parameter. For the diagram itself, ``/`` replaces the block name; no block name contains ``/``.
+the block. The part is ``""`` (the block was added or removed), ``place``, ``comment``, ``u <- wire``, ``u <-
+bends`` or the name of a parameter. For the diagram itself, ``/`` replaces the block name; no block name
+contains ``/``.
 """
 
 from __future__ import annotations
@@ -31,6 +32,12 @@ def changed_aspects(before: Diagram, after: Diagram, path: Aspect = ()) -> set[A
     for wire in before.bends.keys() | after.bends.keys():
         if before.bends.get(wire) != after.bends.get(wire):
             found.add((*path, wire.target.block, f"{wire.target.port} <- bends"))
+    for name in before.commented.keys() | after.commented.keys():
+        if before.commented.get(name) != after.commented.get(name):
+            found.add((*path, name, "comment"))
+    for ref in before.signal_names.keys() | after.signal_names.keys():
+        if before.signal_names.get(ref) != after.signal_names.get(ref):
+            found.add((*path, ref.block, f"{ref.port} -> name"))
     for note in before.notes.keys() | after.notes.keys():
         if before.notes.get(note) != after.notes.get(note):
             found.add((*path, "/", note))

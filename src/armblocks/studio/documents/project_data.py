@@ -13,6 +13,7 @@ from pathlib import Path
 from threading import Lock
 
 from armblocks.diagram import Diagram, TimeTable, UserFunction
+from armblocks.diagram.comments import active_levels
 from armblocks.diagram.function_files import (
     FunctionOutline,
     UnloadedFunction,
@@ -158,9 +159,14 @@ class ProjectData(DataFiles):
 
 
 def files_of(diagram: Diagram) -> Iterator[tuple[str, TimeTable | UserFunction]]:
-    """The tables and functions of files in a hierarchy, with the paths of their blocks."""
-    for level, sheet in levels_of(diagram).items():
+    """The tables and functions of files in a hierarchy, with the paths of their blocks.
+
+    Commented blocks are left out, because a run does not need them.
+    """
+    for level, sheet in active_levels(levels_of(diagram)).items():
         for name, block in sheet.blocks.items():
+            if name in sheet.commented:
+                continue
             for rule in block.own_parameters():
                 value = block.parameter_value(rule.name)
                 if not isinstance(value, TimeTable | UserFunction):

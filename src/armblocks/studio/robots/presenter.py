@@ -35,17 +35,19 @@ class RobotPresenter(Presenter[OpenRobot]):
     def open_file(self, path: str) -> Opening[OpenRobot]:
         """Open the robot of a file, or the robots of a script; robots of a script have no file yet."""
         if path.lower().endswith(".json"):
-            open_file, notes = _noted(lambda: self.files.open_path(path))
+            open_file, notes = _with_warnings(lambda: self.files.open_path(path))
             open_file.notes = notes or open_file.notes
             return Opening([open_file], open_file.notes)
         robots, notes = _read(self._folder.read(path), path)
         source = str(self._folder.path(path))
-        return self._brought((dataclasses.replace(robot, source=source) for robot in robots.values()), notes)
+        return self._opened_without_file(
+            (dataclasses.replace(robot, source=source) for robot in robots.values()), notes
+        )
 
     def dropped(self, data: bytes, name: str) -> Opening[OpenRobot]:
         """Open the robots of a file or script from outside the project."""
         robots, notes = _read(data, name)
-        return self._brought(robots.values(), notes)
+        return self._opened_without_file(robots.values(), notes)
 
     def content(self, open_file: OpenRobot, place: Place) -> RobotContent:
         """Return the tables of a robot."""
@@ -61,7 +63,7 @@ class RobotPresenter(Presenter[OpenRobot]):
             source = str(self._folder.path(open_file.path))
             await self._robot_saved(dataclasses.replace(open_file.robot, source=source))
 
-    def _brought(self, robots: Iterable[Robot], notes: tuple[str, ...]) -> Opening[OpenRobot]:
+    def _opened_without_file(self, robots: Iterable[Robot], notes: tuple[str, ...]) -> Opening[OpenRobot]:
         """Open robots that have no file."""
         opened = [self.files.bring(robot) for robot in robots]
         for open_file in opened:
@@ -71,7 +73,7 @@ class RobotPresenter(Presenter[OpenRobot]):
 
 def _read(data: bytes, name: str) -> tuple[Mapping[str, Robot], tuple[str, ...]]:
     """Return the robots of a file, and the warnings issued while it was read."""
-    robots, notes = _noted(lambda: formats.read_robots(data, name))
+    robots, notes = _with_warnings(lambda: formats.read_robots(data, name))
     if not robots:
         raise FormatError(
             "the file defines no robot",
@@ -82,7 +84,7 @@ def _read(data: bytes, name: str) -> tuple[Mapping[str, Robot], tuple[str, ...]]
     return robots, notes
 
 
-def _noted(read: Callable[[], Result]) -> tuple[Result, tuple[str, ...]]:
+def _with_warnings(read: Callable[[], Result]) -> tuple[Result, tuple[str, ...]]:
     """Return the result of ``read`` and the warnings that it issued."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", ArmblocksWarning)

@@ -41,10 +41,10 @@ class Checks:
             findings, wires = await asyncio.to_thread(check, diagram)
             # With faults, the shapes behind these blocks are unknown: only unconnected inputs are certain.
             return [*faults, *(finding for finding in findings if finding.port or not faults)], wires
-        said = await answer_of(write, self.job(diagram), MOST_SECONDS)
-        if not said:
+        message = await answer_of(write, self.job(diagram), MOST_SECONDS)
+        if not message:
             return [_finding("", f"the Python functions did not return within {MOST_SECONDS:g} s", _FIX)], {}
-        return _CHECKED.validate_json(said)
+        return _CHECKED.validate_json(message)
 
     def job(self, diagram: Diagram) -> dict[str, Any]:
         """Return the diagram and the files that it may read, for a worker process."""

@@ -1,8 +1,8 @@
 """A run with checkpoints: it can return to one and continue with identical results.
 
-Simulink's Step Back works the same way: it restores a snapshot. Instants between two checkpoints can be
+Simulink's Step Back works the same way: it restores a snapshot. Samples between two checkpoints can be
 reached as well, because a run that restarts from a checkpoint repeats the same steps bit for bit. Tuned
-values are not restored: they apply from the instant to which the run returns.
+values are not restored: they apply from the time to which the run returns.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from armblocks.simulation import RunState, Samples, Simulation
 Array = NDArray[np.float64]
 MOST_BYTES = 64 * 2**20
 """Limit of the memory of all checkpoints, bytes; beyond it every second checkpoint is removed."""
-FEWEST_MARKS = 8
+FEWEST_SNAPSHOTS = 8
 
 
 @dataclass(frozen=True)
-class Mark:
+class Snapshot:
     """A checkpoint: state and parameters of a run; ``state`` is ``None`` before the first step."""
 
     recorded: int
@@ -52,76 +52,76 @@ class Mark:
 
 
 class RunHistory:
-    """One run of a model with checkpoints; the numbers of its instants continue after each return."""
+    """One run of a model with checkpoints; the numbers of its samples continue after each return."""
 
     def __init__(self, model: CompiledDiagram) -> None:
         self.run: DiagramRun = model.begin()
-        self._marks = [Mark(0, None, self.run.diagram, self.run.parameters)]
+        self._snapshots = [Snapshot(0, None, self.run.diagram, self.run.parameters)]
         self._begin = 0
-        """Number of the first new instant of ``run``, which restarts at a checkpoint."""
+        """Number of the first new sample of ``run``, which restarts at a checkpoint."""
 
     @property
     def recorded(self) -> int:
-        """Number of recorded instants."""
-        # A resumed run records its initial instant, which was recorded before the return already.
+        """Number of recorded samples."""
+        # A resumed run records a sample at its start, which was already recorded before the return.
         return self._begin + max(0, self.run.recorded - (self._begin > 0))
 
     def samples(self, begin: int) -> Samples:
-        """Signals at the recorded instants from number ``begin`` on."""
-        fresh = self.run.samples(begin - self._begin + (self._begin > 0))
-        return dataclasses.replace(fresh, begin=begin)
+        """Signals of the recorded samples from number ``begin`` on."""
+        samples = self.run.samples(begin - self._begin + (self._begin > 0))
+        return dataclasses.replace(samples, begin=begin)
 
-    def mark(self) -> None:
+    def add_snapshot(self) -> None:
         """Add a checkpoint at the present state."""
-        run, marks = self.run, self._marks
-        if run.finished or self.recorded <= marks[-1].recorded:
+        run, snapshots = self.run, self._snapshots
+        if run.finished or self.recorded <= snapshots[-1].recorded:
             return
-        marks.append(Mark(self.recorded, run.state(), run.diagram, run.parameters))
-        if len(marks) > FEWEST_MARKS and sum(mark.size for mark in marks) > MOST_BYTES:
-            del marks[1:-1:2]
+        snapshots.append(Snapshot(self.recorded, run.state(), run.diagram, run.parameters))
+        if len(snapshots) > FEWEST_SNAPSHOTS and sum(snapshot.size for snapshot in snapshots) > MOST_BYTES:
+            del snapshots[1:-1:2]
 
     def step(self) -> None:
-        """Advance until at least one more instant is recorded; one solver step may record several."""
-        self.mark()
+        """Advance until at least one more sample is recorded; one solver step may record several."""
+        self.add_snapshot()
         before = self.recorded
         while self.recorded == before and not self.run.finished:
             self.run.advance(steps=1)
 
     def tune(self, path: str, value: object) -> None:
-        """Change a parameter from the present instant on; raises the errors of :meth:`DiagramRun.set`."""
-        self.mark()
+        """Change a parameter from the present time on; raises the errors of :meth:`DiagramRun.set`."""
+        self.add_snapshot()
         self.run.set(path, np.asarray(value, dtype=np.float64))
 
-    def back_to(self, recorded: int) -> None:
-        """Return to the latest state with at most ``recorded`` instants, but not before the first step.
+    def return_to_sample(self, recorded: int) -> None:
+        """Return to the latest state with at most ``recorded`` samples, but not before the first step.
 
         The present tuned values apply from there on.
         """
         tuned = self.run.diagram
-        while len(self._marks) > 1 and self._marks[-1].recorded > recorded:
-            self._marks.pop()
-        self._resume(self._marks[-1])
-        # One checkpoint a step: a step that records too many instants is reverted to its own checkpoint.
+        while len(self._snapshots) > 1 and self._snapshots[-1].recorded > recorded:
+            self._snapshots.pop()
+        self._resume(self._snapshots[-1])
+        # One checkpoint a step: a step that records too many samples is reverted to its own checkpoint.
         while self.recorded < recorded and not self.run.finished:
             self.step()
-        if self.recorded > recorded and len(self._marks) > 1:
-            self._resume(self._marks[-1])
+        if self.recorded > recorded and len(self._snapshots) > 1:
+            self._resume(self._snapshots[-1])
         self._tune_to(tuned)
 
-    def stand_at(self, time: float) -> None:
+    def return_to_time(self, time: float) -> None:
         """Return to exactly ``time`` (s), which the last step has passed; the step is repeated up to it."""
-        while len(self._marks) > 1 and self._marks[-1].time > time:
-            self._marks.pop()
+        while len(self._snapshots) > 1 and self._snapshots[-1].time > time:
+            self._snapshots.pop()
         tuned = self.run.diagram
-        self._resume(self._marks[-1])
+        self._resume(self._snapshots[-1])
         self._tune_to(tuned)
         self.run.advance(time, exactly=True)
 
-    def _resume(self, mark: Mark) -> None:
+    def _resume(self, snapshot: Snapshot) -> None:
         simulation = self.run.simulation
-        again = Simulation(simulation.compiled, simulation.options, mark.parameters, mark.state)
-        self.run = DiagramRun(mark.diagram, again)
-        self._begin = mark.recorded
+        resumed = Simulation(simulation.compiled, simulation.options, snapshot.parameters, snapshot.state)
+        self.run = DiagramRun(snapshot.diagram, resumed)
+        self._begin = snapshot.recorded
 
     def _tune_to(self, diagram: Diagram) -> None:
         """Set the tunable parameters to their values in another version of the diagram."""

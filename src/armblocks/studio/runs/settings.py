@@ -31,14 +31,14 @@ _RULES = (
         "sample_time",
         "Sample time of the record",
         "s",
-        "Spacing of the recorded instants; no effect on the steps. Empty: the fixed step, else a thousandth "
+        "Interval between samples; no effect on the steps. Empty: the fixed step, else a thousandth "
         "of the run.",
     ),
     (
         "record_jumps",
         "Record jumps",
         "",
-        "Record both sides of every jump of a signal, also between the recorded instants.",
+        "Record both sides of every jump of a signal, also between the samples.",
     ),
 )
 

@@ -61,7 +61,7 @@ def work(pipe: Connection) -> None:
 
 
 def stride_of(run: DiagramRun) -> int:
-    """Number of instants that are reduced to their extremes; 1 unless the samples fill the page's memory."""
+    """Number of samples that are reduced to their extremes; 1 unless the samples fill the page's memory."""
     numbers = run.simulation.planned * (1 + run.simulation.compiled.signals_layout.size)
     return 1 if numbers <= MOST_NUMBERS else math.ceil(2 * numbers / MOST_NUMBERS)
 
@@ -117,13 +117,13 @@ class _Run:
         self.time = 0.0
         """Time up to which samples were sent, s; without a real-time factor the run may be one step ahead."""
         self.count = 0
-        """Number of recorded instants that were sent."""
+        """Number of samples that were sent."""
         self.stride = 1
-        """Number of instants that are reduced to their extremes."""
+        """Number of samples that are reduced to their extremes."""
         self.times: Array = np.empty(0)
         """Times of the rows that were sent: samples and both sides of jumps, s."""
         self.numbers: NDArray[np.intp] = np.empty(0, dtype=np.intp)
-        """For each row, the number of instants up to the one that it was sent with."""
+        """For each row, the number of samples up to the one with which it was sent."""
         self.began = perf_counter()
 
     def run(self) -> None:
@@ -162,14 +162,14 @@ class _Run:
                 return
 
     def _advance(self, history: RunHistory) -> None:
-        """Advance by one instant if paused, else up to the clock time or for the duration of a frame."""
+        """Advance by one sample if paused, else up to the clock time or for the duration of a frame."""
         run = history.run
         if self.state == "paused":
             history.step()
             return
         due = self.pace.due
         if run.time < due:
-            history.mark()
+            history.add_snapshot()
             run.advance(None if due == math.inf else due, wall_time=FRAME_SECONDS)
 
     def _listen(self, history: RunHistory) -> bool:
@@ -212,7 +212,7 @@ class _Run:
         self._progress()
 
     def _tune(self, history: RunHistory, parameter: str, value: Any) -> None:
-        """Change a parameter from the present instant on; report an invalid value and continue."""
+        """Change a parameter from the present time on; report an invalid value and continue."""
         try:
             self._stand_where_shown(history)
             history.tune(parameter, tuned_value(value, parameter))
@@ -225,8 +225,8 @@ class _Run:
             )
 
     def _go_back(self, history: RunHistory, recorded: int) -> None:
-        """Return to at most ``recorded`` recorded instants; tuned values apply from there on."""
-        history.back_to(max(recorded, 1))
+        """Return to at most ``recorded`` samples; tuned values apply from there on."""
+        history.return_to_sample(max(recorded, 1))
         self.count, self.time = history.recorded, history.run.time
         sent = int(np.searchsorted(self.numbers, self.count, "right"))
         self.times, self.numbers = self.times[:sent], self.numbers[:sent]
@@ -236,7 +236,7 @@ class _Run:
     def _stand_where_shown(self, history: RunHistory) -> None:
         """Return to the displayed time if the run is beyond it, and send all samples up to there."""
         if history.run.time > self.time:
-            history.stand_at(self.time)
+            history.return_to_time(self.time)
             self._send_samples(history)
 
     # -- messages to the hub ---------------------------------------------------------------------------------
@@ -253,7 +253,11 @@ class _Run:
                 stop_time=run.stop_time,
                 channels=[
                     run_messages.Channel(
-                        name=slot.name, shape=list(slot.shape), unit=slot.unit, entries=list(slot.entries)
+                        name=slot.name,
+                        shape=list(slot.shape),
+                        unit=slot.unit,
+                        entries=list(slot.entries),
+                        title=slot.title,
                     )
                     for slot in run.simulation.signals_layout
                 ],
@@ -289,7 +293,7 @@ class _Run:
         """Send samples, with both sides of the jumps between the last sample sent and the last of these."""
         begin = float(self.times[-1]) if self.times.size else -math.inf
         instants = time
-        time, signals = merged(time, signals, jumps.table.only(slice(None), begin, float(time[-1])))
+        time, signals = merged(time, signals, jumps.table.selected(slice(None), begin, float(time[-1])))
         if self.stride > 1:
             ends = time[-1:], signals[:, -1:]
             time, signals = thinned(time, signals, self.stride)
@@ -297,7 +301,7 @@ class _Run:
                 time, signals = np.append(time, ends[0]), np.append(signals, ends[1], axis=1)
         self.pipe.send_bytes(b"S" + sample_frame(self.key, self.times.size, time, signals))
         self.times = np.concatenate([self.times, time])
-        # A side of a jump belongs to the next instant: on a return before that, it is sent again.
+        # A side of a jump belongs to the next sample: after a return to an earlier time, it is sent again.
         numbers = self.count + 1 + np.searchsorted(instants, time)
         self.numbers = np.concatenate([self.numbers, numbers])
         self.count += instants.size

@@ -112,13 +112,13 @@ class Answers:
 
     async def drawing(self, request: Request) -> Response:
         """Return a sheet as a file for download."""
-        asked, kind = request.query_params, request.path_params["kind"]
-        theme = asked.get("theme")
+        requested, kind = request.query_params, request.path_params["kind"]
+        theme = requested.get("theme")
         if theme not in THEMES:
             return PlainTextResponse("the theme must be light or dark", 422)
         hub, document = await self.hub.here(), request.path_params["document"]
         try:
-            data = await hub.drawing(document, kind, sheet=asked.get("sheet", ""), theme=theme)
+            data = await hub.drawing(document, kind, sheet=requested.get("sheet", ""), theme=theme)
         except ArmblocksError as error:
             return PlainTextResponse(str(error), 404)
         return Response(data, media_type=DRAWING_TYPES[kind])

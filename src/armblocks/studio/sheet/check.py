@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Mapping
 
-from armblocks.diagram import Bus, Diagram, PortRef, flatten_hierarchy, infer_shapes, infer_units
+from armblocks.diagram import Bus, Diagram, PortRef, flatten_hierarchy, infer_shapes, infer_units, open_inputs
 from armblocks.diagram.check import check_diagram
 from armblocks.diagram.levels import joined, levels_of
 from armblocks.errors import AlgebraicLoopError, ArmblocksError, DiagramError
@@ -20,16 +20,9 @@ def check(diagram: Diagram) -> tuple[list[Finding], dict[str, WireKind]]:
         levels = levels_of(diagram)
     except DiagramError as error:
         return _findings(error, (), {}), {}
-    open_inputs = [
-        (joined(path, name), port.name)
-        for path, level in levels.items()
-        for name, block in level.blocks.items()
-        for port in block.input_ports()
-        if PortRef(name, port.name) not in level.drivers
-    ]
-    if open_inputs:
+    if unconnected := list(open_inputs(levels)):
         # Shapes and loops can be checked only when every input has a driver.
-        return [_open_input(block, port) for block, port in open_inputs], {}
+        return [_open_input(ref.block, ref.port) for ref in unconnected], {}
     known = [joined(path, name) for path, level in levels.items() for name in level.blocks]
     try:
         wires = _wires(diagram)

@@ -56,6 +56,8 @@ def clipped(
         bends=diagram.bends,
         notes={name: note for name, note in diagram.notes.items() if name in notes},
         logged=tuple(ref for ref in diagram.logged if ref.block in chosen),
+        commented=diagram.commented,
+        signal_names=diagram.signal_names,
         mask=diagram.mask,
         mask_values=diagram.mask_values,
     )
@@ -109,7 +111,27 @@ def pasted(
         bends={**diagram.bends, **bends},
         notes={**diagram.notes, **shifted},
         logged=(*diagram.logged, *(moved(ref) for ref in copied.logged)),
+        signal_names={**diagram.signal_names, **_unused_names(diagram, copied, blocks, moved)},
+        commented={
+            **diagram.commented,
+            **{names.get(name, name): comment for name, comment in copied.commented.items()},
+        },
     )
+
+
+def _unused_names(
+    diagram: Diagram, copied: Diagram, blocks: Collection[str], moved: Callable[[PortRef], PortRef]
+) -> dict[PortRef, str]:
+    """The names of the copied signals, numbered where a block or another signal of the sheet has the name."""
+    taken = {folded(name) for name in (*diagram.blocks, *blocks, *diagram.signal_names.values())}
+    found: dict[PortRef, str] = {}
+    for ref, wish in copied.signal_names.items():
+        name, number = wish, 2
+        while folded(name) in taken:
+            name, number = f"{wish} {number}", number + 1
+        taken.add(folded(name))
+        found[moved(ref)] = name
+    return found
 
 
 def leaves_sideways(wire: Connection, diagram: Diagram) -> bool:

@@ -24,6 +24,7 @@ from armblocks.diagram import (
     ParameterKind,
     Placement,
     PortRef,
+    check_comment,
     with_parameters,
 )
 from armblocks.diagram.diagram import block_in_scope
@@ -38,13 +39,16 @@ from armblocks.studio.protocol.messages.sheet_edits import (
     ArrangeBlocks,
     BendWires,
     BreakLink,
+    CommentBlocks,
     Connect,
     Describe,
     DiagramEdit,
+    GroundPorts,
     GroupBlocks,
     KeepTuned,
     LogSignal,
     MoveBlocks,
+    NameSignal,
     NewBlock,
     PasteBlocks,
     Place,
@@ -58,6 +62,7 @@ from armblocks.studio.protocol.messages.sheet_edits import (
     Wire,
 )
 from armblocks.studio.sheet.clipping import ReadDiagram, leaves_sideways, pasted, reader
+from armblocks.studio.sheet.grounding import grounded
 from armblocks.studio.sheet.mask_edits import with_mask
 from armblocks.studio.sheet.nesting import check_free, grouped, unlinked, with_block
 from armblocks.studio.sheet.parameter_values import ResolveRobot, parameter_value, tuned_value
@@ -329,7 +334,38 @@ def _rename(edit: Rename, diagram: Diagram, _: EditContext) -> Diagram:
         connections=tuple(wires.values()),
         bends={wires[wire]: bends for wire, bends in diagram.bends.items()},
         logged=tuple(moved(ref) for ref in diagram.logged),
+        commented={renamed(name): comment for name, comment in diagram.commented.items()},
+        signal_names={moved(ref): name for ref, name in diagram.signal_names.items()},
     )
+
+
+@EDITS.on(NameSignal, lambda edit: f"name {edit.port}" if edit.name else f"remove the name of {edit.port}")
+def _name_signal(edit: NameSignal, diagram: Diagram, _: EditContext) -> Diagram:
+    ref = _port(edit.port)
+    _check_port(ref, diagram, output=True)
+    named = {other: name for other, name in diagram.signal_names.items() if other != ref}
+    if edit.name.strip():
+        named[ref] = edit.name.strip()
+    return dataclasses.replace(diagram, signal_names=named)
+
+
+@EDITS.on(GroundPorts, lambda edit: "ground and terminate ports")
+def _ground(edit: GroundPorts, diagram: Diagram, _: EditContext) -> Diagram:
+    return grounded(diagram, {_known(name, diagram) for name in edit.blocks} or set(diagram.blocks))
+
+
+_COMMENTED = {"out": "comment out", "through": "comment through", "": "uncomment"}
+
+
+@EDITS.on(CommentBlocks, lambda edit: f"{_COMMENTED[edit.comment]} {_listed(edit.blocks)}")
+def _comment(edit: CommentBlocks, diagram: Diagram, _: EditContext) -> Diagram:
+    chosen = {_known(name, diagram) for name in edit.blocks}
+    commented = {name: comment for name, comment in diagram.commented.items() if name not in chosen}
+    if edit.comment:
+        for name in sorted(chosen):
+            check_comment(name, diagram.blocks[name], edit.comment)
+        commented |= dict.fromkeys(chosen, edit.comment)
+    return dataclasses.replace(diagram, commented=commented)
 
 
 @EDITS.on(SetParameters, lambda edit: f"change {edit.block}")

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from armblocks.diagram import Connection, Diagram
 from armblocks.drawing.diagram_drawing import obstacle, wire_label, wire_nets
 from armblocks.drawing.diagram_layout import boxes
+from armblocks.drawing.wire_names import name_place
 from armblocks.drawing.wire_routing import Routing
 from armblocks.drawing.wires import moved_bends
 from armblocks.studio.protocol.messages.sheets import WireLines
@@ -61,6 +62,10 @@ class SheetLines:
                 paths={str(target): list(path) for target, path in zip(targets, routed[str(source)].paths)},
                 dots=list(routed[str(source)].dots),
                 label=wire_label(sheet, source),
+                name=sheet.signal_names.get(source, ""),
+                name_at=name_place(
+                    sheet.signal_names.get(source, ""), routed[str(source)].paths, obstacles.values()
+                ),
             )
             for source, targets in wires.items()
         }

@@ -99,6 +99,9 @@ def with_block(diagram: Diagram, name: str, block: Block) -> Diagram:
             and (wire.target.block != name or wire.target.port in into)
         ),
         logged=tuple(ref for ref in diagram.logged if ref.block != name or ref.port in out),
+        signal_names={
+            ref: given for ref, given in diagram.signal_names.items() if ref.block != name or ref.port in out
+        },
     )
 
 
@@ -145,7 +148,8 @@ def grouped(names: Sequence[str], name: str, diagram: Diagram) -> Diagram:
     """Return the diagram with some of its blocks inside a new subsystem; all signals are unchanged.
 
     Each outside source that feeds the group becomes an In block, and each port of the group that feeds an
-    outside input becomes an Out block; they are named after that source or port.
+    outside input becomes an Out block; they are named after that source or port. Names of signals remain,
+    inside and at the new outputs.
     """
     where = f"diagram '{diagram.name}'"
     group = {entry: diagram.block(entry) for entry in names}
@@ -158,7 +162,7 @@ def grouped(names: Sequence[str], name: str, diagram: Diagram) -> Diagram:
     leaving = sorted(
         {w.source for w in diagram.connections if w.source.block in group and w.target.block not in group}
     )
-    free = _FreeNames(group)
+    free = _FreeNames((*group, *diagram.signal_names.values()))
     ins = {source: free.name(source) for source in entering}
     outs = {source: free.name(source) for source in leaving}
     inner_wires = [
@@ -177,6 +181,8 @@ def grouped(names: Sequence[str], name: str, diagram: Diagram) -> Diagram:
         layout=_inner_layout(diagram, list(group), list(ins.values()), list(outs.values())),
         bends=diagram.bends,
         logged=tuple(ref for ref in diagram.logged if ref.block in group),
+        commented={entry: comment for entry, comment in diagram.commented.items() if entry in group},
+        signal_names={ref: given for ref, given in diagram.signal_names.items() if ref.block in group},
     )
     outer_wires = [
         wire if wire.source.block not in group else Connection(PortRef(name, outs[wire.source]), wire.target)
@@ -195,6 +201,12 @@ def grouped(names: Sequence[str], name: str, diagram: Diagram) -> Diagram:
         connections=tuple(outer_wires),
         layout={k: p for k, p in diagram.layout.items() if k not in group} | {name: middle},
         logged=tuple(ref for ref in diagram.logged if ref.block not in group),
+        signal_names={
+            PortRef(name, outs[ref]) if ref in outs else ref: given
+            for ref, given in diagram.signal_names.items()
+            if ref in outs or ref.block not in group
+        },
+        commented={entry: comment for entry, comment in diagram.commented.items() if entry not in group},
     )
 
 
@@ -215,7 +227,7 @@ def _inner_layout(
 class _FreeNames:
     """Unique names for the In and Out blocks of a group."""
 
-    def __init__(self, taken: dict[str, Block]) -> None:
+    def __init__(self, taken: Sequence[str]) -> None:
         self._taken = {folded(name) for name in taken}
 
     def name(self, source: PortRef) -> str:

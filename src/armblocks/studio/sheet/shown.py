@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Mapping
 from functools import lru_cache
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal, cast
 
 from armblocks.blocks import BLOCKS
 from armblocks.diagram import Block, Connection, Diagram, DiagramBlock, Parameter, ParameterKind, Placement
@@ -58,6 +58,7 @@ def sheet_change(
     for name, block in after.blocks.items():
         same = before.blocks.get(name) is block and (shown[name] is shows[name] or shown[name] == shows[name])
         same = same and turned.get(name) == turns.get(name)
+        same = same and before.commented.get(name) == after.commented.get(name)
         if not same or before.layout.get(name) != after.layout.get(name):
             blocks[name] = _sheet_block(name, block, after)
     old, new = (
@@ -126,7 +127,9 @@ def _default(kind: type[Block]) -> Block:
 def _sheet_block(name: str, block: Block, diagram: Diagram) -> SheetBlock:
     place = diagram.layout[name]
     shown = drawn_blocks(diagram)[name]
-    drawn = _drawn(shown, dataclasses.replace(place, x=0.0, y=0.0), sum_sides(diagram).get(name))
+    standing = dataclasses.replace(place, x=0.0, y=0.0)
+    comment = cast("Literal['out', 'through', '']", diagram.commented.get(name, ""))
+    drawn = _drawn(shown, standing, sum_sides(diagram).get(name), comment)
     own: dict[str, Any] = {"name": name, "place": Place(**dataclasses.asdict(place))}
     if shown is not block or _names_files(type(block)):
         own["parameters"] = _parameters(block)  # equal tables may come from different files
@@ -139,7 +142,9 @@ def _names_files(kind: type[Block]) -> bool:
 
 
 @lru_cache(maxsize=4096)
-def _drawn(block: Block, place: Placement, sides: SumSides | None) -> SheetBlock:
+def _drawn(
+    block: Block, place: Placement, sides: SumSides | None, comment: Literal["out", "through", ""]
+) -> SheetBlock:
     """Draw a block at the origin; the result is cached, so that equal blocks are drawn once."""
     box = standing_box("", block, place)
     if sides is not None:
@@ -152,7 +157,8 @@ def _drawn(block: Block, place: Placement, sides: SumSides | None) -> SheetBlock
         place=Place(x=0.0, y=0.0),
         width=box.width,
         height=box.height,
-        face=_face(box),
+        face=_face(box, comment),
+        comment=comment,
         inputs=_spots(box, into, inputs=True),
         outputs=_spots(box, out, inputs=False),
         opens=isinstance(block, DiagramBlock),
@@ -171,9 +177,9 @@ def _parameters(block: Block) -> dict[str, Any]:
     }
 
 
-def _face(box: Box) -> str:
+def _face(box: Box, comment: str = "") -> str:
     try:
-        marks = block_marks(box)
+        marks = block_marks(box, comment=comment)
     except ArmblocksError:
         # An error in the drawing of a face (a robot without links) must not prevent the display of the sheet.
         marks = block_marks(dataclasses.replace(box, block=BLOCKS["Ground"]()))

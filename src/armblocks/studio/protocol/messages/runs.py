@@ -31,6 +31,8 @@ class Channel(Message):
     shape: list[int]
     unit: str
     entries: list[str]
+    title: str = ""
+    """The name that the user has given to the signal."""
 
 
 class Tunable(Message):
@@ -69,14 +71,14 @@ class RunCommand(Request[None]):
 
 
 class Control(RunCommand):
-    """Pause, resume, stop or step a run. ``step`` and ``back`` move by one recorded instant."""
+    """Pause, resume, stop or step a run. ``step`` and ``back`` move by one sample."""
 
     kind: Literal["control"] = "control"
     action: Literal["pause", "resume", "step", "back", "stop"]
 
 
 class Rewind(RunCommand):
-    """Pause a run and return to an instant (s). Later samples are discarded; tuned values remain."""
+    """Pause a run and return to a time (s). Later samples are discarded; tuned values remain."""
 
     kind: Literal["rewind"] = "rewind"
     time: float
@@ -116,11 +118,11 @@ class RunStarted(RunEvent):
     aliases: dict[str, str]
     tunables: list[Tunable]
     stride: int
-    """Number of recorded instants that are reduced to two extreme values of each signal; 1: no reduction."""
+    """Number of samples that are reduced to two extreme values of each signal; 1: no reduction."""
 
 
 class RunTuned(RunEvent):
-    """A parameter of a run has this value from this instant (s) on."""
+    """A parameter of a run has this value from this time (s) on."""
 
     kind: Literal["run_tuned"] = "run_tuned"
     run: str
@@ -130,7 +132,7 @@ class RunTuned(RunEvent):
 
 
 class RunRewound(RunEvent):
-    """A run has returned to an earlier instant (s); only the first ``count`` samples remain valid."""
+    """A run has returned to an earlier time (s); only the first ``count`` samples remain valid."""
 
     kind: Literal["run_rewound"] = "run_rewound"
     run: str

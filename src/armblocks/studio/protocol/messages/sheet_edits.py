@@ -187,6 +187,30 @@ class LogSignal(DiagramEdit):
     logged: bool
 
 
+class NameSignal(DiagramEdit):
+    """Name the signal at an output ``block/port``; an empty name removes the name."""
+
+    kind: Literal["name_signal"] = "name_signal"
+    port: str
+    name: Annotated[str, Field(max_length=200)]
+
+
+class CommentBlocks(DiagramEdit):
+    """Comment blocks out or through, or remove their comments; see :mod:`armblocks.diagram.comments`."""
+
+    kind: Literal["comment"] = "comment"
+    blocks: list[str]
+    comment: Literal["out", "through", ""]
+
+
+class GroundPorts(DiagramEdit):
+    """Add a Ground or a Terminator at every unconnected port of these blocks; without blocks, of the
+    sheet."""
+
+    kind: Literal["ground"] = "ground"
+    blocks: list[str] = Field(default_factory=list[str])
+
+
 class ModelEdit(DiagramEdit):
     """An edit of the whole model, independent of the displayed sheet."""
 

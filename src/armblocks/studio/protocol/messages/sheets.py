@@ -76,6 +76,7 @@ class SheetBlock(Message):
     """The mask parameters of the diagram inside; ``default`` is their present value."""
     link: str
     """The library entry to which the block is linked, ``file#name``; ``""`` without a link."""
+    comment: Literal["out", "through", ""] = ""
 
 
 class WireLines(Message):
@@ -89,6 +90,10 @@ class WireLines(Message):
     paths: dict[str, list[tuple[float, float]]]
     dots: list[tuple[float, float]]
     label: str
+    name: str = ""
+    """The name of the signal; ``name_at`` is its position on the baseline and its anchor, if there is a
+    line."""
+    name_at: tuple[float, float, Literal["start", "middle"]] | None = None
 
 
 class Sheet(Message):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -16,18 +17,16 @@ from armblocks.integration.run_point import NO_NUMBERS, Checkpoint, RunPoint
 from armblocks.integration.system import CompiledSystem
 from armblocks.integration.workspace import Status
 from armblocks.simulation.jumps import InstantRows
-from armblocks.simulation.plan import Instants
+from armblocks.simulation.plan import SampleTimes
 
 Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Rows:
     """Recorded samples from number ``begin`` on: ``time (N,)`` s, ``states (N, nx)``, and so on.
 
-    ``instants()`` are both sides of the instants between these samples. ``previous`` is the time of the
-    sample before them, s.
+    ``previous`` is the time of the sample before them, s.
     """
 
     begin: int
@@ -36,7 +35,6 @@ class Rows:
     discrete: Array
     algebraic: Array
     p: Array
-    instants: Callable[[], InstantRows]
     previous: float = -np.inf
 
     def after(self, number: int) -> Rows:
@@ -51,7 +49,6 @@ class Rows:
             discrete=discrete,
             algebraic=algebraic,
             p=self.p,
-            instants=self.instants,
             previous=float(self.time[skip - 1]) if skip else self.previous,
         )
 
@@ -65,17 +62,17 @@ Change = tuple[RunPoint, Array]
 """The point and the parameters before a change of parameters."""
 
 
-class Stretch:
+class RunPart:
     """Records the samples of a run from number ``begin`` on; without states there is no integration.
 
     With a ``window`` only that number of samples is in memory. A consumer receives them before the next ones
-    replace them. Which step records a sample depends only on its time. A chunk of steps with more samples
-    than fit into the window is therefore repeated for the remaining ones.
+    replace them. The time of a sample determines the step that records it. A chunk of steps with
+    more samples than fit into the window is therefore repeated for the remaining samples.
     """
 
     def __init__(
         self,
-        instants: Instants,
+        sample_times: SampleTimes,
         begin: int,
         p: Array,
         integration: Integration | None,
@@ -93,27 +90,26 @@ class Stretch:
         """Number of the first sample in memory."""
         self.window = window
         self._change = change
-        self._start = None if integration is None else integration.start_of_jumps
-        self._breakpoints = _sides_of(breakpoints, instants) if integration is None else None
-        self._delivered = instants.start * SAME_ABOVE if begin == 0 else -np.inf
+        self._breakpoints = _sides_of(breakpoints, sample_times) if integration is None else None
+        self._delivered = sample_times.start * SAME_ABOVE if begin == 0 else -np.inf
         """Instants up to this time (s) belong to another run or were received by a consumer."""
-        self._instants = instants
-        self._time = first_window(instants, begin, window)
+        self._sample_times = sample_times
+        self._time = first_window(sample_times, begin, window)
         self._position = 0
         self._repeat: tuple[int, Checkpoint] | None = None
 
     @property
-    def held(self) -> int:
+    def in_memory(self) -> int:
         """Number of recorded samples in memory."""
         return self._position if self.integration is None else self.integration.recorded
 
     @property
     def recorded(self) -> int:
         """Number of the first sample that is not recorded yet."""
-        return self.begin + self.held
+        return self.begin + self.in_memory
 
     @property
-    def taken(self) -> int:
+    def steps_taken(self) -> int:
         """Number of accepted steps; without integration, the number of recorded samples."""
         return self.recorded if self.integration is None else self.integration.accepted
 
@@ -123,142 +119,155 @@ class Stretch:
         if self.integration is not None:
             return self.integration.time
         last = max(0, self.recorded - 1)
-        return float(self._instants.part(last, last + 1)[0])
+        return float(self._sample_times.part(last, last + 1)[0])
 
     @property
     def status(self) -> Status:
         """Whether the run is paused or has ended, and why."""
         if self.integration is not None:
             return self.integration.status
-        return Status.DONE if self.recorded == self._instants.count else Status.PAUSED
+        return Status.DONE if self.recorded == self._sample_times.count else Status.PAUSED
 
     @property
-    def wants_other(self) -> bool:
+    def other_method_faster(self) -> bool:
         """Whether another method is faster from here on."""
-        return self.integration is not None and self.integration.wants_other
+        return self.integration is not None and self.integration.other_method_faster
 
     def rows(self, begin: int | None = None) -> Rows:
         """The samples in memory from number ``begin`` on, as views."""
-        start = 0 if begin is None else min(self.held, max(0, begin - self.begin))
-        held, run = self.held, self.integration
-        nothing = np.empty((held, 0))
+        start = 0 if begin is None else min(self.in_memory, max(0, begin - self.begin))
+        in_memory, run = self.in_memory, self.integration
+        nothing = np.empty((in_memory, 0))
         parts = (nothing,) * 3 if run is None else (run.states, run.discrete, run.algebraic)
-        states, discrete, algebraic = (part[start:held] for part in parts)
+        states, discrete, algebraic = (part[start:in_memory] for part in parts)
         return Rows(
             begin=self.begin + start,
             # The times of the loop, because a block that ends the run adds the time of the end to them.
-            time=(self._time if run is None else run.course[1])[start:held],
+            time=(self._time if run is None else run.inputs[1])[start:in_memory],
             states=states,
             discrete=discrete,
             algebraic=algebraic,
             p=self.p,
-            instants=self._instant_rows,
             previous=self._previous(self.begin + start),
         )
 
     def _previous(self, number: int) -> float:
         """The time of the sample before sample ``number``, s."""
-        return float(self._instants.part(number - 1, number)[0]) if number else -np.inf
+        return float(self._sample_times.part(number - 1, number)[0]) if number else -np.inf
 
-    def _instant_rows(self) -> InstantRows:
-        """The instants of this part that are in memory and were not received by a consumer."""
-        rows, sample, change = self._native_rows()
-        new = rows[:, 1, 0] > self._delivered
-        if change is not None:
-            new[0] = self._delivered == -np.inf
-            change = change if new[0] else None
-        return InstantRows(rows=rows[new], sample=sample[new], p=self.p, change=change)
+    def instants(self, begin: int, end: int) -> InstantRows:
+        """Both sides of the instants of samples ``begin`` to ``end - 1``, without those that a consumer has
+        received. An instant belongs to the sample at its time, else to the next one."""
+        rows, sample = self._sides
+        new = bisect_right(rows, self._delivered, key=_time)
+        numbers = sample[new:, 0]
+        first, last = (new + bisect_left(numbers, number - self._offset) for number in (begin, end))
+        rows, sample = rows[first:last], sample[first:last].astype(np.int64) + self._offset
+        change = self._change if begin <= self.first < end else None
+        if change is not None and not self._processes_start:
+            # The states are continuous, and no instant is processed.
+            both = np.concatenate([[change[0].time, 0.0], change[0].x])[np.newaxis, np.newaxis]
+            rows = np.concatenate([both.repeat(2, axis=1), rows])
+            sample = np.concatenate([np.full((1, 2), self.first), sample])
+        return InstantRows(rows=rows, sample=sample, p=self.p, change=change)
 
-    def _native_rows(self) -> tuple[Array, Integers, Change | None]:
-        """Rows ``(M, 2, width)`` and numbers of samples ``(M, 2)``. The start of a run is not an instant with
-        two sides; a change of parameters is one, and comes first."""
-        if self._breakpoints is not None:
+    @property
+    def _processes_start(self) -> bool:
+        """Whether the native loop processes an instant at the start of this part."""
+        return self.integration is not None and self.integration.integrator.sizes.hybrid
+
+    @property
+    def _offset(self) -> int:
+        """The number of the sample whose recorded number is 0."""
+        return 0 if self.integration is None else self.begin
+
+    @property
+    def _sides(self) -> tuple[Array, Array]:
+        """Rows ``(M, 2, width)`` of all instants in memory, and their recorded numbers of samples
+        ``(M, 2)``. Both increase after the instants that a consumer has received."""
+        if self.integration is None:
+            assert self._breakpoints is not None
             rows, sample = self._breakpoints
-            later = sample[:, 0] >= self.first
-            rows, sample = rows[later], sample[later]
-        else:
-            assert self.integration is not None
-            rows = self.integration.jumps.rows
-            sample = rows[:, :, 1].astype(np.int64) + self.begin
-            if self._start is not None and len(rows) and rows[0, 1, 0] == self._start:
-                if self._change is not None:
-                    return rows, sample, self._change
-                rows, sample = rows[1:], sample[1:]
-        if self._change is None:
-            return rows, sample, None
-        point = self._change[0]
-        both = np.concatenate([[point.time, 0.0], point.x])[np.newaxis, np.newaxis].repeat(2, axis=1)
-        first = np.full((1, 2), self.first)
-        return np.concatenate([both, rows]), np.concatenate([first, sample]), self._change
+            own = slice(*(bisect_left(sample[:, 0], number) for number in (self.first, self.recorded)))
+            return rows[own], sample[own]
+        rows = self.integration.jumps.rows
+        return rows, rows[:, :, 1]
 
     def advance(self, steps: int, pause: float, consume: Consumer | None) -> None:
         """Take at most ``steps`` steps that begin before ``pause`` (s); pass full windows to ``consume``."""
         if consume is None:
-            self._go(steps, pause)
+            self._advance_loop(steps, pause)
             return
-        self.settle()
+        self.undo_interrupted_chunk()
         if self.integration is not None:
-            self._repeat = (self.begin, self.integration.now())
-        self._go(steps, pause)
-        while self.held == self._time.size and self.recorded < self._instants.count:
+            self._repeat = (self.begin, self.integration.present_checkpoint())
+        self._advance_loop(steps, pause)
+        while self.in_memory == self._time.size and self.recorded < self._sample_times.count:
             self._deliver(consume)
             if self._repeat is not None and self.integration is not None:
-                self.integration.back_to(self._repeat[1])
-            self._hold(self.begin + self._time.size)
-            self._go(steps, pause)
+                self.integration.restore(self._repeat[1])
+            self._start_window(self.begin + self._time.size)
+            self._advance_loop(steps, pause)
         self._repeat = None
         jumps = 0 if self.integration is None else len(self.integration.jumps.rows)
-        if self.held and self.held + jumps > self._time.size // 2:
+        if self.in_memory and self.in_memory + jumps > self._time.size // 2:
             self._deliver(consume)
             if self.integration is not None:
-                self.integration.jumps.drop(self.held)
-            self._hold(self.recorded)
+                self.integration.jumps.drop(self._delivered, self.in_memory)
+            self._start_window(self.recorded)
 
     def _deliver(self, consume: Consumer) -> None:
         """Pass the window to the consumer."""
         rows = self.rows()
+        instants = self.instants(rows.begin, rows.begin + rows.time.size)
         consume(rows)
-        delivered = rows.instants().between(rows.begin, rows.begin + rows.time.size).rows
-        if len(delivered):
-            self._delivered = float(delivered[-1, 1, 0])
+        if len(instants.rows):
+            self._delivered = _time(instants.rows[-1])
+        if rows.time.size:
+            self._change = None
 
-    def settle(self) -> None:
+    def undo_interrupted_chunk(self) -> None:
         """After an interruption within a chunk: return to the start of the chunk, so that it can be
         repeated."""
         if self._repeat is None or self.integration is None:
             return
         begin, before = self._repeat
-        self.integration.back_to(before)
+        self.integration.restore(before)
         if begin != self.begin:
-            self.integration.record(self._time)
+            self.integration.record_at(self._time)
         self._repeat = None
 
-    def _hold(self, begin: int) -> None:
+    def _start_window(self, begin: int) -> None:
         """Make room for the samples from number ``begin`` on."""
-        self._time = first_window(self._instants, begin, self.window)
+        self._time = first_window(self._sample_times, begin, self.window)
         self.begin = begin
         self._position = 0
         if self.integration is not None:
-            self.integration.record(self._time)
+            self.integration.record_at(self._time)
 
-    def _go(self, steps: int, pause: float) -> None:
+    def _advance_loop(self, steps: int, pause: float) -> None:
         if self.integration is not None:
             self.integration.advance(steps, pause)
             return
         # Without states each sample counts as a step, and the last one is at `pause`.
-        until = max(0, self._instants.up_to(pause) - self.begin)
+        until = max(0, self._sample_times.up_to(pause) - self.begin)
         self._position = min(self._time.size, self._position + steps, max(until, self._position))
 
 
-def first_window(instants: Instants, begin: int, window: int | None) -> Array:
+def _time(sides: Array) -> float:
+    """The time of an instant with the rows ``(2, width)``, s."""
+    return float(sides[1, 0])
+
+
+def first_window(sample_times: SampleTimes, begin: int, window: int | None) -> Array:
     """The sample times of the first window, s."""
-    return instants.part(begin, min(instants.count, begin + (window or sys.maxsize)))
+    return sample_times.part(begin, min(sample_times.count, begin + (window or sys.maxsize)))
 
 
-def _sides_of(breakpoints: Array, instants: Instants) -> tuple[Array, Integers]:
+def _sides_of(breakpoints: Array, sample_times: SampleTimes) -> tuple[Array, Array]:
     """Rows ``(M, 2, 2)`` and numbers of samples ``(M, 2)`` of the breakpoints inside a run."""
-    inside = sorted({float(time) for time in breakpoints if instants.start < time <= instants.stop})
+    inside = sorted({float(time) for time in breakpoints if sample_times.start < time <= sample_times.stop})
     times = np.array([[math.nextafter(time, -math.inf), time] for time in inside]).reshape(-1, 2)
     rows = np.stack([times, np.zeros_like(times)], axis=2)
-    sample = np.array([[instants.up_to(t) for t in pair] for pair in times.tolist()], dtype=np.int64)
+    sample = np.array([[sample_times.up_to(t) for t in pair] for pair in times.tolist()], dtype=np.float64)
     return rows, sample.reshape(-1, 2)

@@ -1,0 +1,56 @@
+import type { ReactFlowInstance } from '@xyflow/react'
+import { create } from 'zustand'
+import { nearestInput, nearestOn } from '../model/branching'
+import type { Point } from '../model/wire_lines'
+import { change, useStudio } from '../store'
+import { endAt } from './connecting'
+import { followPointer } from './pointer_drag'
+
+/** Distance from an input within which a new line ends there, screen px. */
+const REACH = 24
+/** Movement from which a press on a line is a drag, screen px. */
+const DRAG_PX = 3
+
+interface Branch {
+  /** The output at the start of the line. */
+  source: string
+  from: Point
+  to: Point
+  /** The input at which it would end. */
+  target: string | null
+}
+
+/** The branch that is being drawn. */
+export const useBranch = create<{ branch: Branch | null }>(() => ({ branch: null }))
+
+/**
+ * Draw a branch from a point of a line: to an input, to a block, or to the empty sheet, where the list of
+ * blocks opens. Escape cancels it.
+ */
+export function drawBranch(
+  flow: Pick<ReactFlowInstance, 'screenToFlowPosition' | 'getZoom'>,
+  source: string,
+  path: readonly Point[],
+  pressed: PointerEvent | React.PointerEvent,
+): void {
+  const point = (event: { clientX: number; clientY: number }): Point => {
+    const { x, y } = flow.screenToFlowPosition({ x: event.clientX, y: event.clientY }, { snapToGrid: false })
+    return [x, y]
+  }
+  const from = nearestOn(path, point(pressed))
+  const move = (event: PointerEvent) => {
+    const distance = Math.hypot(event.clientX - pressed.clientX, event.clientY - pressed.clientY)
+    if (!useBranch.getState().branch && distance <= DRAG_PX) return
+    const at = point(event)
+    const blocks = Object.values(useStudio.getState().document?.blocks ?? {})
+    const found = nearestInput(blocks, at, REACH / flow.getZoom())
+    useBranch.setState({ branch: { source, from, to: found?.at ?? at, target: found?.port ?? null } })
+  }
+  const drop = (event: PointerEvent) => {
+    const { branch } = useBranch.getState()
+    if (!branch) return
+    if (branch.target) void change({ kind: 'connect', wire: { source, target: branch.target } })
+    else endAt({ x: event.clientX, y: event.clientY }, source, true)
+  }
+  followPointer(pressed, { move, drop, leave: () => useBranch.setState({ branch: null }) })
+}

@@ -1,0 +1,72 @@
+import './mantine_later.css'
+import { Kbd, Menu } from '@mantine/core'
+import { useEffect, useState } from 'react'
+import { closeMenu, useContextMenu, type Entries, type Entry } from './context_menu_state'
+
+/** The open context menu, at the pointer. */
+export function ContextMenu() {
+  const { opened, label, at, entries, times } = useContextMenu()
+  // A panel under the menu may disappear, such as the sheet of another document.
+  useEffect(() => {
+    if (!opened) return
+    addEventListener('blur', closeMenu)
+    return () => removeEventListener('blur', closeMenu)
+  }, [opened])
+  return (
+    <Menu
+      key={times}
+      opened={opened}
+      onChange={(next) => !next && closeMenu()}
+      position="bottom-start"
+      offset={2}
+      shadow="md"
+      returnFocus={false}
+      transitionProps={{ duration: 0 }}
+    >
+      <Menu.Target>
+        <div className="menu-anchor" style={{ left: at.x, top: at.y }} aria-hidden />
+      </Menu.Target>
+      <Menu.Dropdown aria-label={label} className="context-menu">
+        <Items entries={entries} />
+      </Menu.Dropdown>
+    </Menu>
+  )
+}
+
+function Items({ entries }: { entries: Entries }) {
+  return entries.map((entry, k) =>
+    entry === null ? <Menu.Divider key={k} /> : <Item key={entry.title} entry={entry} />,
+  )
+}
+
+function Item({ entry }: { entry: Entry }) {
+  const { title, keys, possible = true, checked, within, run } = entry
+  if (within) return <Within title={title} within={within} />
+  if (checked !== undefined)
+    return (
+      <Menu.CheckboxItem checked={checked} disabled={!possible} onChange={run}>
+        {title}
+      </Menu.CheckboxItem>
+    )
+  return (
+    <Menu.Item
+      disabled={!possible}
+      rightSection={keys && <Kbd size="xs">{keys.split(', ')[0]}</Kbd>}
+      onClick={run}
+    >
+      {title}
+    </Menu.Item>
+  )
+}
+
+function Within({ title, within }: { title: string; within: Entries }) {
+  const [opened, setOpened] = useState(false)
+  return (
+    <Menu.Sub onChange={setOpened}>
+      <Menu.Sub.Target>
+        <Menu.Sub.Item>{title}</Menu.Sub.Item>
+      </Menu.Sub.Target>
+      <Menu.Sub.Dropdown className="context-menu">{opened && <Items entries={within} />}</Menu.Sub.Dropdown>
+    </Menu.Sub>
+  )
+}

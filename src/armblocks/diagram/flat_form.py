@@ -1,0 +1,87 @@
+"""The flat form of a diagram: the result of the passes, and its relation to the hierarchy."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from armblocks.diagram.block import Block
+from armblocks.diagram.bus import Carried
+from armblocks.diagram.diagram import Connection, Diagram
+from armblocks.diagram.passes.netlist import Netlist
+from armblocks.diagram.passes.order import resolved
+from armblocks.diagram.port import PortRef, View
+from armblocks.equations import Shape
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlatForm:
+    """A flat diagram, and its relation to the hierarchy. Names are paths from the top level.
+
+    ``levels``: the diagram of every subsystem by its path, with ``""`` for the top. ``carried``: the signal
+    or bus at output ports of the hierarchy, where it is not their own signal. ``aliases``: other names of
+    signals, such as a subsystem's ports. ``views``: the views, by block. ``stated``: ports with a declared
+    shape. ``origins``: for blocks that are not blocks of the hierarchy, such as the control of a conditional
+    subsystem, the block of the hierarchy that they come from. All except ``levels`` are empty for a diagram
+    that is already flat.
+    """
+
+    diagram: Diagram
+    levels: Mapping[str, Diagram]
+    carried: Mapping[PortRef, Carried] = field(default_factory=dict[PortRef, Carried])
+    views: tuple[tuple[str, View], ...] = ()
+    aliases: Mapping[str, PortRef] = field(default_factory=dict[str, PortRef])
+    stated: Mapping[PortRef, tuple[PortRef, Shape]] = field(
+        default_factory=dict[PortRef, tuple[PortRef, Shape]]
+    )
+    origins: Mapping[str, str] = field(default_factory=dict[str, str])
+
+    def original_port(self, ref: PortRef) -> PortRef:
+        """The port of the hierarchy for an input port of a flat block.
+
+        The control ``enabled/enable`` of a subsystem stands for its port: ``enabled/enable/u`` becomes
+        ``enabled/enable``.
+        """
+        origin = self.origins.get(ref.block, ref.block)
+        if ref.block.startswith(f"{origin}/"):
+            return PortRef(origin, ref.block.removeprefix(f"{origin}/"))
+        return PortRef(origin, ref.port)
+
+
+def flat_form(net: Netlist) -> FlatForm:
+    """The flat form of a netlist before all passes. Raises ``DiagramError``."""
+    levels, net = net.levels, resolved(net)
+    return FlatForm(
+        diagram=_as_diagram(net),
+        levels=levels,
+        carried=net.carried,
+        views=net.views,
+        aliases=net.aliases,
+        stated=net.stated,
+        origins=net.origins,
+    )
+
+
+def _as_diagram(net: Netlist) -> Diagram:
+    """The diagram of a netlist without virtual blocks."""
+    return dataclasses.replace(
+        net.top,
+        # Values without the masks from which they were computed.
+        blocks={path: _plain(block) for path, block in net.blocks.items()},
+        connections=tuple(Connection(source, target) for target, source in net.drivers.items()),
+        layout={},
+        bends={},
+        notes={},
+        extras={},
+        gates=net.gates,
+        mask=(),
+        mask_values={},
+        commented={},
+        signal_names={},
+        shares=net.shares,
+    )
+
+
+def _plain(block: Block) -> Block:
+    return dataclasses.replace(block, formulas=()) if block.formulas else block

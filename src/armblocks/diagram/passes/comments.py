@@ -1,0 +1,167 @@
+"""Pass: commented blocks are replaced by zeros or by wires.
+
+Takes: the outermost commented blocks (``Netlist.commented``), and the signals of the model without comments.
+
+Gives: for a block that is commented out zeros with the shapes that its outputs have without comments; for one
+that is commented through replacements of its outputs by the signals at its inputs. The blocks inside a
+commented subsystem are removed.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+from armblocks.diagram.block import Block
+from armblocks.diagram.bus import Bus, Carried
+from armblocks.diagram.comments import is_inside, passed_ports
+from armblocks.diagram.grounded import Bypass, Grounded
+from armblocks.diagram.passes.netlist import KnownSignals, Netlist, Replacement, Replacements
+from armblocks.diagram.port import Port, PortRef
+from armblocks.diagram.shape_rules import shapes_agree
+from armblocks.equations import Shape
+from armblocks.errors import DiagramError
+
+
+def resolve_comments(net: Netlist) -> Netlist:
+    """The netlist without commented blocks.
+
+    Raises ``DiagramError`` for a block that is commented through although the shapes of an input and of its
+    output differ.
+    """
+    if not net.commented:
+        return net
+    comments = _Comments(net)
+    for path, comment in net.commented.items():
+        if comment == "through":
+            comments.pass_through(path)
+        else:
+            comments.ground(path)
+    blocks = comments.blocks
+    return dataclasses.replace(
+        net,
+        levels={path: level for path, level in net.levels.items() if not is_inside(path, net.commented)},
+        blocks=blocks,
+        drivers={ref: source for ref, source in net.drivers.items() if _is_port(ref, blocks)},
+        replaced={**net.replaced, **comments.replaced},
+        origins={**net.origins, **comments.origins},
+        commented={},
+        without_comments=KnownSignals(),
+    )
+
+
+def _is_port(ref: PortRef, blocks: dict[str, Block]) -> bool:
+    block = blocks.get(ref.block)
+    if not isinstance(block, Bypass | Grounded):
+        return block is not None
+    return any(port.name == ref.port for port in block.input_ports())
+
+
+class _Comments:
+    """The blocks and replacements in place of commented blocks."""
+
+    def __init__(self, net: Netlist) -> None:
+        self.net = net
+        self.known = net.without_comments
+        self.blocks = {
+            path: block for path, block in net.blocks.items() if not is_inside(path, net.commented)
+        }
+        self.replaced: dict[str, Replacements] = {}
+        self.origins: dict[str, str] = {}
+
+    def ground(self, path: str) -> None:
+        """Replace a block by zeros."""
+        ports = self.net.blocks[path].output_ports()
+        contents = {port.name: self.known.at(PortRef(path, port.name)) for port in ports}
+        if not ports:
+            return
+        if not any(isinstance(carried, Bus) for carried in contents.values()):
+            self.blocks[path] = Grounded.of({port.name: self._shape(path, port) for port in ports})
+            return
+        self.blocks[path] = Bypass.of((), tuple(contents))
+        self.replaced[path] = {
+            port.name: Replacement((), _always(self._zeros(path, port, contents[port.name])))
+            for port in ports
+        }
+
+    def _zeros(self, path: str, port: Port, carried: Carried) -> Carried:
+        """Zeros with the structure of a signal or bus."""
+        if isinstance(carried, PortRef):
+            return self._zero(path, port.name, self._shape(path, port))
+        zeros = carried
+        for element, source in carried.leaves():
+            shape = self.known.shapes.get(source, ())
+            zeros = zeros.replaced(element, self._zero(path, f"{port.name}.{element}", shape))
+        return zeros
+
+    def _zero(self, path: str, place: str, shape: Shape) -> PortRef:
+        zero = f"{path}.{place}"
+        self.blocks[zero], self.origins[zero] = Grounded.of({"y": shape}), path
+        return PortRef(zero, "y")
+
+    def _shape(self, path: str, port: Port) -> Shape:
+        """The shape of an output without comments.
+
+        If that model has an error, it is the shape of an input that the output drives, or a scalar.
+        """
+        ref = PortRef(path, port.name)
+        stated = port.shape if port.shape is not None else self.known.shape(ref)
+        if stated is not None:
+            return stated
+        taken = (
+            entry.shape
+            for target, source in self.net.drivers.items()
+            if source == ref and target.block in self.blocks
+            for entry in self.blocks[target.block].input_ports()
+            if entry.name == target.port and entry.shape is not None
+        )
+        return next(taken, ())
+
+    def pass_through(self, path: str) -> None:
+        """Replace a block by wires from its inputs to its outputs."""
+        block, net = self.net.blocks[path], self.net
+        wires = passed_ports(block)
+        for into, out in wires:
+            self._check_equal(path, into, out)
+        self.blocks[path] = Bypass.of([into for into, _ in wires], [out for _, out in wires])
+        self.replaced[path] = {out: Replacement((net.drivers[PortRef(path, into)],)) for into, out in wires}
+
+    def _check_equal(self, path: str, into: str, out: str) -> None:
+        given = self.net.drivers[PortRef(path, into)]
+        before = _described(self.known, self.known.at(given))
+        after = _described(self.known, self.known.at(PortRef(path, out)))
+        if before is not None and after is not None and not _agree(before, after):
+            raise DiagramError(
+                f"the block is commented through, but its input '{into}' is {_words(before)} "
+                f"and its output '{out}' is {_words(after)}",
+                where=self.net.label(path),
+                allowed="an input and an output of the same shape",
+                fix="comment the block out, or remove the comment",
+            )
+
+
+_Description = Shape | dict[str, Shape | None]
+"""The shape of a signal, or the shapes of the elements of a bus."""
+
+
+def _described(known: KnownSignals, carried: Carried) -> _Description | None:
+    if isinstance(carried, PortRef):
+        return known.shapes.get(carried)
+    return {element: known.shapes.get(source) for element, source in carried.leaves()}
+
+
+def _agree(one: _Description, other: _Description) -> bool:
+    if isinstance(one, dict) and isinstance(other, dict):
+        return one.keys() == other.keys() and all(
+            mine is None or yours is None or shapes_agree(mine, yours)
+            for mine, yours in zip(one.values(), (other[element] for element in one))
+        )
+    return not isinstance(one, dict) and not isinstance(other, dict) and shapes_agree(one, other)
+
+
+def _words(found: _Description) -> str:
+    return f"a bus with {', '.join(found)}" if isinstance(found, dict) else f"of shape {found}"
+
+
+def _always(carried: Carried) -> Callable[[Sequence[Carried]], Carried]:
+    return lambda _: carried

@@ -1,0 +1,42 @@
+"""Names of signals: a name of an output port, unique among the blocks and signals of its sheet.
+
+The name of a signal in a subsystem has the path of the subsystem, ``"controller/error"``. Results, data files
+and legends show it in place of ``block/port``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from armblocks.diagram.bus import Bus
+from armblocks.diagram.comments import active_levels
+from armblocks.diagram.diagram import Diagram
+from armblocks.diagram.flat_form import FlatForm
+from armblocks.diagram.hierarchy import flatten_hierarchy
+from armblocks.diagram.levels import joined
+from armblocks.diagram.port import PortRef
+
+
+def named_signals(form: FlatForm) -> Iterator[tuple[str, PortRef]]:
+    """The names of all signals by path, outer sheets first, and then those of elements of buses.
+
+    An element is ``name.element``.
+    """
+    elements: list[tuple[str, PortRef]] = []
+    for level, diagram in active_levels(form.levels).items():
+        for ref, name in diagram.signal_names.items():
+            port = PortRef(joined(level, ref.block), ref.port)
+            path, carried = joined(level, name), form.carried.get(port, port)
+            if isinstance(carried, Bus):
+                elements += ((f"{path}.{element}", source) for element, source in carried.leaves())
+            else:
+                yield path, carried
+    yield from elements
+
+
+def signal_titles(diagram: Diagram) -> dict[str, str]:
+    """The name of every named signal by ``block/port``; of several names that of the outermost sheet."""
+    found: dict[str, str] = {}
+    for name, ref in named_signals(flatten_hierarchy(diagram)):
+        found.setdefault(str(ref), name)
+    return found

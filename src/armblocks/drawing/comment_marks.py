@@ -1,0 +1,55 @@
+"""Drawing of commented blocks: grey, with a sign for what replaces the block in the model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from armblocks.diagram.comments import passed_ports
+from armblocks.drawing.block_boxes import NAME_SIZE, Box, PortSpot
+from armblocks.pictures.picture import Curve, Disc, Group, Mark, Polyline, Raster, Rectangle, Text
+from armblocks.pictures.style import Tone
+
+COMMENT_WORDS = {"out": "commented out", "through": "commented through"}
+"""The text for each comment."""
+_BACKGROUNDS = (Tone.SURFACE, Tone.PAGE, Tone.SUNKEN)
+
+
+def commented_marks(marks: Sequence[Mark], box: Box, comment: str) -> list[Mark]:
+    """The drawing of a commented block.
+
+    A block that is commented out has a percent sign, one that is commented through the wires that replace it.
+    """
+    grey = [_greyed(mark) for mark in marks]
+    if comment == "out":
+        return [*grey, Text(box.x, box.y - 3, "%", NAME_SIZE, Tone.MUTED, bold=True)]
+    inputs, outputs = ({spot.name: spot for spot in spots} for spots in (box.inputs, box.outputs))
+    return [*grey, *(_wire(inputs[into], outputs[out]) for into, out in passed_ports(box.block))]
+
+
+def _wire(into: PortSpot, out: PortSpot) -> Mark:
+    points = [(into.x, into.y), (out.x, out.y)]
+    if not into.dy and not out.dy and into.y != out.y:
+        middle = (into.x + out.x) / 2
+        points[1:1] = [(middle, into.y), (middle, out.y)]
+    return Polyline(points, stroke=Tone.WIRE, width=1.2)
+
+
+def _ground(tone: Tone | None) -> Tone | None:
+    return None if tone is None else Tone.SUNKEN if tone in _BACKGROUNDS else Tone.HAIRLINE
+
+
+def _line(tone: Tone | None) -> Tone | None:
+    return None if tone is None else Tone.HAIRLINE
+
+
+def _greyed(mark: Mark) -> Mark:
+    match mark:
+        case Text():
+            return replace(mark, tone=Tone.MUTED)
+        case Group():
+            return replace(mark, marks=tuple(_greyed(inner) for inner in mark.marks))
+        case Polyline() | Curve() | Rectangle() | Disc():
+            return replace(mark, stroke=_line(mark.stroke), fill=_ground(mark.fill))
+        case Raster():
+            return mark

@@ -1,0 +1,145 @@
+"""Habits of the mouse on a sheet: context menus, copies and branches by the right button."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+import pytest
+from accessibility import axe
+from building import block, copied_names, edge, middle, open_fresh_example, run, select_block, wait_until
+from playwright.sync_api import Locator, Page, expect
+
+
+@pytest.fixture(scope="module")
+def shared(open_studio: Callable[[str], Page]) -> Page:
+    return open_studio("van_der_pol_pid")
+
+
+@pytest.fixture
+def sheet(shared: Page) -> Page:
+    """The page shared by this file, with a fresh copy of an example."""
+    open_fresh_example(shared)
+    return shared
+
+
+def entry(page: Page, name: str) -> Locator:
+    """An entry of the open context menu."""
+    return page.locator(".context-menu [role^=menuitem]", has_text=re.compile(f"^{re.escape(name)}"))
+
+
+def right_drag(page: Page, start: tuple[float, float], end: tuple[float, float]) -> None:
+    page.mouse.move(*start)
+    page.mouse.down(button="right")
+    page.mouse.move(start[0] + 5, start[1] + 5)
+    page.mouse.move(*end, steps=4)
+    page.mouse.up(button="right")
+
+
+def test_the_right_button_copies_blocks_and_branches_from_lines(sheet: Page) -> None:
+    x, y = middle(block(sheet, "PID").locator(".face"))
+    right_drag(sheet, (x, y), (x + 20, y + 70))
+    copy = block(sheet, "PID 2")
+    expect(copy).to_have_class(re.compile("selected"))
+    left, top = middle(copy.locator(".face"))
+    assert abs(left - x - 20) <= 5  # half a step of the grid, at this zoom
+    assert abs(top - y - 70) <= 5
+    expect(sheet.locator(".drawn-copy")).to_have_count(0)
+    line = middle(edge(sheet, "PID/y -> u/u1").locator(".piece").first)
+    right_drag(sheet, line, middle(copy.locator('[data-handleid="u"]')))
+    expect(edge(sheet, "PID/y -> PID 2/u")).to_have_count(1)
+    sheet.keyboard.press("Control+z")
+    expect(edge(sheet, "PID/y -> PID 2/u")).to_have_count(0)
+    sheet.mouse.move(*line)
+    sheet.keyboard.down("Control")
+    sheet.mouse.down()
+    sheet.mouse.move(line[0] + 5, line[1] + 8, steps=2)
+    expect(sheet.locator(".drawn-branch")).to_have_count(1)
+    sheet.keyboard.press("Escape")
+    expect(sheet.locator(".drawn-branch")).to_have_count(0)
+    sheet.mouse.up()
+    sheet.mouse.move(*line)
+    sheet.mouse.down()
+    sheet.mouse.move(line[0], line[1] - 60, steps=3)
+    sheet.mouse.up()
+    sheet.keyboard.up("Control")
+    field = sheet.get_by_role("textbox", name="Add a block")
+    field.fill("gain")
+    field.press("Enter")
+    expect(edge(sheet, "PID/y -> Gain/u")).to_have_count(1)
+    expect(sheet.get_by_role("menu")).to_have_count(0)
+
+
+def test_context_menus_of_blocks_lines_ports_the_sheet_and_charts(sheet: Page) -> None:
+    block(sheet, "PID").click(button="right")
+    expect(sheet.get_by_role("menu", name="PID")).to_be_visible()
+    axe(sheet)
+    entry(sheet, "Rename").click()
+    field = sheet.get_by_role("textbox", name="Name of PID")
+    field.fill("controller")
+    field.press("Enter")
+    name = "controller"
+    expect(block(sheet, name)).to_be_visible()
+    select_block(sheet, name)
+    sheet.keyboard.press("Shift+F10")
+    assert copied_names(sheet, lambda: entry(sheet, "Copy").press("Enter")) == [name]
+    expect(block(sheet, name)).to_be_focused()
+    pane = sheet.locator(".react-flow__pane")
+    pane.click(button="right", position={"x": 40, "y": 40})
+    entry(sheet, "Paste here").click()
+    pasted = block(sheet, f"{name} 2")
+    expect(pasted).to_have_class(re.compile("selected"))
+    corner, origin = pasted.locator(".face").bounding_box(), pane.bounding_box()
+    assert corner is not None
+    assert origin is not None
+    assert abs(corner["x"] - origin["x"] - 40) <= 6
+    sheet.mouse.click(*middle(edge(sheet, f"{name}/y -> u/u1").locator(".piece").first), button="right")
+    entry(sheet, "Log the signal").click()
+    expect(sheet.get_by_label(f"{name}/y is logged")).to_be_visible()
+    block(sheet, name).locator('[data-handleid="u"]').click(button="right")
+    entry(sheet, "Delete its line").click()
+    expect(edge(sheet, f"error/y -> {name}/u")).to_have_count(0)
+    sheet.keyboard.press("Control+z")
+    expect(edge(sheet, f"error/y -> {name}/u")).to_have_count(1)
+    sheet.keyboard.press("Control+z")
+    sheet.keyboard.press("Control+z")
+    run(sheet)
+    chart = sheet.locator('.chart[data-view="Scope"]')
+    chart.locator(".u-over").click(button="right")
+    entry(sheet, "Measuring cursors").click()
+    expect(chart.locator(".between")).to_be_visible()
+    chart.locator(".u-over").click(button="right")
+    entry(sheet, "Measuring cursors").click()
+    chart.locator(".u-over").click(button="right")
+    entry(sheet, "Show the block on the sheet").click()
+    expect(block(sheet, "Scope")).to_have_class(re.compile("selected"))
+
+
+def test_a_dragged_block_snaps_to_a_straight_line_and_alt_turns_it_off(sheet: Page) -> None:
+    def levels() -> tuple[float, float]:
+        return tuple(
+            middle(block(sheet, name).locator(f'[data-handleid="{port}"]'))[1]
+            for name, port in (("PID", "y"), ("damping", "u"))
+        )  # type: ignore[return-value]
+
+    out, into = levels()
+    x, y = middle(block(sheet, "damping").locator(".face"))
+    sheet.mouse.move(x, y)
+    sheet.mouse.down()
+    sheet.mouse.move(x, y + 10, steps=2)
+    sheet.mouse.move(x, y + out - into + 3, steps=4)
+    expect(sheet.locator(".guides path")).not_to_have_count(0)
+    sheet.mouse.up()
+    expect(sheet.locator(".guides")).to_have_count(0)
+    wait_until(sheet, lambda: abs(levels()[0] - levels()[1]) < 0.1)
+    expect(sheet.get_by_role("button", name="Undo move damping (Ctrl+Z)")).to_be_enabled()
+    x, y = middle(block(sheet, "damping").locator(".face"))
+    sheet.mouse.move(x, y)
+    sheet.mouse.down()
+    sheet.mouse.move(x, y + 40, steps=3)
+    sheet.keyboard.down("Alt")
+    sheet.mouse.move(x, y + 4, steps=3)
+    expect(sheet.locator(".guides")).to_have_count(0)
+    sheet.mouse.up()
+    sheet.keyboard.up("Alt")
+    wait_until(sheet, lambda: abs(levels()[0] - levels()[1]) > 1)
