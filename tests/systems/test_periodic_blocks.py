@@ -12,17 +12,19 @@ from armblocks.blocks import (
     Clock,
     Constant,
     FirstOrderHold,
+    Gain,
     Integrator,
     Memory,
     PulseGenerator,
     Ramp,
     SineWave,
+    Sum,
     UnitDelay,
     ZeroOrderHold,
 )
 from armblocks.diagram import Block, Diagram, DiagramBuilder
 from armblocks.equations import SimulationOptions
-from armblocks.errors import DiagramError
+from armblocks.errors import ArmblocksError, DiagramError
 from armblocks.simulation import simulate
 from compiled_diagrams import compiled
 
@@ -120,6 +122,39 @@ def test_the_input_is_sampled_after_the_events_at_the_same_time(run: Run) -> Non
     now, before = 1.0 - k % 2, np.where(k < 1, 0.0, k % 2)
     assert found["hold/y"] == pytest.approx(before + (now - before) * (t / 0.25 - k), abs=1e-12)
     assert found["pwm/y"] == pytest.approx(now)
+
+
+def test_a_chain_of_holds_has_the_value_of_its_source_at_each_sample_time(run: Run) -> None:
+    """Each hold jumps at the sample time, and the next one samples after that jump."""
+    builder = DiagramBuilder("d")
+    out = builder.add("pulses", PulseGenerator(period=0.5))
+    for number in range(4):
+        out = builder.add(f"hold {number}", FirstOrderHold(period=0.25), out)
+    found = run(builder.build(), 3.125)
+    ticks = np.abs(found["t"] / 0.25 - np.round(found["t"] / 0.25)) < 1e-9
+    assert found["hold 3/y"][ticks] == pytest.approx(found["pulses/y"][ticks], abs=1e-12)
+
+
+@pytest.mark.parametrize("gain", [0.5, -0.9, 0.0])
+def test_a_loop_through_an_extrapolating_hold_is_solved_at_each_sample_time(run: Run, gain: float) -> None:
+    """u = gain y + 1, and y = u at the sample times."""
+    found = run(loop_through_a_hold(gain), 1.0)
+    assert found["sum/y"][::50] == pytest.approx(1.0 / (1.0 - gain), rel=1e-9)
+
+
+def test_a_loop_through_an_extrapolating_hold_with_a_gain_above_1_is_refused() -> None:
+    with pytest.raises(ArmblocksError, match=r"is inf at 0\.25 s"):
+        native("rk45")(loop_through_a_hold(-2.0), 1.0)
+
+
+def loop_through_a_hold(gain: float) -> Diagram:
+    builder = DiagramBuilder("d")
+    hold = builder.add("hold", FirstOrderHold(period=0.25))
+    total = builder.add(
+        "sum", Sum(), builder.add("gain", Gain(gain=gain), hold), builder.add("1", Constant())
+    )
+    builder.connect(total, hold)
+    return builder.build()
 
 
 @pytest.mark.parametrize("duty", [-0.5, 0.0, 0.3, 1.0, 1.5])

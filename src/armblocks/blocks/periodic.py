@@ -1,12 +1,12 @@
 """Blocks that sample their input once a period and have a continuous-time output between samples.
 
 T is the period, t_k = offset + k T is the k-th sample time. The sampled value includes the effects of all
-ticks and events at t_k: a second event samples the input again after the first one.
+ticks and events at t_k: as long as the input differs from the sample at that instant, it is sampled again.
 """
 
 from __future__ import annotations
 
-from casadi import SX, if_else, logic_and, logic_or
+from casadi import SX, fabs, fmax, if_else, logic_and, logic_not, logic_or, mmax, mmin, vertcat
 
 from armblocks.blocks.switching import since
 from armblocks.diagram import (
@@ -16,9 +16,12 @@ from armblocks.diagram import (
 )
 
 COUNT = State("count", (), "number of samples taken")
-FRESH = State("fresh", (), "1 until the input has been sampled again, else 0")
+WHEN = State("when", (), "time of the last sample")
+ODD = State("odd", (), "1 after an odd number of repeated samples, else 0")
 INSTANT = Guard("instant", (), "t - the next sample time", 1)
-AGAIN = Guard("again", (), "the input has been sampled", -1)
+AGAIN = Guard("again", (2,), "the input differs from its sample", -1)
+SAME_VALUE = 2.0**-40
+"""Relative difference within which a signal equals its sample: in loops the rounding errors differ."""
 
 
 def sample_time(p: Signals, count: SX) -> SX:
@@ -32,12 +35,23 @@ def sampled(t: SX, x: Signals, p: Signals, e: Signals) -> tuple[SX, SX, Signals]
     The start needs no event: every mode iteration at t = 0 samples the input again.
     """
     due = logic_or(e["instant"] > 0.0, t >= sample_time(p, x["count"]))
-    same = logic_and(x["count"] > 0.0, t <= sample_time(p, x["count"] - 1.0))
-    looks = logic_or(due, logic_or(same, e["again"] < 0.0))
-    fresh = if_else(e["instant"] > 0.0, 1.0, if_else(e["again"] < 0.0, 0.0, x["fresh"]))
-    return due, looks, {"count": x["count"] + due, "fresh": fresh}
+    looks = logic_or(due, _just_sampled(t, x, p))
+    odd = if_else(mmin(e["again"]) < 0.0, 1.0 - x["odd"], x["odd"])
+    return due, looks, {"count": x["count"] + due, "when": if_else(due, t, x["when"]), "odd": odd}
 
 
-def sampling_guards(t: SX, x: Signals, p: Signals) -> Signals:
-    """The guards of both events: a sample time is reached; the input is sampled again."""
-    return {"instant": since(t, sample_time(p, x["count"])), "again": 0.5 - x["fresh"]}
+def sampling_guards(t: SX, x: Signals, p: Signals, value: SX, sample: SX) -> Signals:
+    """The guards of both events: a sample time is reached; the input is no longer equal to its sample.
+
+    The two entries of the second guard take turns, because an entry that has fired needs another sign first.
+    """
+    close = fabs(value - sample) <= SAME_VALUE * fmax(fabs(value), fabs(sample))
+    differs = logic_and(_just_sampled(t, x, p), mmax(logic_not(close)))
+    again = [if_else(logic_and(differs, x["odd"] == turn), -1.0, 1.0) for turn in (0.0, 1.0)]
+    return {"instant": since(t, sample_time(p, x["count"])), "again": vertcat(*again)}
+
+
+def _just_sampled(t: SX, x: Signals, p: Signals) -> SX:
+    """Whether the last sample was taken at this instant: t_k, or a few units in the last place beside it."""
+    last = fmax(x["when"], sample_time(p, x["count"] - 1.0))
+    return logic_and(x["count"] > 0.0, t <= last)

@@ -20,9 +20,11 @@ from armblocks.routines.arithmetic import select
 from armblocks.routines.memory import IntegerVariable, Reals, RealVariable
 from armblocks.routines.values import Boolean, Integer, Real
 
-TURNS_TOGETHER, MOST_TURNS = 8, 32
-"""Mode iteration changes all inconsistent modes together in the first ``TURNS_TOGETHER`` iterations plus one
-for each mode. It ends after ``MOST_TURNS`` iterations for each mode."""
+ITERATIONS_TOGETHER, MOST_ITERATIONS = 8, 32
+"""Mode iteration changes all inconsistent modes together in the first ``ITERATIONS_TOGETHER`` iterations plus
+one for each mode. It ends after ``MOST_ITERATIONS`` iterations for each mode."""
+START_ITERATIONS = 400
+"""Resets at the start of a run, beside one for each guard, within which loops of sampled values converge."""
 
 
 class Events:
@@ -38,81 +40,81 @@ class Events:
         self.point = point
         self.guards = len(frame.sizes.directions)
         self.modes = len(frame.sizes.modes)
-        self.functions = GuardFunctions(frame.r.program, frame.places, frame.sizes)
-        places = frame.places
-        self.x, self.new_x = frame.vector(places.x), frame.vector(places.new_x)
+        self.functions = GuardFunctions(frame.r.program, frame.workspace, frame.sizes)
+        workspace = frame.workspace
+        self.x, self.new_x = frame.vector(workspace.x), frame.vector(workspace.new_x)
 
-    def watch(self, time: Real, x: Reals) -> Integer:
+    def mark_fired(self, time: Real, x: Reals) -> Integer:
         """Evaluate all guards and mark those that fire; return the number of them and of inconsistent
         modes."""
         f = self.frame
         self.point.value = time
         t = self.point.memory
         self.evaluation.solve(t, x)
-        return f.r.call(self.functions.watch, t, x, f.reals, f.p)
+        return f.r.call(self.functions.mark_fired, t, x, f.reals, f.p)
 
     def make_modes_consistent(self, time: Real) -> None:
         """At the start of the run, apply resets without events until states and modes are consistent.
 
         A mode may change a signal on which another mode depends. The reset is therefore repeated until
-        nothing changes, at most once for each guard.
+        nothing changes, but at most ``START_ITERATIONS`` times and once for each guard.
         """
-        f, r, places = self.frame, self.frame.r, self.frame.places
-        left, fired = Count.AT_START, f.vector(places.fired)
-        with r.when(f.counts[left] != 0):
+        f, r, workspace = self.frame, self.frame.r, self.frame.workspace
+        counter, fired = Count.AT_START, f.vector(workspace.fired)
+        with r.when(f.counts[counter] != 0):
             self.point.value = time
             for i in r.each(self.guards):
                 fired[i] = 0.0
             if self.modes:
-                self._follow_at_start()
-            f.counts[left] = self.guards
+                self._make_following_modes_consistent()
+            f.counts[counter] = self.guards + START_ITERATIONS
             with r.part() as iteration:
                 self.evaluation.solve(self.point.memory, self.x)
                 self.reset()
                 same = r.real(1.0)
                 for before, after, count in (
-                    (places.x, places.new_x, f.n),
-                    (places.z, places.new_z, f.sizes.discrete),
+                    (workspace.x, workspace.new_x, f.n),
+                    (workspace.z, workspace.new_z, f.sizes.discrete),
                 ):
                     for i in r.each(count):
                         old, new = f.vector(before)[i], f.vector(after)[i]
                         same.value = select(old != new, 0.0, same.value)
-                self.take_reset()
-                remaining = f.counts[left] - 1
-                f.counts[left] = remaining
+                self.apply_reset()
+                remaining = f.counts[counter] - 1
+                f.counts[counter] = remaining
                 iteration.again_when((same.value == 0.0) & (remaining > 0))
-            f.counts[left] = 0
+            f.counts[counter] = 0
 
-    def _follow_at_start(self) -> None:
+    def _make_following_modes_consistent(self) -> None:
         """Make the following modes consistent, before the stateful modes."""
         f, r, functions, t = self.frame, self.frame.r, self.functions, self.point.memory
-        turns = r.integer(0)
+        iterations = r.integer(0)
         with r.loop() as loop:
             self.evaluation.solve(t, self.x)
             functions.evaluate(r, t, self.x, f.reals, f.p)
-            turns.value = turns.value + 1
-            loop.leave_unless(turns.value < TURNS_TOGETHER + self.modes)
-            loop.leave_unless(r.call(functions.any_contradicts, f.reals, r.constant_boolean(True)))
+            iterations.value = iterations.value + 1
+            loop.leave_unless(iterations.value < ITERATIONS_TOGETHER + self.modes)
+            loop.leave_unless(r.call(functions.any_inconsistent, f.reals, r.constant_boolean(True)))
             self.reset()
-            self._hold(turns, follows=True)
-            r.call(functions.take_followers, f.reals)
+            self._restrict_mode_changes(iterations, follows=True)
+            r.call(functions.copy_following_modes, f.reals)
 
     def reset(self) -> None:
         """Compute ``new_x`` and ``new_z`` for the events that are marked in ``fired``."""
-        f, places = self.frame, self.frame.places
+        f, workspace = self.frame, self.frame.workspace
         z, unknowns, fired, new_z = (
-            f.vector(place) for place in (places.z, places.trial_w, places.fired, places.new_z)
+            f.vector(place) for place in (workspace.z, workspace.trial_w, workspace.fired, workspace.new_z)
         )
         t = self.point.memory
         f.r.call(system_functions.reset, t, self.x, z, unknowns, f.p, fired, self.new_x, new_z)
 
-    def take_reset(self) -> None:
+    def apply_reset(self) -> None:
         """Copy the states and discrete variables of the reset to ``x`` and ``z``."""
-        f, places = self.frame, self.frame.places
-        f.copy(places.new_x, places.x, f.n)
-        f.copy(places.new_z, places.z, f.sizes.discrete)
+        f, workspace = self.frame, self.frame.workspace
+        f.copy(workspace.new_x, workspace.x, f.n)
+        f.copy(workspace.new_z, workspace.z, f.sizes.discrete)
 
-    def fire(self, time: Real) -> None:
+    def process(self, time: Real) -> None:
         """Iterate over modes and guards until all modes are consistent and no guard fires.
 
         1. Following modes are made consistent. Before that the signals do not have their values of this
@@ -122,69 +124,69 @@ class Events:
 
         In the first iterations all inconsistent modes change together, then only the first of them. With this
         least index rule the iteration ends for every complementarity problem with a P-matrix (Murty 1974). If
-        it still does not end, the run ends: no choice of the modes is consistent.
+        it still does not end, no choice of the modes is consistent, and the run ends.
         """
         f, r, functions = self.frame, self.frame.r, self.functions
         yes, no = r.constant_boolean(True), r.constant_boolean(False)
-        quiet_turns = r.integer(0)
-        with r.loop() as turns:
-            turns.leave_when(self.watch(time, self.x) == 0)
-            f.count[Count.FRESH].value = 1
+        iterations = r.integer(0)
+        with r.loop() as loop:
+            loop.leave_when(self.mark_fired(time, self.x) == 0)
+            f.count[Count.RESTARTED].value = 1
             # An iteration counts as a step, so that a call with few steps returns soon even at many events.
-            f.taken.value = f.taken.value + 1
+            f.steps_of_call.value = f.steps_of_call.value + 1
             if self.modes:
-                with r.when(r.call(functions.any_contradicts, f.reals, yes)):
-                    self._follow(time, quiet_turns)
-                    turns.again()
+                with r.when(r.call(functions.any_inconsistent, f.reals, yes)):
+                    self._iterate_following_modes(time, iterations)
+                    loop.again()
                 with r.unless(r.call(functions.any_fired, f.reals, no)):
-                    turns.leave_unless(r.call(functions.any_contradicts, f.reals, no))
-                    self._settle(time, quiet_turns)
-                    turns.again()
-            r.call(functions.take_signs, f.reals, no)
+                    loop.leave_unless(r.call(functions.any_inconsistent, f.reals, no))
+                    self._iterate_stateful_modes(time, iterations)
+                    loop.again()
+            r.call(functions.store_signs, f.reals, no)
             self._count_events(time, yes, bounds=True)
-            self._capture_again()
-            self._remember_modes()
+            self._recapture()
+            self._store_previous_modes()
             self.reset()
-            self.take_reset()
-            self._take_fired_signs()
-        self._remember_modes()
-        r.call(functions.take_signs, f.reals, no)
-        self._end_moment()
-        places, slopes = f.places, f.vector(f.places.guard_slopes)
-        f.copy(places.guards, places.guards_before, self.guards)
+            self.apply_reset()
+            self._store_fired_signs()
+        self._store_previous_modes()
+        r.call(functions.store_signs, f.reals, no)
+        self._end_instant()
+        workspace, derivatives = f.workspace, f.vector(f.workspace.guard_derivatives)
+        f.copy(workspace.guards, workspace.guards_before, self.guards)
         for i in r.each(self.guards):
-            slopes[i] = float("nan")
+            derivatives[i] = float("nan")
 
-    def _follow(self, time: Real, quiet_turns: IntegerVariable) -> None:
+    def _iterate_following_modes(self, time: Real, iterations: IntegerVariable) -> None:
         """One iteration of the following modes."""
         f, r, functions = self.frame, self.frame.r, self.functions
         r.call(functions.any_fired, f.reals, r.constant_boolean(True))
-        self._count_quiet_turn(time, quiet_turns)
+        self._count_iteration_without_event(time, iterations)
         self.reset()
-        self._hold(quiet_turns, follows=True)
-        r.call(functions.take_followers, f.reals)
+        self._restrict_mode_changes(iterations, follows=True)
+        r.call(functions.copy_following_modes, f.reals)
         self.evaluation.solve(self.point.memory, self.x)
         if f.sizes.tangents is not None:
             functions.evaluate(r, self.point.memory, self.x, f.reals, f.p)
-            r.call(functions.take_tangent_signs, f.reals)
+            r.call(functions.store_tangent_signs, f.reals)
 
-    def _settle(self, time: Real, quiet_turns: IntegerVariable) -> None:
+    def _iterate_stateful_modes(self, time: Real, iterations: IntegerVariable) -> None:
         """One iteration of the stateful modes, without an event."""
         f, r = self.frame, self.frame.r
-        r.call(self.functions.take_signs, f.reals, r.constant_boolean(False))
-        self._count_quiet_turn(time, quiet_turns)
+        r.call(self.functions.store_signs, f.reals, r.constant_boolean(False))
+        self._count_iteration_without_event(time, iterations)
         self.reset()
-        self._hold(quiet_turns, follows=False)
-        self.take_reset()
-        self._take_fired_signs()
+        self._restrict_mode_changes(iterations, follows=False)
+        self.apply_reset()
+        self._store_fired_signs()
 
-    def _capture_again(self) -> None:
+    def _recapture(self) -> None:
         """Capture the present values that belong to hysteresis modes, before the reset of this iteration."""
-        f, r, places = self.frame, self.frame.r, self.frame.places
+        f, r, workspace = self.frame, self.frame.r, self.frame.workspace
         if not f.sizes.recaptured:
             return
         z, new_z, unknowns, ticking = (
-            f.vector(place) for place in (places.z, places.new_z, places.trial_w, places.ticking)
+            f.vector(place) for place in (workspace.z, workspace.new_z, workspace.trial_w, workspace.ticking)
         )
         for clock in range(len(f.sizes.clocks)):
             ticking[clock] = 0.0
@@ -194,64 +196,65 @@ class Events:
         for i in r.each(len(f.sizes.recaptured)):
             z[recaptured[i]] = new_z[recaptured[i]]
 
-    def _remember_modes(self) -> None:
+    def _store_previous_modes(self) -> None:
         """Store the present values of hysteresis modes as their previous values."""
         f = self.frame
         if not f.sizes.remembered:
             return
-        z, (modes, before) = f.vector(f.places.z), zip(*f.sizes.remembered)
+        z, (modes, before) = f.vector(f.workspace.z), zip(*f.sizes.remembered)
         of_modes = f.r.integers("mode.remembering", modes)
         of_before = f.r.integers("mode.before", before)
         for i in f.r.each(len(modes)):
             z[of_before[i]] = z[of_modes[i]]
 
-    def _end_moment(self) -> None:
+    def _end_instant(self) -> None:
         """Give silenced guards their present signs, and set the momentary values to 0."""
         f, r = self.frame, self.frame.r
-        if self.functions.begin_anew:
-            r.call(self.functions.begin_anew, f.reals)
+        if self.functions.store_silenced_signs:
+            r.call(self.functions.store_silenced_signs, f.reals)
         if f.sizes.momentary:
-            z, momentary = f.vector(f.places.z), r.integers("momentary", f.sizes.momentary)
+            z, momentary = f.vector(f.workspace.z), r.integers("momentary", f.sizes.momentary)
             for i in r.each(len(f.sizes.momentary)):
                 z[momentary[i]] = 0.0
 
-    def _count_quiet_turn(self, time: Real, quiet_turns: IntegerVariable) -> None:
+    def _count_iteration_without_event(self, time: Real, iterations: IntegerVariable) -> None:
         """Count an iteration without an event; return from the loop after too many of them."""
-        self._count_events(time, quiet_turns.value == 0, bounds=False)
-        quiet_turns.value = quiet_turns.value + 1
-        few = quiet_turns.value < MOST_TURNS * self.modes
-        self.frame.leave_unless(few, Status.INCONSISTENT_MODES)
+        self._count_events(time, iterations.value == 0, bounds=False)
+        iterations.value = iterations.value + 1
+        allowed = iterations.value < MOST_ITERATIONS * self.modes
+        self.frame.leave_unless(allowed, Status.INCONSISTENT_MODES)
 
-    def _hold(self, quiet_turns: IntegerVariable, *, follows: bool) -> None:
+    def _restrict_mode_changes(self, iterations: IntegerVariable, *, follows: bool) -> None:
         """Keep the values of consistent modes. After many iterations only the first inconsistent mode
         changes."""
         f, r = self.frame, self.frame.r
-        one_by_one = quiet_turns.value > TURNS_TOGETHER + self.modes
-        r.call(self.functions.hold_modes, f.reals, r.constant_boolean(follows), one_by_one)
+        one_by_one = iterations.value > ITERATIONS_TOGETHER + self.modes
+        r.call(self.functions.restrict_mode_changes, f.reals, r.constant_boolean(follows), one_by_one)
 
-    def _take_fired_signs(self) -> None:
+    def _store_fired_signs(self) -> None:
         """Store the signs after the reset of the guards that fired; the others keep their stored signs."""
         f, r, t = self.frame, self.frame.r, self.point.memory
         self.evaluation.solve(t, self.x)
         self.functions.evaluate(r, t, self.x, f.reals, f.p)
-        r.call(self.functions.take_signs, f.reals, r.constant_boolean(True))
+        r.call(self.functions.store_signs, f.reals, r.constant_boolean(True))
 
     def _count_events(self, time: Real, first: Boolean, *, bounds: bool) -> None:
-        """Count the events; return from the loop if they are endless. ``bounds``: limit the next step."""
+        """Count the events; return from the loop if they are endless. With ``bounds`` the next step is
+        limited."""
         f = self.frame
-        bound = f.r.call(self.functions.note_events, time, f.reals, f.counts, first)
+        bound = f.r.call(self.functions.count_events, time, f.reals, f.counts, first)
         if bounds:
             f.scalar[Scalar.BOUND].value = bound
-        # ``note_events`` returns a negative bound for endless events.
+        # ``count_events`` returns a negative bound for endless events.
         f.leave_unless(bound >= 0.0, Status.ENDLESS_EVENTS)
 
-    def stop(self, time: Real) -> None:
+    def end_run(self, time: Real) -> None:
         """If a guard that ends the run is positive, record this instant, unless it is recorded, and
         return."""
         f, r = self.frame, self.frame.r
         if not f.sizes.stops:
             return
-        signs = [f.vector(f.places.signs)[k] for k in f.sizes.stops]
+        signs = [f.vector(f.workspace.signs)[k] for k in f.sizes.stops]
         positive: Boolean = signs[0] > 0.0
         for sign in signs[1:]:
             positive = positive | (sign > 0.0)
@@ -265,6 +268,6 @@ class Events:
                 f.arrays.samples[number] = time
                 row = f.arrays.out.after(number * f.n)
                 copy(r, self.x, row, f.n)
-                self.records.others(time, number, row)
+                self.records.discrete_and_unknowns(time, number, row)
                 f.increase(Count.SAMPLE)
             f.leave(Status.STOPPED)

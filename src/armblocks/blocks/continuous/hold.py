@@ -8,7 +8,7 @@ from typing import ClassVar
 from casadi import SX, fmax, if_else
 from numpy.typing import ArrayLike
 
-from armblocks.blocks.periodic import AGAIN, COUNT, FRESH, INSTANT, sample_time, sampled, sampling_guards
+from armblocks.blocks.periodic import AGAIN, COUNT, INSTANT, ODD, WHEN, sample_time, sampled, sampling_guards
 from armblocks.diagram import (
     Block,
     Guard,
@@ -67,7 +67,7 @@ class FirstOrderHold(Block):
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         shape = self.output_shapes(inputs)["y"]
         samples = (State("last", shape, "the last sample"), State("before", shape, "the sample before"))
-        return (COUNT, FRESH, *samples)
+        return (COUNT, WHEN, ODD, *samples)
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         return INSTANT, AGAIN
@@ -79,10 +79,14 @@ class FirstOrderHold(Block):
         return {"y": if_else(x["count"] > 0.0, line, x["last"])}
 
     def initial_states(self, p: Signals) -> Signals:
-        return {"count": SX(0.0), "fresh": SX(0.0), "last": p["initial"], "before": p["initial"]}
+        return {
+            **dict.fromkeys(("count", "when", "odd"), SX(0.0)),
+            "last": p["initial"],
+            "before": p["initial"],
+        }
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return sampling_guards(t, x, p)
+        return sampling_guards(t, x, p, u["u"], x["last"])
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         due, looks, counted = sampled(t, x, p, e)

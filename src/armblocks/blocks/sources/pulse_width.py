@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from casadi import SX, fmax, fmin, if_else, logic_and
 
-from armblocks.blocks.periodic import AGAIN, COUNT, FRESH, INSTANT, sample_time, sampled, sampling_guards
+from armblocks.blocks.periodic import AGAIN, COUNT, INSTANT, ODD, WHEN, sample_time, sampled, sampling_guards
 from armblocks.blocks.switching import since
 from armblocks.diagram import (
     Block,
@@ -52,7 +52,7 @@ class PWM(Block):
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         high = State("high", (), "1 during a pulse, else 0")
-        return (COUNT, FRESH, State("duty", (), "the duty cycle of this period"), high)
+        return (COUNT, WHEN, ODD, State("duty", (), "the duty cycle of this period"), high)
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         return INSTANT, AGAIN, Guard("edge", (), "t - the end of the pulse", 1)
@@ -61,15 +61,19 @@ class PWM(Block):
         return {"y": p["amplitude"] * x["high"]}
 
     def initial_states(self, p: Signals) -> Signals:
-        return dict.fromkeys(("count", "fresh", "duty", "high"), SX(0.0))
+        return dict.fromkeys(("count", "when", "odd", "duty", "high"), SX(0.0))
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         edge = since(t, sample_time(p, x["count"] - 1.0 + x["duty"]))
-        return {**sampling_guards(t, x, p), "edge": edge}
+        return {**sampling_guards(t, x, p, _limited(u["D"]), x["duty"]), "edge": edge}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         _, looks, counted = sampled(t, x, p, e)
-        duty = if_else(looks, fmin(fmax(u["D"], 0.0), 1.0), x["duty"])
+        duty = if_else(looks, _limited(u["D"]), x["duty"])
         ends = logic_and(e["edge"] > 0.0, x["duty"] < 1.0)
         high = if_else(looks, duty > 0.0, if_else(ends, 0.0, x["high"]))
         return {**counted, "duty": duty, "high": high}
+
+
+def _limited(duty: SX) -> SX:
+    return fmin(fmax(duty, 0.0), 1.0)
