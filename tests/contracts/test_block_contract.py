@@ -88,7 +88,7 @@ def all_equations(block: Block, shapes: Shapes) -> Function:
     """Return all values of the block's equations as a function of t, x, u, e and p."""
     features = features_of(block, shapes)
     states = (*features.states, *features.discrete, *features.modes, *features.conditions, *features.delays)
-    rates = [Slot(f"{name}'", shapes[name]) for name in features.rated_inputs]
+    rates = [Slot(f"{name}'", shapes[name]) for name in features.differentiated_inputs]
     ends = [
         [Slot(state.name, state.shape) for state in states],
         [Slot(name, shape) for name, shape in shapes.items()] + rates,
@@ -104,7 +104,7 @@ def all_equations(block: Block, shapes: Shapes) -> Function:
         for kind, equation in features.equations.items()
         if kind is not SlotKind.RESET or features.guards
     ]
-    found += [features.starts(p), features.past(p), features.held(p), features.guesses(p)]
+    found += [features.starts(p), features.history(p), features.held(p), features.guesses(p)]
     found += [{name: bound[k] for name, bound in features.delay_bounds(p).items()} for k in (0, 1)]
     found += [dict(enumerate(map(SX, features.breakpoints(p))))]
     return Function("f", [t, *symbols], [SX(value) for group in found for value in group.values()])

@@ -176,7 +176,7 @@ def through_another(u: Any) -> Any:
     return spring(u) + 1.0
 
 
-def made(factor: float) -> Callable[[Any], Any]:
+def driver(factor: float) -> Callable[[Any], Any]:
     return lambda u: factor * u
 
 
@@ -199,13 +199,13 @@ def test_the_key_contains_the_code_of_a_function_and_of_all_names_it_uses(
         through_another,
         by_default,
         by_modules,
-        made(2.0),
-        made(3.0),
+        driver(2.0),
+        driver(3.0),
     ]
     found = [keyed(function) for function in functions]
     assert len(set(found)) == len(found)
     assert found == [keyed(function) for function in functions]
-    assert keyed(made(2.0)) == found[4]
+    assert keyed(driver(2.0)) == found[4]
     monkeypatch.setattr(sys.modules[__name__], "STIFFNESS", 3.5)
     assert keyed(spring) != found[0] and keyed(through_another) != found[1]
     monkeypatch.undo()

@@ -34,8 +34,8 @@ def arguments(block: Block, features: Features, hidden: Mapping[str, float]) -> 
     """Return pseudo-random states and inputs without events; hidden inputs and states are as given, or 0."""
     random = np.random.default_rng(3)
     held = (*features.states, *features.discrete, *features.modes, *features.conditions, *features.delays)
-    before = (mode.before for mode in features.modes if mode.remembers)
-    inputs = (*features.inputs, *(f"{name}'" for name in features.rated_inputs))
+    before = (mode.before for mode in features.modes if mode.hysteresis)
+    inputs = (*features.inputs, *(f"{name}'" for name in features.differentiated_inputs))
 
     def drawn(names: Iterator[str]) -> dict[str, SX]:
         return {

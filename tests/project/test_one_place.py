@@ -71,8 +71,8 @@ class Screw(Joint):
 
     letter: ClassVar[str] = "H"
     unit: ClassVar[str] = "rad"
-    turn: ClassVar[float] = 1.0
-    slide: ClassVar[float] = 0.25
+    angular: ClassVar[float] = 1.0
+    linear: ClassVar[float] = 0.25
 '''
 USE_OF_JOINT = """
 import numpy as np

@@ -256,7 +256,7 @@ def obeys_equations(case: Case) -> Iterator[str]:
     flat = flat_diagram(case.diagram)
     shapes = infer_shapes(flat)
     for name, block in flat.blocks.items():
-        if block.sampled or block.rated_inputs or block.time_derivatives or name in flat.gates:
+        if block.sampled or block.differentiated_inputs or block.time_derivatives or name in flat.gates:
             continue
         if type(block) in CONTROLS or block.implicit_outputs:
             continue
@@ -264,9 +264,9 @@ def obeys_equations(case: Case) -> Iterator[str]:
             numbers = BlockNumbers(name, block, shapes.inputs[name], shapes.outputs[name])
         except UnsupportedError:
             continue
-        remembers = any(f"x:{m.name}" in numbers.needs("mode", m.name) for m in numbers.modes)
-        remembers = remembers or bool(numbers.remembered)
-        if numbers.states or numbers.discrete or numbers.lines or remembers:
+        hysteresis_modes = any(f"x:{m.name}" in numbers.needs("mode", m.name) for m in numbers.modes)
+        hysteresis_modes = hysteresis_modes or bool(numbers.remembered)
+        if numbers.states or numbers.discrete or numbers.lines or hysteresis_modes:
             continue
         yield from contradicted_rows(case, numbers)
 

@@ -78,7 +78,7 @@ class BlockNumbers:
         self.lines = block.delay_lines(shapes)
         self.conditions = block.conditions(shapes)
         self.modes = (*block.modes(shapes), *self.conditions)
-        self.remembered = [mode for mode in block.modes(shapes) if mode.remembers]
+        self.remembered = [mode for mode in block.modes(shapes) if mode.hysteresis]
         self.guards = block.guards(shapes)
         self.symbols: dict[str, SX] = {"t": SX.sym("t")}
         self.arrays: dict[str, np.ndarray] = {"t": np.zeros(1)}
@@ -89,7 +89,7 @@ class BlockNumbers:
         ends = {
             "x": {s.name: s.shape for s in (*self.states, *self.discrete, *self.lines, *self.modes)}
             | {mode.before: mode.shape for mode in self.remembered},
-            "u": {**shapes, **{f"{u}'": shapes[u] for u in block.rated_inputs}},
+            "u": {**shapes, **{f"{u}'": shapes[u] for u in block.differentiated_inputs}},
             "e": {guard.name: guard.shape for guard in self.guards},
             "p": {rule.name: shape_of(block.parameter_value(rule.name)) for rule in block.inputs_of_the_run()}
             | ({"T": ()} if block.sampled else {}),
@@ -138,7 +138,7 @@ class BlockNumbers:
         add("delay", block.delay_times(t, x, u, p), {line.name: () for line in self.lines})
         bounds = block.delay_bounds(p)
         add("shortest", {key: bound[0] for key, bound in bounds.items()}, dict.fromkeys(bounds, ()))
-        past = block.initial_past(p)
+        past = block.initial_history(p)
         add("past", past, {line.name: line.shape for line in self.lines})
         add("start", block.initial_states(p), shape_of_state)
         add("guess", block.initial_guesses(p), out_shapes)
@@ -224,7 +224,7 @@ class BlockNumbers:
         if not self.on:
             return
         for state in self.discrete:
-            if state.remembers:
+            if state.hysteresis:
                 self.arrays[f"x:{state.name}"][:] = self.value("capture", state.name)
         for mode in self.remembered:
             self.arrays[f"x:{mode.before}"][:] = self.arrays[f"x:{mode.name}"]

@@ -20,11 +20,11 @@ class Screw(Joint):
     unit: ClassVar[str] = "rad"
 
     @property
-    def turn(self) -> float:
+    def angular(self) -> float:
         return 1.0
 
     @property
-    def slide(self) -> float:
+    def linear(self) -> float:
         return 0.05
 
 

@@ -51,7 +51,7 @@ class Observer(Block):
         return (State("count", (), ""), State("left", (), ""))
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("on", (), "", follows=True, remembers=True), State("stuck", (), ""))
+        return (State("on", (), "", follows=True, hysteresis=True), State("stuck", (), ""))
 
     def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
         return (Condition("above", (), ""),)

@@ -25,16 +25,16 @@ def product(factors: Iterable[complex]) -> complex:
     return complex(re, im)
 
 
-def quotient(over: complex, under: complex) -> complex:
-    """``over / under`` by R. L. Smith's algorithm (Algorithm 116, Comm. ACM 5(8), 1962)."""
-    if abs(under.real) >= abs(under.imag):
-        ratio = under.imag / under.real
-        scale = under.real + under.imag * ratio
-        re, im = over.real + over.imag * ratio, over.imag - over.real * ratio
+def quotient(dividend: complex, divisor: complex) -> complex:
+    """``dividend / divisor`` by R. L. Smith's algorithm (Algorithm 116, Comm. ACM 5(8), 1962)."""
+    if abs(divisor.real) >= abs(divisor.imag):
+        ratio = divisor.imag / divisor.real
+        scale = divisor.real + divisor.imag * ratio
+        re, im = dividend.real + dividend.imag * ratio, dividend.imag - dividend.real * ratio
     else:
-        ratio = under.real / under.imag
-        scale = under.real * ratio + under.imag
-        re, im = over.real * ratio + over.imag, over.imag * ratio - over.real
+        ratio = divisor.real / divisor.imag
+        scale = divisor.real * ratio + divisor.imag
+        re, im = dividend.real * ratio + dividend.imag, dividend.imag * ratio - dividend.real
     return complex(re / scale, im / scale)
 
 

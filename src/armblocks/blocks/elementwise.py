@@ -22,8 +22,8 @@ def parameters_shape(block: Block, *names: str) -> Shape:
 
 def common_unit(units: Mapping[str, str]) -> str:
     """The common unit, or ``""``."""
-    found = set(units.values())
-    return found.pop() if len(found) == 1 else ""
+    distinct = set(units.values())
+    return distinct.pop() if len(distinct) == 1 else ""
 
 
 def unit_of_terms(units: Mapping[str, str]) -> Mapping[str, str]:

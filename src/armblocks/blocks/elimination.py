@@ -14,13 +14,13 @@ def solve(A: SX, B: SX) -> SX:
     """X (n, k) with A X = B, for A (n, n) and B (n, k); not finite if A is singular."""
     n = A.shape[0]
     rows, _ = _triangular(horzcat(A, B))
-    found: list[SX] = [SX(0, 0)] * n
+    solution: list[SX] = [SX(0, 0)] * n
     for i in reversed(range(n)):
         right = rows[i][:, n:]
         for j in range(i + 1, n):
-            right = right - rows[i][j] * found[j]
-        found[i] = right / rows[i][i]
-    return vertcat(*found)
+            right = right - rows[i][j] * solution[j]
+        solution[i] = right / rows[i][i]
+    return vertcat(*solution)
 
 
 def determinant(A: SX) -> SX:

@@ -49,10 +49,10 @@ def side_of(external_reset: str, trigger: SX) -> SX:
     return trigger != 0.0 if external_reset in LEVELS else trigger > 0.0
 
 
-def fires_at_tick(external_reset: str, trigger: SX, seen: SX) -> SX:
-    """Whether a sampled block is reset at this tick; ``seen`` is the state ``SEEN``."""
+def fires_at_tick(external_reset: str, trigger: SX, previous_side: SX) -> SX:
+    """Whether a sampled block is reset at this tick; ``previous_side`` is the state ``SEEN``."""
     side = side_of(external_reset, trigger)
-    rises, falls = logic_and(side, seen == 0.0), logic_and(side == 0.0, seen == 1.0)
+    rises, falls = logic_and(side, previous_side == 0.0), logic_and(side == 0.0, previous_side == 1.0)
     fires = {
         "rising": rises,
         "falling": falls,

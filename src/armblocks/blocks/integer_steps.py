@@ -40,14 +40,14 @@ def rounding_edges(function: str, n: SX, mirrored: bool = False) -> tuple[SX, SX
     return n, SX(0.0)
 
 
-def step_after(now: SX, before: SX, e: Signals, up: str = "up", down: str = "down") -> SX:
-    """An integer after the events at both ends of its interval; ``now``: computed from the present values.
+def step_after(target: SX, before: SX, e: Signals, up: str = "up", down: str = "down") -> SX:
+    """An integer after the events at both ends of its interval; ``target``: computed from the present values.
 
     A jump may pass several integers at once. The integer changes by at least one, because at a border
     rounding errors could give the old value again.
     """
-    lower = if_else(e[down] < 0.0, fmin(now, before - 1.0), before)
-    return if_else(e[up] > 0.0, fmax(now, before + 1.0), lower)
+    lower = if_else(e[down] < 0.0, fmin(target, before - 1.0), before)
+    return if_else(e[up] > 0.0, fmax(target, before + 1.0), lower)
 
 
 @dataclass(frozen=True)
@@ -85,23 +85,27 @@ class IntegerSteps:
 
     def mode_values(self, x: Signals, u: Signals) -> Signals:
         ends = self.guard_values(x, u)
-        return {self.mode: cell_of(self._now(u), x[self.mode], ends, f"{self.mark}up", f"{self.mark}down")}
+        return {
+            self.mode: cell_of(self._rounded(u), x[self.mode], ends, f"{self.mark}up", f"{self.mark}down")
+        }
 
     def contradictions(self, x: Signals, u: Signals) -> Signals:
         return {self.mode: beyond(self.guard_values(x, u), f"{self.mark}up", f"{self.mark}down")}
 
     def resets(self, x: Signals, u: Signals, e: Signals) -> Signals:
-        return {self.mode: step_after(self._now(u), x[self.mode], e, f"{self.mark}up", f"{self.mark}down")}
+        return {
+            self.mode: step_after(self._rounded(u), x[self.mode], e, f"{self.mark}up", f"{self.mark}down")
+        }
 
-    def _now(self, u: Signals) -> SX:
-        found = ROUNDINGS[self.function](u[self.signal])
-        return found if self.count is None else fmin(fmax(found, 0.0), self.count - 1.0)
+    def _rounded(self, u: Signals) -> SX:
+        integer = ROUNDINGS[self.function](u[self.signal])
+        return integer if self.count is None else fmin(fmax(integer, 0.0), self.count - 1.0)
 
 
 class BlockWithSteps(Block):
     """Base class of blocks with integers that follow inputs, given by :meth:`_steps`."""
 
-    memoryless: ClassVar[bool] = True
+    following_modes: ClassVar[bool] = True
 
     def _steps(self) -> tuple[IntegerSteps, ...]:
         """The integers whose changes are events."""

@@ -42,17 +42,17 @@ def weights(
     if method in ("flat", "nearest"):
         return cells(u, ends) if cell is None else [cell == float(k) for k in range(len(points))]
     if extrapolation == "linear" and method == "linear":
-        found = None if cell is None else [cell == float(k) for k in range(len(points) - 1)]
-        return linear_weights(u, points, found)
+        interval = None if cell is None else [cell == float(k) for k in range(len(points) - 1)]
+        return linear_weights(u, points, interval)
     if cell is None:
-        inside, found = fmin(fmax(u, points[0]), points[-1]), None
+        inside, interval = fmin(fmax(u, points[0]), points[-1]), None
     else:
         last = float(len(ends))
         inside = if_else(cell == 0.0, points[0], if_else(cell == last, points[-1], u))
-        at = fmin(fmax(cell, 1.0), last - 1.0)
-        found = [at == float(k) for k in range(1, len(points))]
+        inner_cell = fmin(fmax(cell, 1.0), last - 1.0)
+        interval = [inner_cell == float(k) for k in range(1, len(points))]
     if method == "linear":
-        return linear_weights(inside, points, found)
+        return linear_weights(inside, points, interval)
     fixed = [float(point) for point in points]  # splines need constant break points
     weighted = _cubic_weights(inside, fixed)
     if extrapolation == "linear":
@@ -82,12 +82,12 @@ def linear_weights(u: SX, points: Sequence[Point], interval: Sequence[SX] | None
 
     ``interval``, if given, is 1 for the interval of u and 0 for all others.
     """
-    found = [SX(0.0) for _ in points]
+    weights = [SX(0.0) for _ in points]
     for k, inside in enumerate(interval or cells(u, points[1:-1])):
         fraction = (u - points[k]) / (points[k + 1] - points[k])
-        found[k] = found[k] + if_else(inside, 1.0 - fraction, 0.0)
-        found[k + 1] = found[k + 1] + if_else(inside, fraction, 0.0)
-    return found
+        weights[k] = weights[k] + if_else(inside, 1.0 - fraction, 0.0)
+        weights[k + 1] = weights[k + 1] + if_else(inside, fraction, 0.0)
+    return weights
 
 
 def cells(u: SX, borders: Sequence[Point]) -> list[SX]:

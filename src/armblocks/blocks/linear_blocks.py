@@ -179,8 +179,8 @@ def roots_of(block: SectionsByRoots) -> tuple[Any, Any]:
 
 def section_output(system: LinearSystem, x: SX, u: SX) -> SX:
     """The output C x + D u; without feedthrough the input does not appear."""
-    found = dot(SX(np.asarray(system.C)), x)
-    return found + system.D * u if system.D else found
+    output = dot(SX(np.asarray(system.C)), x)
+    return output + system.D * u if system.D else output
 
 
 def section_change(system: LinearSystem, x: SX, u: SX) -> SX:

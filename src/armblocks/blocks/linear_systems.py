@@ -44,12 +44,12 @@ class LinearSystem:
     D: float
 
 
-def complex_roots(given: ArrayLike, where: str, name: str) -> Roots:
+def complex_roots(rows: ArrayLike, where: str, name: str) -> Roots:
     """Zeros or poles, as (n,) real numbers or (n, 2) rows (real, imaginary).
 
     Raises ``InputError`` if a complex root lacks its conjugate.
     """
-    values = np.asarray(given, dtype=np.float64)
+    values = np.asarray(rows, dtype=np.float64)
     if values.ndim == 2 and values.shape[1] != 2:
         raise InputError(
             f"{name} has shape {values.shape}",
@@ -225,14 +225,14 @@ def sampled(system: ZeroPoleGain) -> ZeroPoleGain:
 
 
 def _complex(real: Matrix, imaginary: Matrix) -> Roots:
-    found = np.empty(len(real), dtype=np.complex128)
-    found.real, found.imag = real, imaginary
-    return found
+    roots = np.empty(len(real), dtype=np.complex128)
+    roots.real, roots.imag = real, imaginary
+    return roots
 
 
-def _quotients(over: complex | Roots, under: Roots) -> Roots:
+def _quotients(dividends: complex | Roots, divisors: Roots) -> Roots:
     """Elementwise quotients; one dividend, or as many as divisors."""
-    pairs = zip(np.broadcast_to(over, under.shape).tolist(), under.tolist())
+    pairs = zip(np.broadcast_to(dividends, divisors.shape).tolist(), divisors.tolist())
     return np.array([quotient(complex(a), b) for a, b in pairs], dtype=np.complex128)
 
 
@@ -244,9 +244,9 @@ def _split(roots: Roots, centre: float) -> Roots:
 
 def _paired(roots: ArrayLike) -> Roots:
     """The roots without rounding errors of symmetry: exact conjugate pairs and exactly real roots."""
-    given = np.asarray(roots, dtype=np.complex128)
-    tolerance = np.array([1e-9 * magnitude(root) for root in given])
-    real = given[np.abs(given.imag) <= tolerance].real + 0j
-    upper = given[given.imag > tolerance]
-    found: Roots = np.concatenate([upper, np.conj(upper), real]).astype(np.complex128)
-    return found
+    values = np.asarray(roots, dtype=np.complex128)
+    tolerance = np.array([1e-9 * magnitude(root) for root in values])
+    real = values[np.abs(values.imag) <= tolerance].real + 0j
+    upper = values[values.imag > tolerance]
+    paired: Roots = np.concatenate([upper, np.conj(upper), real]).astype(np.complex128)
+    return paired

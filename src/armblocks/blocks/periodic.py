@@ -19,7 +19,7 @@ COUNT = State("count", (), "number of samples taken")
 WHEN = State("when", (), "time of the last sample")
 ODD = State("odd", (), "1 after an odd number of repeated samples, else 0")
 INSTANT = Guard("instant", (), "t - the next sample time", 1)
-AGAIN = Guard("again", (2,), "the input differs from its sample", -1)
+RESAMPLE = Guard("again", (2,), "the input differs from its sample", -1)
 SAME_VALUE = 2.0**-40
 """Relative difference within which a signal equals its sample: in loops the rounding errors differ."""
 
@@ -34,21 +34,25 @@ def sampled(t: SX, x: Signals, p: Signals, e: Signals) -> tuple[SX, SX, Signals]
 
     The start needs no event: every mode iteration at t = 0 samples the input again.
     """
-    due = logic_or(e["instant"] > 0.0, t >= sample_time(p, x["count"]))
-    looks = logic_or(due, _just_sampled(t, x, p))
+    at_sample_time = logic_or(e["instant"] > 0.0, t >= sample_time(p, x["count"]))
+    samples = logic_or(at_sample_time, _just_sampled(t, x, p))
     odd = if_else(mmin(e["again"]) < 0.0, 1.0 - x["odd"], x["odd"])
-    return due, looks, {"count": x["count"] + due, "when": if_else(due, t, x["when"]), "odd": odd}
+    return (
+        at_sample_time,
+        samples,
+        {"count": x["count"] + at_sample_time, "when": if_else(at_sample_time, t, x["when"]), "odd": odd},
+    )
 
 
 def sampling_guards(t: SX, x: Signals, p: Signals, value: SX, sample: SX) -> Signals:
     """The guards of both events: a sample time is reached; the input is no longer equal to its sample.
 
-    The two entries of the second guard take turns, because an entry that has fired needs another sign first.
+    The two entries of the second guard alternate, because an entry that has fired needs the other sign first.
     """
     close = fabs(value - sample) <= SAME_VALUE * fmax(fabs(value), fabs(sample))
     differs = logic_and(_just_sampled(t, x, p), mmax(logic_not(close)))
-    again = [if_else(logic_and(differs, x["odd"] == turn), -1.0, 1.0) for turn in (0.0, 1.0)]
-    return {"instant": since(t, sample_time(p, x["count"])), "again": vertcat(*again)}
+    values = [if_else(logic_and(differs, x["odd"] == turn), -1.0, 1.0) for turn in (0.0, 1.0)]
+    return {"instant": since(t, sample_time(p, x["count"])), "again": vertcat(*values)}
 
 
 def _just_sampled(t: SX, x: Signals, p: Signals) -> SX:

@@ -53,7 +53,7 @@ def pid_states(shape: Shape) -> tuple[State, ...]:
 
 
 def pid_start(p: Signals) -> Signals:
-    """Their initial values."""
+    """The initial values of the two states."""
     return {"integral": p["initial_integral"], "filter": p["initial_filter"]}
 
 
@@ -84,17 +84,17 @@ class ContinuousPid:
 
     def guards(self, shape: Shape) -> tuple[Guard, ...]:
         """Guards of the limits, the sign of the integral's rate, and the reset."""
-        found = list[Guard]()
+        declared = list[Guard]()
         if self.limited:
-            found += [
+            declared += [
                 Guard("upper", shape, "the output - upper", locates=True),
                 Guard("lower", shape, "the output - lower", locates=True),
             ]
         if self.clamps:
-            found.append(Guard("drive", shape, "the rate of the integral", locates=True))
+            declared.append(Guard("drive", shape, "the rate of the integral", locates=True))
         if self.external_reset != "none":
-            found.append(Guard("reset", (), "the trigger", RESETS[self.external_reset]))
-        return tuple(found)
+            declared.append(Guard("reset", (), "the trigger", RESETS[self.external_reset]))
+        return tuple(declared)
 
     def output(self, x: Signals, e: Errors, p: Signals) -> SX:
         """The controller output."""
@@ -118,36 +118,36 @@ class ContinuousPid:
         self, x: Signals, e: Errors, p: Signals, tracked: SX | None, trigger: SX | None
     ) -> Signals:
         """The values of :meth:`guards`."""
-        found = dict[str, SX]()
+        values = dict[str, SX]()
         if self.limited:
             free = self._free(x, e, p)
-            found |= {"upper": free - p["upper"], "lower": free - p["lower"]}
+            values |= {"upper": free - p["upper"], "lower": free - p["lower"]}
         if self.clamps:
-            found["drive"] = self._rate(x, e, p, tracked) - THRESHOLD_OFFSET
+            values["drive"] = self._rate(x, e, p, tracked) - THRESHOLD_OFFSET
         if trigger is not None:
-            found["reset"] = trigger - THRESHOLD_OFFSET
-        return found
+            values["reset"] = trigger - THRESHOLD_OFFSET
+        return values
 
     def mode_values(self, x: Signals, e: Errors, p: Signals, tracked: SX | None) -> Signals:
         """The modes that follow from the present values."""
-        found = dict[str, SX]()
+        values = dict[str, SX]()
         if self.limited:
-            found["limit"] = zone(self._free(x, e, p), p["lower"], p["upper"])
+            values["limit"] = zone(self._free(x, e, p), p["lower"], p["upper"])
         if self.clamps:
-            found["drive"] = if_else(self._rate(x, e, p, tracked) > 0.0, 1.0, -1.0)
-        return found
+            values["drive"] = if_else(self._rate(x, e, p, tracked) > 0.0, 1.0, -1.0)
+        return values
 
     def resets(self, x: Signals, p: Signals, fired: Signals) -> Signals:
         """The modes and states after events."""
-        found = dict[str, SX]()
+        after = dict[str, SX]()
         if self.limited:
-            found["limit"] = zone_after(x["limit"], fired)
+            after["limit"] = zone_after(x["limit"], fired)
         if self.clamps:
-            found["drive"] = if_else(fired["drive"] == 0.0, x["drive"], fired["drive"])
+            after["drive"] = if_else(fired["drive"] == 0.0, x["drive"], fired["drive"])
         if self.external_reset != "none":
-            still = fired["reset"] == 0.0
-            found |= {name: if_else(still, x[name], start) for name, start in pid_start(p).items()}
-        return found
+            untriggered = fired["reset"] == 0.0
+            after |= {name: if_else(untriggered, x[name], start) for name, start in pid_start(p).items()}
+        return after
 
     def _free(self, x: Signals, e: Errors, p: Signals) -> SX:
         P, _, D = _gains(self.form, p)
@@ -196,9 +196,9 @@ class SampledPid:
 
     def updates(self, x: Signals, e: Errors, p: Signals, trigger: SX | None, tracked: SX | None) -> Signals:
         """The next states."""
-        now = self._at_tick(x, p, trigger)
+        states = self._at_tick(x, p, trigger)
         _, I, D = _gains(self.form, p)  # noqa: E741
-        rate, free = I * e.integral, self._free(now, e, p)
+        rate, free = I * e.integral, self._free(states, e, p)
         limited = self._limited(free, p)
         if self.anti_windup == "clamping":
             outwards = (free - limited) * rate > 0.0
@@ -208,23 +208,23 @@ class SampledPid:
             rate = rate + p["Kb"] * (limited - free) / (1.0 + share)
         if tracked is not None:
             rate = rate + p["Kt"] * (tracked - limited)
-        found = {
-            "integral": now["integral"] + p["T"] * rate,
-            "filter": now["filter"] + p["T"] * self._derivative(now, D * e.derivative, p),
+        after = {
+            "integral": states["integral"] + p["T"] * rate,
+            "filter": states["filter"] + p["T"] * self._derivative(states, D * e.derivative, p),
         }
         if trigger is not None:
-            found["trigger"] = if_else(trigger > 0.0, 1.0, -1.0)
-        return found
+            after["trigger"] = if_else(trigger > 0.0, 1.0, -1.0)
+        return after
 
-    def _free(self, now: Signals, e: Errors, p: Signals) -> SX:
+    def _free(self, states: Signals, e: Errors, p: Signals) -> SX:
         P, I, D = _gains(self.form, p)  # noqa: E741
-        free = P * e.proportional + now["integral"] + self._derivative(now, D * e.derivative, p)
+        free = P * e.proportional + states["integral"] + self._derivative(states, D * e.derivative, p)
         share = _share(self.integrator_method)
         return free + share * p["T"] * I * e.integral if share else free
 
-    def _derivative(self, now: Signals, weighted: SX, p: Signals) -> SX:
+    def _derivative(self, states: Signals, weighted: SX, p: Signals) -> SX:
         """The filtered derivative d = N (D e - f), where f is the sum of d."""
-        rate, share = p["N"] * (weighted - now["filter"]), _share(self.filter_method)
+        rate, share = p["N"] * (weighted - states["filter"]), _share(self.filter_method)
         return rate / (1.0 + share * p["T"] * p["N"]) if share else rate
 
     def _at_tick(self, x: Signals, p: Signals, trigger: SX | None) -> Signals:

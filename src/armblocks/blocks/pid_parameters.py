@@ -16,7 +16,7 @@ from armblocks.diagram import (
     Shapes,
     WorkedExample,
     broadcast,
-    made,
+    driver,
     parameter,
     shape_of,
 )
@@ -88,12 +88,12 @@ def further_inputs(external_reset: str, tracking: bool) -> tuple[Port, ...]:
 
 def pid_example(kind: str, **parameters: Any) -> WorkedExample:
     """A closed loop with two lags and a step of the reference."""
-    plant = made("SecondOrderLag", natural_frequency=2.0, damping=0.8).named("plant")
-    step = made("Step")
+    plant = driver("SecondOrderLag", natural_frequency=2.0, damping=0.8).named("plant")
+    step = driver("Step")
     feeds = (
         {"r": step, "u": plant.by(u="y")}
         if kind == "two"
-        else {"u": made("Sum", signs="+-").by(u1=step, u2=plant.by(u="y"))}
+        else {"u": driver("Sum", signs="+-").by(u1=step, u2=plant.by(u="y"))}
     )
     return WorkedExample(
         shows="The plant follows a step of the reference; the control action is largest at the step.",

@@ -44,11 +44,11 @@ def stream_start(seed: SX, shape: Shape) -> dict[str, SX]:
         for _ in range(SEED_BITS):
             half = floor(rest / 2.0)
             odd = rest - 2.0 * half
-            state = [if_else(odd, far, near) for far, near in zip(_times(jump, state, modulus), state)]
+            state = [if_else(odd, far, near) for far, near in zip(_product(jump, state, modulus), state)]
             rest, jump = half, _squared(jump, 1, modulus)
         hop, elements = _squared(matrix, 76, modulus), [state]
         for _ in range(count - 1):
-            elements.append(_times(hop, elements[-1], modulus))
+            elements.append(_product(hop, elements[-1], modulus))
         terms += [[element[k] for element in elements] for k in range(3)]
     return {name: _shaped(values, shape) for name, values in zip(_NAMES, terms)}
 
@@ -83,14 +83,14 @@ def _modulo(value: SX, modulus: float) -> SX:
     return value - modulus * floor(value / modulus)
 
 
-def _times(matrix: _Matrix, vector: Sequence[SX], modulus: int) -> list[SX]:
+def _product(matrix: _Matrix, vector: Sequence[SX], modulus: int) -> list[SX]:
     """A matrix of 32-bit numbers times a vector, modulo; entries are split in two, so that sums are exact."""
-    found = list[SX]()
+    product = list[SX]()
     for row in matrix:
         high = sum((float(entry >> 17) * value for entry, value in zip(row, vector)), SX(0.0))
         low = sum((float(entry & 0x1FFFF) * value for entry, value in zip(row, vector)), SX(0.0))
-        found.append(_modulo(131072.0 * _modulo(high, modulus) + low, modulus))
-    return found
+        product.append(_modulo(131072.0 * _modulo(high, modulus) + low, modulus))
+    return product
 
 
 def _squared(matrix: _Matrix, times: int, modulus: int) -> _Matrix:

@@ -31,26 +31,26 @@ def spline_derivatives(points: Sequence[float], values: Array) -> Array:
     if len(x) == 2:
         return np.concatenate([quotients, quotients])
     lower, diagonal, upper = _diagonals(h)
-    found = _right_side(h, quotients)
+    derivatives = _right_side(h, quotients)
     for k in range(1, len(x)):
         factor = lower[k - 1] / diagonal[k - 1]
         diagonal[k] -= factor * upper[k - 1]
-        found[k] -= factor * found[k - 1]
-    found[-1] /= diagonal[-1]
+        derivatives[k] -= factor * derivatives[k - 1]
+    derivatives[-1] /= diagonal[-1]
     for k in range(len(x) - 2, -1, -1):
-        found[k] = (found[k] - upper[k] * found[k + 1]) / diagonal[k]
-    return found
+        derivatives[k] = (derivatives[k] - upper[k] * derivatives[k + 1]) / diagonal[k]
+    return derivatives
 
 
 @lru_cache(maxsize=16)
 def with_derivatives(axes: tuple[tuple[float, ...], ...], table: object) -> Array:
     """The table of a long spline: values and derivatives alternate along each of the given axes."""
-    found = np.asarray(table, dtype=np.float64)
+    entries = np.asarray(table, dtype=np.float64)
     for k, points in enumerate(axes):
-        values = np.moveaxis(found, k, 0)
+        values = np.moveaxis(entries, k, 0)
         pairs = np.stack([values, spline_derivatives(points, values)], axis=1)
-        found = np.moveaxis(pairs.reshape(2 * len(points), *values.shape[1:]), 0, k)
-    return np.ascontiguousarray(found)
+        entries = np.moveaxis(pairs.reshape(2 * len(points), *values.shape[1:]), 0, k)
+    return np.ascontiguousarray(entries)
 
 
 def spline_corners(u: SX, points: SX, cell: SX | None, *, straight: bool) -> list[tuple[SX, SX]]:
@@ -75,12 +75,12 @@ def spline_corners(u: SX, points: SX, cell: SX | None, *, straight: bool) -> lis
     if straight:
         beyond = u - inside
         left, right = left + if_else(u < first, beyond, 0.0), right + if_else(u > last, beyond, 0.0)
-    place = 2.0 * k
+    offset = 2.0 * k
     return [
-        (place, r * r * (1.0 + 2.0 * s)),
-        (place + 1.0, left),
-        (place + 2.0, s * s * (1.0 + 2.0 * r)),
-        (place + 3.0, right),
+        (offset, r * r * (1.0 + 2.0 * s)),
+        (offset + 1.0, left),
+        (offset + 2.0, s * s * (1.0 + 2.0 * r)),
+        (offset + 3.0, right),
     ]
 
 
@@ -101,13 +101,13 @@ def _diagonals(h: Array) -> tuple[Array, Array, Array]:
 def _right_side(h: Array, quotients: Array) -> Array:
     """The right side ``(n, …)`` of that system, from the difference quotients ``(n - 1, …)``."""
     n = len(h) + 1
-    found = np.empty((n, *quotients.shape[1:]))
+    right = np.empty((n, *quotients.shape[1:]))
     before, after = (part.reshape(-1, *[1] * (quotients.ndim - 1)) for part in (h[:-1], h[1:]))
-    found[1:-1] = 3.0 * (after * quotients[:-1] + before * quotients[1:])
+    right[1:-1] = 3.0 * (after * quotients[:-1] + before * quotients[1:])
     if n == 3:
-        found[0], found[2] = 2.0 * quotients[0], 2.0 * quotients[1]
-        return found
+        right[0], right[2] = 2.0 * quotients[0], 2.0 * quotients[1]
+        return right
     first, last = h[0] + h[1], h[-1] + h[-2]
-    found[0] = ((h[0] + 2.0 * first) * h[1] * quotients[0] + h[0] * h[0] * quotients[1]) / first
-    found[-1] = ((h[-1] + 2.0 * last) * h[-2] * quotients[-1] + h[-1] * h[-1] * quotients[-2]) / last
-    return found
+    right[0] = ((h[0] + 2.0 * first) * h[1] * quotients[0] + h[0] * h[0] * quotients[1]) / first
+    right[-1] = ((h[-1] + 2.0 * last) * h[-2] * quotients[-1] + h[-1] * h[-1] * quotients[-2]) / last
+    return right

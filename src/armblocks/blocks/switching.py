@@ -82,19 +82,20 @@ def beyond(guards: Signals, up: str = "up", down: str = "down") -> SX:
     return logic_or(guards[up] > 0.0, guards[down] < 0.0)
 
 
-def cell_of(now: SX, before: SX, guards: Signals, up: str = "up", down: str = "down") -> SX:
-    """The consistent cell: ``before`` while the guards at its ends allow it, else ``now``.
+def cell_of(target: SX, before: SX, guards: Signals, up: str = "up", down: str = "down") -> SX:
+    """The consistent cell: ``before`` while the guards at its ends allow it, else ``target``.
 
-    ``now`` is computed from the present values. If it equals ``before`` because of rounding, the result is
+    ``target`` is computed from the present values. If it equals ``before`` because of rounding, the result is
     the next cell.
     """
-    left = if_else(guards[down] < 0.0, fmin(now, before - 1.0), before)
-    return if_else(guards[up] > 0.0, fmax(now, before + 1.0), left)
+    left = if_else(guards[down] < 0.0, fmin(target, before - 1.0), before)
+    return if_else(guards[up] > 0.0, fmax(target, before + 1.0), left)
 
 
-def counted(now: SX, before: SX, due: SX) -> SX:
-    """The number of past edges: ``before`` + 1, or ``now`` (by the time), when the next edge is due."""
-    return if_else(due, fmax(now, before + 1.0), before)
+def counted(target: SX, before: SX, reached: SX) -> SX:
+    """The number of past edges: ``before`` + 1, or ``target`` (by the time), where ``reached`` (the next
+    edge) is 1."""
+    return if_else(reached, fmax(target, before + 1.0), before)
 
 
 def zone_after(mode: SX, e: Signals) -> SX:

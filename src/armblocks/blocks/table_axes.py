@@ -139,8 +139,8 @@ class LongAxis:
     def cell(self, u: SX) -> SX:
         last = last_at_or_below(self.points, u)
         if self.method == "nearest":
-            here = fmin(fmax(last, 0.0), self._count - 1.0)
-            return if_else(last >= self._count, float(self._count), here + (u >= self._border(here)))
+            border = fmin(fmax(last, 0.0), self._count - 1.0)
+            return if_else(last >= self._count, float(self._count), border + (u >= self._border(border)))
         return fmin(fmax(last + (1.0 if self._constant_outside else 0.0), 0.0), float(self._count))
 
     def above_upper_boundary(self, u: SX, cell: SX) -> SX:
@@ -232,12 +232,12 @@ class Axes:
 
     def guard_values(self, x: Signals, u: Signals) -> Signals:
         """The distances of the inputs beyond both ends of their cells."""
-        found = dict[str, SX]()
+        values = dict[str, SX]()
         for port, k, axis in self._axes_with_modes():
-            place = [u[port], x[f"cell{k}"]]
-            found[f"up{k}"] = elementwise(place, axis.above_upper_boundary) + THRESHOLD_OFFSET
-            found[f"down{k}"] = elementwise(place, axis.above_lower_boundary) + THRESHOLD_OFFSET
-        return found
+            position = [u[port], x[f"cell{k}"]]
+            values[f"up{k}"] = elementwise(position, axis.above_upper_boundary) + THRESHOLD_OFFSET
+            values[f"down{k}"] = elementwise(position, axis.above_lower_boundary) + THRESHOLD_OFFSET
+        return values
 
     def mode_values(self, x: Signals, u: Signals) -> Signals:
         """The cells that follow from the present values."""
@@ -261,12 +261,12 @@ class Axes:
 
     def resets(self, x: Signals, u: Signals, e: Signals) -> Signals:
         """The cells after events: the next cell, or the cell to which u has jumped."""
-        found = dict[str, SX]()
+        cells = dict[str, SX]()
         for port, k, axis in self._axes_with_modes():
-            here, cell = elementwise([u[port]], axis.cell), x[f"cell{k}"]
-            down = if_else(e[f"down{k}"] < 0.0, fmin(here, cell - 1.0), cell)
-            found[f"cell{k}"] = if_else(e[f"up{k}"] > 0.0, fmax(here, cell + 1.0), down)
-        return found
+            target, cell = elementwise([u[port]], axis.cell), x[f"cell{k}"]
+            down = if_else(e[f"down{k}"] < 0.0, fmin(target, cell - 1.0), cell)
+            cells[f"cell{k}"] = if_else(e[f"up{k}"] > 0.0, fmax(target, cell + 1.0), down)
+        return cells
 
     def value(self, table: SX, shape: Shape, x: Signals, u: Signals) -> SX:
         """The output of a table of this shape, element by element."""
@@ -276,8 +276,8 @@ class Axes:
                 cells[port] = elementwise([u[port]], axis.cell)
         entries = flatten(table, shape)
 
-        def at(*places: SX) -> SX:
-            positions, known = dict(zip(self.axes, places)), dict(zip(cells, places[len(self.axes) :]))
+        def at(*point: SX) -> SX:
+            positions, known = dict(zip(self.axes, point)), dict(zip(cells, point[len(self.axes) :]))
             corners = list[list[tuple[SX, SX]]]()
             weights_by_axis = list[list[SX]]()
             for port, axis in self.axes.items():
@@ -308,19 +308,19 @@ def axis(points: SX | Sequence[float | SX], method: str, extrapolation: str) -> 
 def read(entries: SX, shape: Shape, corners: Sequence[Sequence[tuple[SX, SX]]]) -> SX:
     """The weighted sum of the entries of a flat table at the corners of a cell, read by index."""
     strides = [math.prod(shape[k + 1 :]) for k in range(len(shape))]
-    found = SX(0.0)
+    total = SX(0.0)
     for corner in itertools.product(*corners):
-        index = sum((float(stride) * place for stride, (place, _) in zip(strides, corner)), SX(0.0))
+        index = sum((float(stride) * entry for stride, (entry, _) in zip(strides, corner)), SX(0.0))
         weight = math.prod((weight for _, weight in corner), start=SX(1.0))
-        found = found + weight * read_entry(entries, index)
-    return found
+        total = total + weight * read_entry(entries, index)
+    return total
 
 
 @dataclass(frozen=True, kw_only=True)
 class BlockWithAxes(Block):
     """A block with a lookup table. The cells are its modes, and a change of the cell is an event."""
 
-    memoryless: ClassVar[bool] = True
+    following_modes: ClassVar[bool] = True
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
         return self._axes().modes(inputs)
@@ -381,16 +381,16 @@ class BlockWithAxes(Block):
     def _axes(self, p: Signals | None = None) -> Axes:
         """The axis of each input, with the positions from run inputs where the table is long."""
         extrapolation = str(self.parameter_value("extrapolation"))
-        found = dict[str, Axis]()
+        axes = dict[str, Axis]()
         if p and is_spline(self, self._is_long()):
             first = 0
             for port, points in self._positions_by_input().items():
-                found[port] = SplineAxis(p["knots"][first : first + len(points)], extrapolation)
+                axes[port] = SplineAxis(p["knots"][first : first + len(points)], extrapolation)
                 first += len(points)
         else:
             along = self._run_positions(p) if p and self._is_long() else self._positions_by_input()
-            found = {port: axis(points, self._method, extrapolation) for port, points in along.items()}
-        return Axes(found, bool(self.parameter_value("zero_crossing")))
+            axes = {port: axis(points, self._method, extrapolation) for port, points in along.items()}
+        return Axes(axes, bool(self.parameter_value("zero_crossing")))
 
     def _value(self, x: Signals, u: Signals, p: Signals) -> SX:
         """The output of the table, element by element."""

@@ -59,7 +59,7 @@ from armblocks.diagram.units import infer_units, integral_unit, rate_unit
 from armblocks.diagram.user_function import UserFunction
 from armblocks.diagram.variation import with_comments, with_parameters
 from armblocks.diagram.virtual_wiring import BusAssignment, BusCreator, BusSelector, From, Goto
-from armblocks.diagram.worked_example import Fed, Feed, WorkedExample, made
+from armblocks.diagram.worked_example import Driver, ExampleBlock, WorkedExample, driver
 
 __all__ = [
     "REQUIRED",
@@ -83,10 +83,10 @@ __all__ = [
     "DiagramBuilder",
     "DiagramDifference",
     "DiagramShapes",
+    "Driver",
     "EnabledSubsystem",
     "EnabledTriggeredSubsystem",
-    "Fed",
-    "Feed",
+    "ExampleBlock",
     "FileSettings",
     "FlatForm",
     "From",
@@ -127,6 +127,7 @@ __all__ = [
     "content_key",
     "diagram_difference",
     "diagram_views",
+    "driver",
     "flat_diagram",
     "flatten_hierarchy",
     "formula",
@@ -135,7 +136,6 @@ __all__ = [
     "integral_unit",
     "is_inside",
     "levels_of",
-    "made",
     "mask_parameter",
     "open_inputs",
     "parameter",

@@ -101,23 +101,23 @@ def with_analysis_points(
     ``UnknownNameError`` for unknown names and ``InputError`` for duplicate or unsuitable ones.
     """
     form = flatten_hierarchy(diagram)
-    given, diagram = diagram, form.diagram
+    hierarchy, diagram = diagram, form.diagram
     parameters: dict[str, str] = {}
-    moved: dict[PortRef, str] = {}
-    masked = mask_parameters(given)
-    for name in _once(inputs, "input"):
+    perturbed: dict[PortRef, str] = {}
+    masked = mask_parameters(hierarchy)
+    for name in _unique(inputs, "input"):
         path = name if name in masked and name not in diagram.blocks else _parameter(diagram, name)
         if path is None:
-            moved[_port(form, name, "input")] = name
+            perturbed[_port(form, name, "input")] = name
         else:
             parameters[name] = path
-    opened = {_port(form, name, "opening") for name in _once(openings, "opening")}
-    if not moved and not opened:
-        return PreparedDiagram(diagram=given, inputs=parameters, levels={})
-    shapes = infer_shapes(given)
+    opened = {_port(form, name, "opening") for name in _unique(openings, "opening")}
+    if not perturbed and not opened:
+        return PreparedDiagram(diagram=hierarchy, inputs=parameters, levels={})
+    shapes = infer_shapes(hierarchy)
     blocks, wires = dict(diagram.blocks), list(diagram.connections)
     levels: dict[str, str] = {}
-    chosen = {*moved, *opened}
+    chosen = {*perturbed, *opened}
     # Output ports first: a point at an input port is then inserted after the point of its driver.
     for ref in sorted(chosen, key=lambda ref: (not _is_output(diagram, ref), ref)):
         source = ref if _is_output(diagram, ref) else diagram.drivers[ref]
@@ -126,8 +126,8 @@ def with_analysis_points(
         blocks[name] = _point(shape, ref in opened)
         if ref in opened:
             levels[f"{name}.level"] = str(source)
-        if ref in moved:
-            parameters[moved[ref]] = f"{name}.offset"
+        if ref in perturbed:
+            parameters[perturbed[ref]] = f"{name}.offset"
         wires = _rewired(wires, ref, name, source)
     prepared = dataclasses.replace(diagram, blocks=blocks, connections=tuple(wires))
     return PreparedDiagram(
@@ -135,7 +135,7 @@ def with_analysis_points(
     )
 
 
-def _once(names: Sequence[str], kind: str) -> Sequence[str]:
+def _unique(names: Sequence[str], kind: str) -> Sequence[str]:
     for index, name in enumerate(names):
         if name in names[:index]:
             raise InputError(
@@ -187,25 +187,25 @@ def _is_output(diagram: Diagram, ref: PortRef) -> bool:
 
 
 def _point(shape: Shape, opened: bool) -> Block:
-    nothing = np.zeros(shape)
-    return LoopOpening(level=nothing, offset=nothing) if opened else InputPoint(offset=nothing)
+    zeros = np.zeros(shape)
+    return LoopOpening(level=zeros, offset=zeros) if opened else InputPoint(offset=zeros)
 
 
-def _new_name(ref: PortRef, taken: Mapping[str, Block]) -> str:
+def _new_name(ref: PortRef, blocks: Mapping[str, Block]) -> str:
     name = f"{ref.block}:{ref.port}"
-    while name in taken:
+    while name in blocks:
         name += "'"
     return name
 
 
 def _rewired(wires: Sequence[Connection], ref: PortRef, point: str, source: PortRef) -> list[Connection]:
     """The connections, with the point inserted into those that start or end at a port."""
-    entry, way_out = PortRef(point, "u"), PortRef(point, "y")
+    point_input, point_output = PortRef(point, "u"), PortRef(point, "y")
     if ref == source:
         changed = [
-            dataclasses.replace(wire, source=way_out) if wire.source == ref else wire for wire in wires
+            dataclasses.replace(wire, source=point_output) if wire.source == ref else wire for wire in wires
         ]
-        return [*changed, Connection(source, entry)]
+        return [*changed, Connection(source, point_input)]
     before = next(wire for wire in wires if wire.target == ref)
     others = [wire for wire in wires if wire.target != ref]
-    return [*others, Connection(before.source, entry), Connection(way_out, ref)]
+    return [*others, Connection(before.source, point_input), Connection(point_output, ref)]

@@ -82,11 +82,11 @@ class Block(ABC):
     ``port?`` of the inputs at the tick and returns those of the outputs."""
     virtual: ClassVar[bool] = False
     """Whether the block represents connections only: it has no equations and is removed before tracing."""
-    spreads: ClassVar[tuple[str, ...]] = ()
+    broadcast_parameters: ClassVar[tuple[str, ...]] = ()
     """Array parameters whose shape is broadcast with the input shapes to the output shape."""
-    memoryless: ClassVar[bool] = False
+    following_modes: ClassVar[bool] = False
     """Whether all modes are functions of the present signals, and all guards only locate their changes."""
-    rated_inputs: ClassVar[tuple[str, ...]] = ()
+    differentiated_inputs: ClassVar[tuple[str, ...]] = ()
     """Inputs whose exact time derivative the equations read, as ``u["name'"]``."""
     example: ClassVar[WorkedExample] = WorkedExample()
     """The worked example; by default the block gets inputs that fit its ports."""
@@ -106,19 +106,19 @@ class Block(ABC):
     """Width and height of a card, px; by default the size of the sign. Port names may widen it."""
 
     def __post_init__(self) -> None:
-        formulas, open_ones = dict(self.formulas), False
+        formulas, unresolved = dict(self.formulas), False
         for rule in self.parameters():
             where = f"{type(self).__name__}.{rule.name}"
             value = getattr(self, rule.name)
             if isinstance(value, ParameterFormula):
                 formulas[rule.name] = value.text
                 if formula_names(value.text):
-                    open_ones = True  # names are resolved in the diagram that contains the block
+                    unresolved = True  # names are resolved in the diagram that contains the block
                     continue
                 value = formula_value(rule, value.text, {}, type(self).__name__)
             object.__setattr__(self, rule.name, rule.check(value, where))
         object.__setattr__(self, "formulas", tuple(sorted(formulas.items())))
-        if not open_ones:
+        if not unresolved:
             self.check()
 
     # -- description -------------------------------------------------------------------------------------
@@ -190,9 +190,9 @@ class Block(ABC):
             if name not in known:
                 raise UnknownNameError("parameter", name, known, where=self.type_name())
         texts = {name: value.text for name, value in values.items() if isinstance(value, ParameterFormula)}
-        kept = {name: text for name, text in self.formulas if name not in values} | texts
+        formulas = {name: text for name, text in self.formulas if name not in values} | texts
         plain = {name: value for name, value in values.items() if name not in texts}
-        return self.replaced({**plain, "formulas": tuple(sorted(kept.items()))})
+        return self.replaced({**plain, "formulas": tuple(sorted(formulas.items()))})
 
     def in_scope(self, scope: Scope, where: str) -> Self:
         """The block with its formulas evaluated in a scope.
@@ -264,21 +264,21 @@ class Block(ABC):
         return ()
 
     def delay_lines(self, inputs: Shapes) -> tuple[DelayLine, ...]:
-        """Delayed inputs that the equations read, each in ``rated_inputs`` too."""
+        """Delayed inputs that the equations read, each in ``differentiated_inputs`` too."""
         return ()
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
         """Shapes of the outputs whose port does not declare one, from the shapes of all inputs.
 
         By default it is the broadcast shape of the inputs without a declared shape and of the parameters in
-        ``spreads``. Raises ``InputError`` where the shapes do not fit.
+        ``broadcast_parameters``. Raises ``InputError`` where the shapes do not fit.
         """
         ends = [port.name for port in self.output_ports() if port.shape is None]
         if self.virtual or not ends:
             return {}
         own = {port.name for port in self.input_ports() if port.shape is not None}
         wide = {name: shape for name, shape in inputs.items() if name not in own}
-        for name in self.spreads:
+        for name in self.broadcast_parameters:
             wide[f"parameter {name}" if name in wide else name] = shape_of(self.parameter_value(name))
         return dict.fromkeys(ends, broadcast(wide))
 
@@ -354,7 +354,7 @@ class Block(ABC):
         """The lower and upper limit of each delay (s), above 0; no step exceeds the lower limit."""
         return {}
 
-    def initial_past(self, p: Signals) -> Signals:
+    def initial_history(self, p: Signals) -> Signals:
         """The value of each delay line for times before the start."""
         return {}
 
@@ -375,8 +375,8 @@ class Block(ABC):
         test is cheaper than the value.
         """
         before = {mode: x[name_before(mode)] for mode in x if name_before(mode) in x}
-        found = self.mode_values(t, {**x, **before}, u, p)
-        return {name: logic_or(value > x[name], value < x[name]) for name, value in found.items()}
+        consistent = self.mode_values(t, {**x, **before}, u, p)
+        return {name: logic_or(value > x[name], value < x[name]) for name, value in consistent.items()}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         """New values of the states and modes that an event may change.

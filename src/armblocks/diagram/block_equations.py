@@ -20,7 +20,11 @@ from armblocks.diagram.block import Block, Shapes, Signals
 from armblocks.diagram.conditional_equations import FIRE, conditional
 from armblocks.diagram.features import Arguments, Features, SlotKind, features_of
 from armblocks.diagram.flat_values import natural, spread, tunable_slots
-from armblocks.diagram.generated_modes import condition_answers, with_memory, with_modes_of_conditions
+from armblocks.diagram.generated_modes import (
+    evaluated_conditions,
+    with_modes_of_conditions,
+    with_previous_modes,
+)
 from armblocks.diagram.parameter import shape_of
 from armblocks.diagram.port import DelayLine, Guard, State
 from armblocks.equations import Shape, Slot, call_with_constants, has_elementary
@@ -129,7 +133,7 @@ class _Structure:
     tunable_shapes: tuple[Shape, ...]
     input_shapes: tuple[tuple[str, Shape], ...]
     period: float
-    settled: bool
+    consistent_modes: bool
     hidden: tuple[str, ...]
     clocked: bool
     block: Block = field(compare=False)
@@ -140,14 +144,13 @@ def block_equations(
     input_shapes: Shapes,
     *,
     period: float = 1.0,
-    settled: bool = False,
+    consistent_modes: bool = False,
     hidden: Collection[str] = (),
 ) -> BlockEquations:
     """Trace a block whose inputs have these shapes; equal structures are traced once.
 
-    ``period`` s: of a sampled block's clock. ``settled``: with modes computed from the present values instead
-    of by events. ``hidden``: the hidden inputs of a block in a conditional subsystem.
-    """
+    ``period`` s: of a sampled block's clock. ``consistent_modes``: with modes computed from the present
+    values instead of by events. ``hidden``: the hidden inputs of a block in a conditional subsystem."""
     clocked = block.sampled and FIRE not in hidden
     inputs = block.inputs_of_the_run()
     return _trace(
@@ -157,7 +160,8 @@ def block_equations(
             tunable_shapes=tuple(shape_of(block.parameter_value(rule.name)) for rule in inputs),
             input_shapes=tuple(input_shapes.items()),
             period=period if clocked else 0.0,
-            settled=settled and bool(block.modes(input_shapes) or block.conditions(input_shapes) or hidden),
+            consistent_modes=consistent_modes
+            and bool(block.modes(input_shapes) or block.conditions(input_shapes) or hidden),
             hidden=tuple(sorted(hidden)),
             clocked=clocked,
             block=block,
@@ -169,19 +173,21 @@ def block_equations(
 def _trace(structure: _Structure) -> BlockEquations:
     own = features_of(structure.block, dict(structure.input_shapes))
     if structure.hidden:
-        own = conditional(own, structure.hidden, clocked=structure.clocked, ticking=structure.settled)
+        own = conditional(
+            own, structure.hidden, clocked=structure.clocked, ticking=structure.consistent_modes
+        )
     # Conditions whose change is an event are modes; the others are evaluated directly.
-    located = () if structure.settled else tuple(entry for entry in own.conditions if entry.located)
+    located = () if structure.consistent_modes else tuple(entry for entry in own.conditions if entry.located)
     requested = tuple(entry for entry in own.conditions if entry not in located)
-    features = with_modes_of_conditions(with_memory(own, clocked=structure.clocked), located)
-    past = tuple(
+    features = with_modes_of_conditions(with_previous_modes(own, clocked=structure.clocked), located)
+    delayed = tuple(
         State(f"{line.name}{mark}", line.shape, line.doc) for mark in ("", "'") for line in features.delays
     )
     ends = {
         "x": [Slot(state.name, state.shape) for state in features.states],
-        "z": [Slot(state.name, state.shape) for state in (*features.discrete, *past, *features.modes)],
+        "z": [Slot(state.name, state.shape) for state in (*features.discrete, *delayed, *features.modes)],
         "u": [Slot(name, shape) for name, shape in features.inputs.items()]
-        + [Slot(f"{name}'", features.inputs[name]) for name in features.rated_inputs],
+        + [Slot(f"{name}'", features.inputs[name]) for name in features.differentiated_inputs],
         "e": [Slot(guard.name, guard.shape) for guard in features.guards],
         "p": list(tunable_slots(structure.block)),
     }
@@ -191,23 +197,27 @@ def _trace(structure: _Structure) -> BlockEquations:
     if structure.clocked:
         p["T"] = SX(structure.period)
     at = Arguments(t, {**x, **z}, u, p, e)
-    at = at.with_states(condition_answers(own, requested, at))
-    consistent = at.with_states(own.equations[SlotKind.MODE](at)) if structure.settled else at
-    found = {
-        kind: features.equations[kind](at if kind is SlotKind.MODE else consistent)
+    at = at.with_states(evaluated_conditions(own, requested, at))
+    at_consistent_modes = (
+        at.with_states(own.equations[SlotKind.MODE](at)) if structure.consistent_modes else at
+    )
+    results = {
+        kind: features.equations[kind](at if kind is SlotKind.MODE else at_consistent_modes)
         for kind in SlotKind
         if kind is not SlotKind.CONDITION
     }
-    sought = _required_shapes(features, structure.clocked, found)
-    for kind, values in found.items():
-        _check_complete(structure.block, kind, list(sought[kind]), values)
-    slots = [BlockSlot(kind, name, shape) for kind, named in sought.items() for name, shape in named.items()]
-    flat = [spread(SX(found[slot.kind][slot.name]), slot.shape) for slot in slots]
+    required = _required_shapes(features, structure.clocked, results)
+    for kind, values in results.items():
+        _check_complete(structure.block, kind, list(required[kind]), values)
+    slots = [
+        BlockSlot(kind, name, shape) for kind, named in required.items() for name, shape in named.items()
+    ]
+    flat = [spread(SX(results[slot.kind][slot.name]), slot.shape) for slot in slots]
     groups = _grouped(slots, flat, t, symbols, ends)
     return BlockEquations(
         features=own,
         states=features.states,
-        discrete=(*features.discrete, *past, *features.modes),
+        discrete=(*features.discrete, *delayed, *features.modes),
         modes=features.modes,
         guards=features.guards,
         groups=groups,
@@ -217,14 +227,14 @@ def _trace(structure: _Structure) -> BlockEquations:
 
 
 def _required_shapes(
-    features: Features, clocked: bool, found: Mapping[SlotKind, Signals]
+    features: Features, clocked: bool, results: Mapping[SlotKind, Signals]
 ) -> dict[SlotKind, dict[str, Shape]]:
     """The shapes of the values that the equations of each role return."""
     held = (*features.states, *features.discrete, *features.modes)
     states = {state.name: state.shape for state in held}
     modes = {mode.name: mode.shape for mode in features.modes}
     delayed = {line.name: line.shape for line in features.delays}
-    resets, captures = found[SlotKind.RESET], found[SlotKind.CAPTURE]
+    resets, captures = results[SlotKind.RESET], results[SlotKind.CAPTURE]
     return {
         SlotKind.OUTPUT: dict(features.outputs),
         SlotKind.DERIVATIVE: {state.name: state.shape for state in features.states},
@@ -263,11 +273,11 @@ def _grouped(
         assert dependence is not None
         if dependence.jac_sparsity(index, 0).nnz() > 0:
             timed.add(index)
-        pattern = tuple(dependence.jac_sparsity(index, 2 + place).nnz() > 0 for place in range(len(parts)))
+        pattern = tuple(dependence.jac_sparsity(index, 2 + part).nnz() > 0 for part in range(len(parts)))
         members.setdefault(pattern, []).append(index)
     groups: list[Group] = []
     for pattern, indices in members.items():
-        on = [place for place in range(len(parts)) if pattern[place]]
+        on = [part for part in range(len(parts)) if pattern[part]]
         names = {letter: tuple(letters[k][1] for k in on if letters[k][0] == letter) for letter in "xzue"}
         groups.append(
             Group(
@@ -280,7 +290,7 @@ def _grouped(
                 expression=vertcat(*[flat[index] for index in indices]),
                 t=t,
                 p=symbols["p"],
-                z=vertcat(*[parts[place] for place in on], SX(0, 1)),
+                z=vertcat(*[parts[part] for part in on], SX(0, 1)),
             )
         )
     return tuple(groups)
@@ -295,11 +305,11 @@ def _parts(column: SX, slots: list[Slot]) -> list[SX]:
     return parts
 
 
-def _check_complete(block: Block, kind: SlotKind, sought: list[str], values: Signals) -> None:
-    if set(sought) != set(values):
+def _check_complete(block: Block, kind: SlotKind, required: list[str], values: Signals) -> None:
+    if set(required) != set(values):
         raise DiagramError(
             f"the equations give {sorted(values)} as {kind.value}s",
             where=f"block type {block.type_name()}",
-            allowed=f"exactly {sorted(sought)}",
+            allowed=f"exactly {sorted(required)}",
             fix="correct the block's class",
         )

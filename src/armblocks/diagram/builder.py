@@ -90,9 +90,9 @@ class DiagramBuilder:
         self.settings = settings or SimulationOptions()
         self._extras = dict(extras or {})
         self._blocks: dict[str, Block] = {}
-        self._count = 0  # of blocks, those inside subsystems included
+        self._count = 0  # number of blocks, including those of subsystems
         self._ports: dict[str, tuple[dict[str, None], dict[str, None]]] = {}  # names of inputs, of outputs
-        self._taken: dict[str, str] = {}
+        self._used_names: dict[str, str] = {}
         self._wires: dict[PortRef, PortRef] = {}
         self._layout: dict[str, Placement] = {}
         self._bends: dict[Connection, tuple[float, ...]] = {}
@@ -121,8 +121,8 @@ class DiagramBuilder:
         if isinstance(value, ParameterFormula):
             self._outer[rule.name] = value
             value = None
-        given = {} if value is None else {rule.name: value}
-        self._mask_values |= values_of((rule,), given, f"diagram '{self.name}'")
+        values = {} if value is None else {rule.name: value}
+        self._mask_values |= values_of((rule,), values, f"diagram '{self.name}'")
         self._mask.append(rule)
         return formula(rule.name)
 
@@ -136,7 +136,7 @@ class DiagramBuilder:
         if isinstance(block, Inport | Outport) and block.port == 0:
             block = dataclasses.replace(block, port=self._next_port(type(block)))
         check_block_name(name, where)
-        other = self._taken.get(folded(name))
+        other = self._used_names.get(folded(name))
         if other is not None:
             same = f"a block is named '{other}', which differs only in case or Unicode encoding"
             raise DiagramError(
@@ -156,7 +156,7 @@ class DiagramBuilder:
                 allowed=f"{len(ports)}: {', '.join(port.name for port in ports)}" if ports else "no inputs",
                 fix="remove the last ones",
             )
-        self._taken[folded(name)] = name
+        self._used_names[folded(name)] = name
         self._blocks[name] = block
         self._ports[name] = (
             dict.fromkeys(port.name for port in ports),
@@ -300,8 +300,8 @@ class DiagramBuilder:
         )
 
     def _next_port(self, kind: type[Inport | Outport]) -> int:
-        given = [block.port for block in self._blocks.values() if isinstance(block, kind)]
-        return max(given, default=0) + 1
+        numbers = [block.port for block in self._blocks.values() if isinstance(block, kind)]
+        return max(numbers, default=0) + 1
 
     def _known(self, name: str) -> Block:
         if name not in self._blocks:

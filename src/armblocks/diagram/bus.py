@@ -24,20 +24,20 @@ class Bus:
 
     def paths(self) -> tuple[str, ...]:
         """The paths of all elements, buses within this bus included."""
-        found: list[str] = []
+        all_paths: list[str] = []
         for name, carried in self.elements.items():
-            found.append(name)
+            all_paths.append(name)
             if isinstance(carried, Bus):
-                found += [f"{name}.{path}" for path in carried.paths()]
-        return tuple(found)
+                all_paths += [f"{name}.{path}" for path in carried.paths()]
+        return tuple(all_paths)
 
     def element(self, path: str) -> Carried | None:
         """The element of this path, if there is one."""
         name, _, rest = path.partition(".")
-        found = self.elements.get(name)
-        if not rest or found is None:
-            return found
-        return found.element(rest) if isinstance(found, Bus) else None
+        carried = self.elements.get(name)
+        if not rest or carried is None:
+            return carried
+        return carried.element(rest) if isinstance(carried, Bus) else None
 
     def replaced(self, path: str, carried: Carried) -> Bus:
         """The same bus with another element at a path that exists."""

@@ -67,12 +67,12 @@ def commented_paths(levels: Mapping[str, Diagram]) -> dict[str, Comment]:
 
     Raises ``DiagramError`` for a block that cannot be commented.
     """
-    found: dict[str, Comment] = {}
+    comments: dict[str, Comment] = {}
     for level, diagram in levels.items():
         for name, comment in diagram.commented.items():
-            if not is_inside(level, found):
-                found[joined(level, name)] = check_comment(name, diagram.blocks[name], comment)
-    return found
+            if not is_inside(level, comments):
+                comments[joined(level, name)] = check_comment(name, diagram.blocks[name], comment)
+    return comments
 
 
 def is_inside(path: str, commented: Collection[str]) -> bool:
@@ -99,22 +99,22 @@ def open_inputs(levels: Mapping[str, Diagram]) -> Iterator[PortRef]:
         drivers = diagram.drivers
         for name, block in diagram.blocks.items():
             comment = diagram.commented.get(name)
-            needed = [port.name for port in block.input_ports()] if comment is None else []
+            required = [port.name for port in block.input_ports()] if comment is None else []
             if comment == "through":
-                needed = [into for into, _ in passed_ports(block)]
+                required = [into for into, _ in passed_ports(block)]
             yield from (
-                PortRef(joined(level, name), port) for port in needed if PortRef(name, port) not in drivers
+                PortRef(joined(level, name), port) for port in required if PortRef(name, port) not in drivers
             )
 
 
 def check_connected(levels: Mapping[str, Diagram]) -> None:
     """Raise ``DiagramError`` that lists the inputs that nothing drives, of all diagrams of a hierarchy."""
-    found = [str(ref) for ref in open_inputs(levels)]
-    if found:
-        shown = ", ".join(found[:MOST_LISTED])
-        rest = len(found) - MOST_LISTED
+    unconnected = [str(ref) for ref in open_inputs(levels)]
+    if unconnected:
+        shown = ", ".join(unconnected[:MOST_LISTED])
+        rest = len(unconnected) - MOST_LISTED
         raise DiagramError(
-            f"{len(found)} unconnected input{'s' * (len(found) > 1)}: {shown}"
+            f"{len(unconnected)} unconnected input{'s' * (len(unconnected) > 1)}: {shown}"
             + (f" and {rest} more" if rest > 0 else ""),
             where=f"diagram '{next(iter(levels.values())).name}'",
             allowed="each input has a driver",

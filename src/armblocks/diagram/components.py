@@ -12,7 +12,7 @@ def strongly_connected(needs: Sequence[Sequence[int]]) -> list[list[int]]:
     lowest: dict[int, int] = {}
     stack: list[int] = []
     closed: set[int] = set()
-    circles: list[list[int]] = []
+    components: list[list[int]] = []
     for root in range(count):
         if root in number:
             continue
@@ -27,14 +27,14 @@ def strongly_connected(needs: Sequence[Sequence[int]]) -> list[list[int]]:
                 if path:
                     lowest[path[-1][0]] = min(lowest[path[-1][0]], lowest[node])
                 if lowest[node] == number[node]:
-                    place = stack.index(node)
-                    circles.append(sorted(stack[place:]))
-                    closed.update(stack[place:])
-                    del stack[place:]
+                    index = stack.index(node)
+                    components.append(sorted(stack[index:]))
+                    closed.update(stack[index:])
+                    del stack[index:]
             elif following not in number:
                 number[following] = lowest[following] = len(number)
                 stack.append(following)
                 path.append((following, iter(needs[following])))
             elif following not in closed:
                 lowest[node] = min(lowest[node], number[following])
-    return circles
+    return components

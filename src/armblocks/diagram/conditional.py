@@ -20,11 +20,11 @@ from armblocks.diagram.block import Block
 from armblocks.diagram.parameter import ParameterKind, parameter
 from armblocks.diagram.port import Port
 from armblocks.diagram.structure import DiagramBlock
-from armblocks.diagram.worked_example import WorkedExample, made
+from armblocks.diagram.worked_example import WorkedExample, driver
 
 _STATES = ("held", "reset")
 _EDGES = ("rising", "falling", "either")
-_PULSES = made("PulseGenerator", period=4.0, width=50.0)
+_PULSES = driver("PulseGenerator", period=4.0, width=50.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,7 +78,7 @@ class EnabledTriggeredSubsystem(DiagramBlock):
     title: ClassVar[str] = "Enabled and Triggered Subsystem"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The output samples the sine at rising edges of the pulse, but only while enable is 1.",
-        inputs={"trigger": _PULSES, "enable": made("Step", time=3.0)},
+        inputs={"trigger": _PULSES, "enable": driver("Step", time=3.0)},
         shown=("In1", "trigger", "Out1"),
     )
 
@@ -115,7 +115,7 @@ class ActionSubsystem(DiagramBlock):
     title: ClassVar[str] = "Action Subsystem"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The If block activates the subsystem while the sine is positive, else its output is held.",
-        inputs={"action": made("If").by(u="In1").at("if1")},
+        inputs={"action": driver("If").by(u="In1").at("if1")},
         shown=("In1", "Out1"),
     )
 
@@ -137,13 +137,13 @@ class Merge(Block):
         shows="An If block activates one of two subsystems by the sign of a sine; "
         "Merge passes the output of the active one.",
         inputs={
-            "u1": made("ActionSubsystem")
+            "u1": driver("ActionSubsystem")
             .named("positive")
-            .by(In1=made("Constant"), action=made("If").by(u=made("SineWave")).named("if").at("if1")),
-            "u2": made("ActionSubsystem")
+            .by(In1=driver("Constant"), action=driver("If").by(u=driver("SineWave")).named("if").at("if1")),
+            "u2": driver("ActionSubsystem")
             .named("negative")
             .by(
-                In1=made("Constant", value=-1.0),
+                In1=driver("Constant", value=-1.0),
                 action="if/else",
             ),
         },

@@ -5,9 +5,8 @@ to their initial values. When the control turns on, modes become consistent with
 start of a run, and guards are evaluated from then on. A triggered block executes when the trigger fires, as a
 sampled block does at a tick.
 
-``conditional`` composes functions from features to features, one for each part of this. They treat equations
-by role (``SlotKind.while_off``), not by name.
-"""
+``conditional`` composes functions from features to features, one for each of these rules. They treat
+equations by role (``SlotKind.while_off``), not by name."""
 
 from __future__ import annotations
 
@@ -31,9 +30,9 @@ the block's modes are consistent since the control is on. A hidden guard: the co
 def conditional(features: Features, gate: Collection[str], *, clocked: bool, ticking: bool) -> Features:
     """The features of a block with these hidden inputs.
 
-    ``clocked``: it works at the ticks of a clock. ``ticking``: the equations are those of a tick, where a
-    restart acts before all equations. At an event a restart acts through the resets, one iteration after the
-    control has changed; the hidden state ``?done`` prevents a second restart after that of a tick.
+    ``clocked``: the block is active at the ticks of a clock. ``ticking``: the equations are those of a tick,
+    where a restart acts before all equations. At an event a restart acts through the resets, one iteration
+    after the control has changed; the hidden state ``?done`` prevents a second restart after that of a tick.
     """
     own = with_hidden_inputs(features, gate)
     if ON in gate and clocked:
@@ -41,16 +40,16 @@ def conditional(features: Features, gate: Collection[str], *, clocked: bool, tic
         own = while_on(own, AT_TICKS)
     if RESTART in gate and ticking:
         own = restarted_before_a_tick(own)
-    found = own
+    gated = own
     if ON in gate:
-        found = while_on(found, [kind for kind in SlotKind if kind not in AT_TICKS])
+        gated = while_on(gated, [kind for kind in SlotKind if kind not in AT_TICKS])
     if FIRE in gate and features.sampled:
-        found = executed_when_fired(found)
+        gated = executed_when_fired(gated)
     if RESTART in gate:
-        found = restarted(found, own.equations[SlotKind.MODE], clocked=clocked)
+        gated = restarted(gated, own.equations[SlotKind.MODE], clocked=clocked)
     if ON in gate and features.modes:
-        found = with_consistent_modes(found)
-    return found
+        gated = with_consistent_modes(gated)
+    return gated
 
 
 def with_hidden_inputs(features: Features, gate: Collection[str]) -> Features:
@@ -71,9 +70,9 @@ def with_hidden_inputs(features: Features, gate: Collection[str]) -> Features:
 def while_on(features: Features, kinds: Iterable[SlotKind]) -> Features:
     """With equations of these roles that hold while the control is on; see ``SlotKind.while_off``."""
 
-    def gated(equation: Equation, kept: bool) -> Equation:
+    def gated(equation: Equation, keeps_state: bool) -> Equation:
         return lambda at: {
-            name: if_else(at.u[ON] != 0.0, value, at.x[name] if kept else 0.0)
+            name: if_else(at.u[ON] != 0.0, value, at.x[name] if keeps_state else 0.0)
             for name, value in equation(at).items()
         }
 
@@ -87,7 +86,8 @@ def while_on(features: Features, kinds: Iterable[SlotKind]) -> Features:
 
 
 def restarted_before_a_tick(features: Features) -> Features:
-    """With equations that see the initial states wherever the block is restarted; its modes have no past."""
+    """With equations that see the initial states wherever the block is restarted; the previous values of its
+    modes are 0."""
     zeros = {mode.name: SX(0.0) for mode in features.modes}
 
     def begun(at: Arguments, modes: Signals) -> Arguments:
@@ -96,9 +96,9 @@ def restarted_before_a_tick(features: Features) -> Features:
             {name: if_else(at.u[RESTART] != 0.0, start, at.x[name]) for name, start in starts.items()}
         )
 
-    found = features.at_arguments(lambda at: begun(at, {}))
+    changed = features.at_arguments(lambda at: begun(at, {}))
     modes = features.equations[SlotKind.MODE]
-    return found.with_equations({SlotKind.MODE: lambda at: modes(begun(at, zeros))})
+    return changed.with_equations({SlotKind.MODE: lambda at: modes(begun(at, zeros))})
 
 
 def executed_when_fired(features: Features) -> Features:
@@ -107,11 +107,11 @@ def executed_when_fired(features: Features) -> Features:
 
     def fired(at: Arguments) -> Signals:
         after = dict(resets(at))
-        made = {
+        updated = {
             name: if_else(at.u[FIRE] != 0.0, value, after.get(name, at.x[name]))
             for name, value in updates(at).items()
         }
-        return {**after, **made}
+        return {**after, **updated}
 
     return features.with_equations({SlotKind.RESET: fired, SlotKind.UPDATE: lambda at: {}})
 
@@ -128,16 +128,16 @@ def restarted(features: Features, modes: Equation, *, clocked: bool) -> Features
 
     def reset(at: Arguments) -> Signals:
         after = dict(resets(at))
-        again = at.u[RESTART] != 0.0
+        restarts = at.u[RESTART] != 0.0
         starts = _starts(features, at)
         if clocked:
-            after[_DONE] = if_else(again, 0.0, at.x[_DONE])
+            after[_DONE] = if_else(restarts, 0.0, at.x[_DONE])
             done = at.x[_DONE] != 0.0
-            kept = {name: after.get(name, at.x[name]) for name in ticked}
-            starts |= {name: if_else(done, value, starts[name]) for name, value in kept.items()}
+            after_tick = {name: after.get(name, at.x[name]) for name in ticked}
+            starts |= {name: if_else(done, value, starts[name]) for name, value in after_tick.items()}
         begins = {**starts, **_first_modes(modes, at.with_states(starts))}
         for name, value in begins.items():
-            after[name] = if_else(again, value, after.get(name, at.x[name]))
+            after[name] = if_else(restarts, value, after.get(name, at.x[name]))
         if features.guards:
             after[_BEGUN] = if_else(at.u[RESTART] != 0.0, 1.0, at.x[_BEGUN])
         return after
@@ -174,16 +174,16 @@ def with_consistent_modes(features: Features) -> Features:
         return {**equations[SlotKind.CONTRADICTION](at), _WORKS: (at.u[ON] != 0.0) != at.x[_WORKS]}
 
     def guards(at: Arguments) -> Signals:
-        found = equations[SlotKind.GUARD](at)
-        settled = {name: if_else(at.x[_WORKS] != 0.0, value, 0.0) for name, value in found.items()}
-        return {**settled, _TURNED: at.u[ON] - 0.5}
+        values = equations[SlotKind.GUARD](at)
+        consistent = {name: if_else(at.x[_WORKS] != 0.0, value, 0.0) for name, value in values.items()}
+        return {**consistent, _TURNED: at.u[ON] - 0.5}
 
     def reset(at: Arguments) -> Signals:
         after = dict(equations[SlotKind.RESET](at))
         begins = logic_and(at.u[ON] != 0.0, at.x[_WORKS] == 0.0)
-        now = {**at.x, **after}
-        earlier = {name: now[name_before(name)] for name in now if name_before(name) in now}
-        for name, value in modes(dataclasses.replace(at, x={**now, **earlier})).items():
+        present = {**at.x, **after}
+        earlier = {name: present[name_before(name)] for name in present if name_before(name) in present}
+        for name, value in modes(dataclasses.replace(at, x={**present, **earlier})).items():
             after[name] = if_else(begins, value, after.get(name, at.x[name]))
         after[_WORKS] = at.u[ON] != 0.0
         return after

@@ -1,10 +1,9 @@
 """Blocks that replace conditional subsystems in a flat diagram: controls, held outputs, merged outputs.
 
-They are not in the library and never in a file. An event has two iterations: first the control's mode follows
-its signal, so that ``restart`` or ``fire`` becomes 1; then the guard ``acts`` triggers, the blocks inside are
-reset or executed, and the control stores that it has acted. At a tick modes follow at once, and both happen
-together.
-"""
+They are not in the library and never in a file. An event has two iterations. In the first, the control's mode
+follows its signal, and ``restart`` or ``fire`` becomes 1. In the second, the guard ``acts`` triggers: the
+blocks inside are reset or executed, and the control stores that it has acted. At a tick the modes follow
+immediately, so that one iteration is sufficient."""
 
 from __future__ import annotations
 
@@ -105,8 +104,8 @@ class EnableControl(Block):
 
     def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         on = x["side"] * _outer(u)
-        late = logic_and(x["works"] != on, logic_not(_begins(on, x)))
-        return {"side": x["side"] != _side(u["u"]), "works": late}
+        inconsistent = logic_and(x["works"] != on, logic_not(_begins(on, x)))
+        return {"side": x["side"] != _side(u["u"]), "works": inconsistent}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         side = if_else(e["side"] == 0.0, x["side"], if_else(e["side"] > 0.0, 1.0, 0.0))

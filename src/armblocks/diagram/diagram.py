@@ -18,7 +18,7 @@ from armblocks.equations import SimulationOptions
 from armblocks.errors import ArmblocksError, DiagramError, UnknownNameError
 from armblocks.lazy_exports import shown_by
 
-_Kept = TypeVar("_Kept")
+_Result = TypeVar("_Result")
 
 
 @dataclass(frozen=True, order=True)
@@ -78,8 +78,8 @@ def block_in_scope(name: str, block: Block, scope: Scope) -> Block:
     except (DiagramError, UnknownNameError):
         raise
     except ArmblocksError as error:
-        place = error.where if error.where.startswith(where) else f"{where}, {error.where}"
-        raise DiagramError(error.what, where=place, allowed=error.allowed, fix=error.fix) from None
+        location = error.where if error.where.startswith(where) else f"{where}, {error.where}"
+        raise DiagramError(error.what, where=location, allowed=error.allowed, fix=error.fix) from None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,7 +120,9 @@ class Diagram:
     """Names of the signals at outputs, see :mod:`armblocks.diagram.signal_names`."""
     shares: Mapping[str, str] = field(default_factory=dict[str, str])
     """For a flat diagram: blocks that share the parameters of the block of the given name."""
-    _kept: dict[str, object] = field(init=False, repr=False, compare=False, default_factory=dict[str, object])
+    _cache: dict[str, object] = field(
+        init=False, repr=False, compare=False, default_factory=dict[str, object]
+    )
 
     def __post_init__(self) -> None:
         where = f"diagram '{self.name}'"
@@ -133,8 +135,8 @@ class Diagram:
             }
             object.__setattr__(self, "blocks", blocks)
         if self.bends:  # drop the bends of removed connections
-            kept = {wire: self.bends[wire] for wire in self.connections if self.bends.get(wire)}
-            object.__setattr__(self, "bends", kept)
+            bends = {wire: self.bends[wire] for wire in self.connections if self.bends.get(wire)}
+            object.__setattr__(self, "bends", bends)
         if self.commented:
             present = {name: comment for name, comment in self.commented.items() if name in self.blocks}
             object.__setattr__(self, "commented", present)
@@ -157,7 +159,7 @@ class Diagram:
         read_only: dict[str, Any] = {name: MappingProxyType(state[name]) for name in _READ_ONLY}
         for name, value in (state | read_only).items():
             object.__setattr__(self, name, value)
-        object.__setattr__(self, "_kept", {})
+        object.__setattr__(self, "_cache", {})
 
     def with_mask_values(self, values: Mapping[str, object]) -> Diagram:
         """A copy with other values of some mask parameters, and of all parameters that depend on them.
@@ -202,8 +204,8 @@ class Diagram:
             raise UnknownNameError("block", name, self.blocks, where=f"diagram '{self.name}'")
         return self.blocks[name]
 
-    def keep(self, name: str, compute: Callable[[], _Kept]) -> _Kept:
+    def keep(self, name: str, compute: Callable[[], _Result]) -> _Result:
         """The result of a pure function of this diagram, cached with the diagram under a name."""
-        if name not in self._kept:
-            self._kept[name] = compute()
-        return cast("_Kept", self._kept[name])
+        if name not in self._cache:
+            self._cache[name] = compute()
+        return cast("_Result", self._cache[name])

@@ -115,13 +115,13 @@ def diagram_difference(before: Diagram, after: Diagram) -> DiagramDifference:
     """
     for diagram in (before, after):
         check_type(diagram, Diagram, "a Diagram", where="diagram_difference")
-    found = _Findings()
-    _compare_levels(before, after, "", found)
+    findings = _Findings()
+    _compare_levels(before, after, "", findings)
     for name in {**before.mask_values, **after.mask_values}:
         old, new = before.mask_values.get(name), after.mask_values.get(name)
         if old != new:
-            found.parameters.append(ValueChange(path="", name=name, before=old, after=new))
-    return DiagramDifference(**{name: tuple(entries) for name, entries in vars(found).items()})
+            findings.parameters.append(ValueChange(path="", name=name, before=old, after=new))
+    return DiagramDifference(**{name: tuple(entries) for name, entries in vars(findings).items()})
 
 
 @dataclass
@@ -143,59 +143,65 @@ class _Findings:
     notes: list[ValueChange] = field(default_factory=list[ValueChange])
 
 
-def _compare_levels(before: Diagram, after: Diagram, path: str, found: _Findings) -> None:
+def _compare_levels(before: Diagram, after: Diagram, path: str, findings: _Findings) -> None:
     names = _renamings(before, after)
 
     def at(name: str) -> str:
         return f"{path}/{name}" if path else name
 
     for old, new in names.items():
-        found.renamed.append(Renaming(before=at(old), after=at(new), block=after.blocks[new]))
+        findings.renamed.append(Renaming(before=at(old), after=at(new), block=after.blocks[new]))
     for name, block in before.blocks.items():
         if name in after.blocks:
-            _compare_blocks(block, after.blocks[name], at(name), found)
+            _compare_blocks(block, after.blocks[name], at(name), findings)
         elif name not in names:
-            found.removed.append(PlacedBlock(path=at(name), block=block))
+            findings.removed.append(PlacedBlock(path=at(name), block=block))
     for name, block in after.blocks.items():
         if name not in before.blocks and name not in names.values():
-            found.added.append(PlacedBlock(path=at(name), block=block))
+            findings.added.append(PlacedBlock(path=at(name), block=block))
     wires_before = {
         Connection(_renamed(wire.source, names), _renamed(wire.target, names)) for wire in before.connections
     }
     wires_after = set(after.connections)
-    found.wires_added += (PlacedWire(path=path, wire=wire) for wire in sorted(wires_after - wires_before))
-    found.wires_removed += (PlacedWire(path=path, wire=wire) for wire in sorted(wires_before - wires_after))
+    findings.wires_added += (PlacedWire(path=path, wire=wire) for wire in sorted(wires_after - wires_before))
+    findings.wires_removed += (
+        PlacedWire(path=path, wire=wire) for wire in sorted(wires_before - wires_after)
+    )
     old_comments = {names.get(name, name): comment for name, comment in before.commented.items()}
     for name in {**old_comments, **after.commented}:
         if name in after.blocks and old_comments.get(name) != after.commented.get(name):
             change = {"before": old_comments.get(name), "after": after.commented.get(name)}
-            found.comments.append(ValueChange(path=at(name), name="commented", **change))
+            findings.comments.append(ValueChange(path=at(name), name="commented", **change))
     old_names = {_renamed(ref, names): name for ref, name in before.signal_names.items()}
     for ref in sorted({**old_names, **after.signal_names}):
-        given, now = old_names.get(ref), after.signal_names.get(ref)
-        if given != now:
-            found.signal_names.append(ValueChange(path=at(str(ref)), name="name", before=given, after=now))
+        old_name, new_name = old_names.get(ref), after.signal_names.get(ref)
+        if old_name != new_name:
+            findings.signal_names.append(
+                ValueChange(path=at(str(ref)), name="name", before=old_name, after=new_name)
+            )
     logged_before, logged_after = {_renamed(port, names) for port in before.logged}, set(after.logged)
-    found.logged_added += (PlacedPort(path=path, port=port) for port in sorted(logged_after - logged_before))
-    found.logged_removed += (
+    findings.logged_added += (
+        PlacedPort(path=path, port=port) for port in sorted(logged_after - logged_before)
+    )
+    findings.logged_removed += (
         PlacedPort(path=path, port=port) for port in sorted(logged_before - logged_after)
     )
-    _compare_sheets(before, after, path, found)
+    _compare_sheets(before, after, path, findings)
 
 
-def _compare_sheets(before: Diagram, after: Diagram, path: str, found: _Findings) -> None:
+def _compare_sheets(before: Diagram, after: Diagram, path: str, findings: _Findings) -> None:
     """The differences of two diagrams of the hierarchy themselves, without their blocks."""
     for name in _SETTINGS:
         old_value, new_value = getattr(before.settings, name), getattr(after.settings, name)
         if old_value != new_value:
-            found.settings.append(ValueChange(path=path, name=name, before=old_value, after=new_value))
+            findings.settings.append(ValueChange(path=path, name=name, before=old_value, after=new_value))
     old_mask, new_mask = ({rule.name: rule for rule in diagram.mask} for diagram in (before, after))
     for name in {**old_mask, **new_mask}:
         old_rule, new_rule = old_mask.get(name), new_mask.get(name)
         if old_rule != new_rule:
-            found.masks.append(ValueChange(path=path, name=name, before=old_rule, after=new_rule))
+            findings.masks.append(ValueChange(path=path, name=name, before=old_rule, after=new_rule))
     if before.description != after.description:
-        found.descriptions.append(
+        findings.descriptions.append(
             ValueChange(path=path, name="description", before=before.description, after=after.description)
         )
     old_notes, new_notes = (
@@ -204,12 +210,12 @@ def _compare_sheets(before: Diagram, after: Diagram, path: str, found: _Findings
     for name in sorted({**old_notes, **new_notes}):
         old_text, new_text = old_notes.get(name), new_notes.get(name)
         if old_text != new_text:
-            found.notes.append(ValueChange(path=path, name=name, before=old_text, after=new_text))
+            findings.notes.append(ValueChange(path=path, name=name, before=old_text, after=new_text))
 
 
-def _compare_blocks(before: Block, after: Block, path: str, found: _Findings) -> None:
+def _compare_blocks(before: Block, after: Block, path: str, findings: _Findings) -> None:
     if before.type_name() != after.type_name():
-        found.types.append(
+        findings.types.append(
             ValueChange(path=path, name="type", before=before.type_name(), after=after.type_name())
         )
     old_rules, new_rules = _rules(before), _rules(after)
@@ -218,12 +224,12 @@ def _compare_blocks(before: Block, after: Block, path: str, found: _Findings) ->
         new = after.stated_value(name) if name in new_rules else None
         if isinstance(old, Diagram) and isinstance(new, Diagram):
             if old.link != new.link:
-                found.parameters.append(
+                findings.parameters.append(
                     ValueChange(path=path, name="library", before=old.link or None, after=new.link or None)
                 )
-            _compare_levels(old, new, path, found)
+            _compare_levels(old, new, path, findings)
         elif old != new:
-            found.parameters.append(ValueChange(path=path, name=name, before=old, after=new))
+            findings.parameters.append(ValueChange(path=path, name=name, before=old, after=new))
 
 
 def _rules(block: Block) -> Mapping[str, Parameter]:
@@ -247,21 +253,25 @@ def _renamings(before: Diagram, after: Diagram) -> dict[str, str]:
     are the same block. Where several blocks have equal colours, one pair is matched and refinement continues;
     any choice is valid.
     """
-    gone = {name: hash(_content(block)) for name, block in before.blocks.items() if name not in after.blocks}
-    new = {name: hash(_content(block)) for name, block in after.blocks.items() if name not in before.blocks}
-    gone_ends, new_ends = _ends_of(before, gone), _ends_of(after, new)
+    removed = {
+        name: hash(_content(block)) for name, block in before.blocks.items() if name not in after.blocks
+    }
+    added = {name: hash(_content(block)) for name, block in after.blocks.items() if name not in before.blocks}
+    removed_ends, added_ends = _ends_of(before, removed), _ends_of(after, added)
     pairs: dict[str, str] = {}
-    while gone and new:
+    while removed and added:
         paired = {later: hash(("paired", later)) for later in pairs.values()}
-        gone_paired = {old: paired[later] for old, later in pairs.items()}
-        old_colours, new_colours = _refined(gone, new, (gone_ends, gone_paired), (new_ends, paired))
-        olds, laters = _by_colour(old_colours), _by_colour(new_colours)
-        shared = [colour for colour in olds if colour in laters]
-        certain = [colour for colour in shared if len(olds[colour]) == len(laters[colour]) == 1]
+        removed_paired = {old: paired[later] for old, later in pairs.items()}
+        old_colours, new_colours = _refined(
+            removed, added, (removed_ends, removed_paired), (added_ends, paired)
+        )
+        old_names, new_names = _by_colour(old_colours), _by_colour(new_colours)
+        shared = [colour for colour in old_names if colour in new_names]
+        certain = [colour for colour in shared if len(old_names[colour]) == len(new_names[colour]) == 1]
         for colour in certain or shared[:1]:
-            old, later = olds[colour][0], laters[colour][0]
+            old, later = old_names[colour][0], new_names[colour][0]
             pairs[old] = later
-            del gone[old], new[later]
+            del removed[old], added[later]
         if not shared:
             break
     return pairs
@@ -288,24 +298,26 @@ _Surroundings = tuple[dict[str, _Ends], _Colours]
 
 
 def _refined(
-    olds: _Colours, laters: _Colours, around_olds: _Surroundings, around_laters: _Surroundings
+    old: _Colours, new: _Colours, old_surroundings: _Surroundings, new_surroundings: _Surroundings
 ) -> tuple[_Colours, _Colours]:
     """The stable colours of both sides, after equally many rounds."""
     count = 0
-    while (reached := len({*olds.values(), *laters.values()})) > count:
-        count = reached
-        olds, laters = _one_round(olds, *around_olds), _one_round(laters, *around_laters)
-    return olds, laters
+    while (colour_count := len({*old.values(), *new.values()})) > count:
+        count = colour_count
+        old, new = _one_round(old, *old_surroundings), _one_round(new, *new_surroundings)
+    return old, new
 
 
 def _one_round(colours: _Colours, ends: Mapping[str, _Ends], paired: _Colours) -> _Colours:
     known = {**paired, **colours}
 
-    def seen(port: PortRef) -> object:
-        return (known.get(port.block, port.block), port.port)
+    def colour_of(end: PortRef) -> object:
+        return (known.get(end.block, end.block), end.port)
 
     return {
-        name: hash((own, frozenset((mine, way, seen(other)) for mine, way, other in ends[name])))
+        name: hash(
+            (own, frozenset((port, direction, colour_of(other)) for port, direction, other in ends[name]))
+        )
         for name, own in colours.items()
     }
 

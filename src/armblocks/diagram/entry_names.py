@@ -31,11 +31,11 @@ def entry_names(diagram: Diagram, shapes: Mapping[str, Shape]) -> Mapping[str, t
             if shapes.get(one) == shapes.get(other) and len(shapes.get(one, ())) == 1:
                 groups.join(one, other)
         stated += [(path, port.names) for port, path in {**inputs, **outputs}.items() if port.names]
-    found: dict[str, set[tuple[str, ...]]] = {}
+    names_of: dict[str, set[tuple[str, ...]]] = {}
     for path, names in stated:
         if shapes.get(path) == (len(names),):
-            found.setdefault(groups.of(path), set()).add(names)
-    named = {path: found.get(groups.of(path), set()) for path in shapes}
+            names_of.setdefault(groups.of(path), set()).add(names)
+    named = {path: names_of.get(groups.of(path), set()) for path in shapes}
     return {path: next(iter(rows)) for path, rows in named.items() if len(rows) == 1}
 
 

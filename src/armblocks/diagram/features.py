@@ -90,12 +90,12 @@ class Features:
     """What a block declares, and its equations by role.
 
     The functions of the parameters alone are those of :class:`~armblocks.diagram.block.Block`: ``starts`` is
-    ``initial_states``, ``past`` is ``initial_past``, ``held`` is ``initial_outputs``, ``guesses`` is
+    ``initial_states``, ``history`` is ``initial_history``, ``held`` is ``initial_outputs``, ``guesses`` is
     ``initial_guesses``.
     """
 
     inputs: Shapes
-    rated_inputs: tuple[str, ...]
+    differentiated_inputs: tuple[str, ...]
     outputs: Shapes
     """Outputs that have equations."""
     records: Shapes
@@ -108,7 +108,7 @@ class Features:
     equations: Mapping[SlotKind, Equation]
     sampled: bool
     starts: Callable[[Signals], Signals]
-    past: Callable[[Signals], Signals]
+    history: Callable[[Signals], Signals]
     held: Callable[[Signals], Signals]
     guesses: Callable[[Signals], Signals]
     delay_bounds: Callable[[Signals], Mapping[str, tuple[SX, SX]]]
@@ -132,12 +132,12 @@ def _composed(equation: Equation, change: Callable[[Arguments], Arguments]) -> E
 def features_of(block: Block, inputs: Shapes) -> Features:
     """The features of a block whose inputs have these shapes."""
     lines, modes, guards = block.delay_lines(inputs), block.modes(inputs), block.guards(inputs)
-    if block.memoryless:
+    if block.following_modes:
         modes = tuple(dataclasses.replace(mode, follows=True) for mode in modes)
         guards = tuple(dataclasses.replace(guard, locates=True) for guard in guards)
     return Features(
         inputs=inputs,
-        rated_inputs=block.rated_inputs,
+        differentiated_inputs=block.differentiated_inputs,
         outputs=_output_shapes(block, inputs),
         records={port.name: port.shape or () for port in block.record_ports()},
         states=block.states(inputs),
@@ -163,7 +163,7 @@ def features_of(block: Block, inputs: Shapes) -> Features:
             SlotKind.CONDITION: lambda at: block.condition_values(at.t, at.x, at.u, at.p),
         },
         starts=block.initial_states,
-        past=block.initial_past,
+        history=block.initial_history,
         held=block.initial_outputs,
         guesses=block.initial_guesses,
         delay_bounds=block.delay_bounds,
@@ -175,6 +175,6 @@ def _output_shapes(block: Block, inputs: Shapes) -> dict[str, Shape]:
     if block.virtual:
         return {}
     stated = {port.name: port.shape for port in block.output_ports() if port.shape is not None}
-    found = {**stated, **block.output_shapes(inputs)}
+    shapes = {**stated, **block.output_shapes(inputs)}
     names = [port.name for port in block.output_ports() if port.name not in block.time_derivatives]
-    return {name: found[name] for name in names}
+    return {name: shapes[name] for name in names}

@@ -122,18 +122,18 @@ def _global_names(code: CodeType) -> set[str]:
     """
     import dis  # imported here: most diagrams have no function
 
-    found: set[str] = set()
+    names: set[str] = set()
     for instruction in dis.get_instructions(code):
         if instruction.opname in ("LOAD_GLOBAL", "LOAD_NAME"):
-            found.add(str(instruction.argval))
+            names.add(str(instruction.argval))
         elif instruction.opname == "IMPORT_NAME" and not _is_known_module(str(instruction.argval)):
             raise UnknownContentError(str(instruction.argval))
     if _READING.intersection(code.co_names):
         raise UnknownContentError(", ".join(_READING.intersection(code.co_names)))
     for entry in code.co_consts:
         if isinstance(entry, CodeType):
-            found |= _global_names(entry)
-    return found
+            names |= _global_names(entry)
+    return names
 
 
 def _is_known_module(name: str) -> bool:

@@ -78,15 +78,15 @@ def _function_in(
             where=str(file),
             fix="run the file with Python, and correct the reported error",
         ) from error
-    found = vars(module).get(name)
-    if not callable(found):
+    function = vars(module).get(name)
+    if not callable(function):
         raise FormatError(
             f"{path} has no function named '{name}'",
             fix="correct the name",
             where=str(file),
             allowed="a function at the top level of the file",
         )
-    return found
+    return function
 
 
 def split_reference(reference: str) -> tuple[str, str]:
@@ -108,15 +108,15 @@ def _no_function(reference: str) -> FormatError:
 
 def line_of(error: BaseException, file: str) -> int:
     """The last line of a file that led to an error, 0 if there is none."""
-    found = 0
+    line = 0
     if isinstance(error, SyntaxError) and error.filename == file:
-        found = error.lineno or 0
+        line = error.lineno or 0
     trace = error.__traceback__
     while trace is not None:
         if trace.tb_frame.f_code.co_filename == file:
-            found = trace.tb_lineno
+            line = trace.tb_lineno
         trace = trace.tb_next
-    return found
+    return line
 
 
 @dataclass(frozen=True)
@@ -140,9 +140,9 @@ def functions_of(source: bytes, path: str) -> Mapping[str, FunctionOutline]:
             tree = ast.parse(source, path)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         line = error.lineno if isinstance(error, SyntaxError) else None
-        what = error.msg if isinstance(error, SyntaxError) else str(error) or "it is nested too deeply"
+        problem = error.msg if isinstance(error, SyntaxError) else str(error) or "it is nested too deeply"
         raise FormatError(
-            f"the file is not Python{f': line {line}' if line else ''}: {what}"[:300],
+            f"the file is not Python{f': line {line}' if line else ''}: {problem}"[:300],
             where=path,
             fix="correct this line",
         ) from None
@@ -158,19 +158,19 @@ def functions_of(source: bytes, path: str) -> Mapping[str, FunctionOutline]:
     }
 
 
-def _arguments(given: ast.arguments) -> Iterator[inspect.Parameter]:
+def _arguments(declared: ast.arguments) -> Iterator[inspect.Parameter]:
     kinds = inspect.Parameter
-    plain = [*given.posonlyargs, *given.args]
+    plain = [*declared.posonlyargs, *declared.args]
     for k, argument in enumerate(plain):
-        kind = kinds.POSITIONAL_ONLY if k < len(given.posonlyargs) else kinds.POSITIONAL_OR_KEYWORD
-        default = ... if k >= len(plain) - len(given.defaults) else kinds.empty
+        kind = kinds.POSITIONAL_ONLY if k < len(declared.posonlyargs) else kinds.POSITIONAL_OR_KEYWORD
+        default = ... if k >= len(plain) - len(declared.defaults) else kinds.empty
         yield kinds(argument.arg, kind, default=default)
-    if given.vararg is not None:
-        yield kinds(given.vararg.arg, kinds.VAR_POSITIONAL)
-    for argument, value in zip(given.kwonlyargs, given.kw_defaults):
+    if declared.vararg is not None:
+        yield kinds(declared.vararg.arg, kinds.VAR_POSITIONAL)
+    for argument, value in zip(declared.kwonlyargs, declared.kw_defaults):
         yield kinds(argument.arg, kinds.KEYWORD_ONLY, default=kinds.empty if value is None else ...)
-    if given.kwarg is not None:
-        yield kinds(given.kwarg.arg, kinds.VAR_KEYWORD)
+    if declared.kwarg is not None:
+        yield kinds(declared.kwarg.arg, kinds.VAR_KEYWORD)
 
 
 @dataclass(frozen=True, eq=False)

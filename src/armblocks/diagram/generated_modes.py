@@ -17,24 +17,24 @@ from armblocks.diagram.port import Condition, Guard, State
 from armblocks.equations import Slot, unflatten
 
 
-def with_memory(features: Features, *, clocked: bool) -> Features:
+def with_previous_modes(features: Features, *, clocked: bool) -> Features:
     """Add a discrete state for every mode with hysteresis: its value before the event time.
 
     Such a mode follows from this value, not from values during mode iteration. ``clocked``: the block
     works at the ticks of a clock, which do not change this value.
     """
-    remembering = [mode for mode in features.modes if mode.remembers]
-    if not remembering:
+    hysteresis_modes = [mode for mode in features.modes if mode.hysteresis]
+    if not hysteresis_modes:
         return features
     modes, updates = features.equations[SlotKind.MODE], features.equations[SlotKind.UPDATE]
 
     def earlier(at: Arguments) -> Signals:
-        return modes(at.with_states({mode.name: at.x[mode.before] for mode in remembering}))
+        return modes(at.with_states({mode.name: at.x[mode.before] for mode in hysteresis_modes}))
 
     def updated(at: Arguments) -> Signals:
-        return {**updates(at), **{mode.before: at.x[mode.before] for mode in remembering}}
+        return {**updates(at), **{mode.before: at.x[mode.before] for mode in hysteresis_modes}}
 
-    before = (dataclasses.replace(mode, name=mode.before) for mode in remembering)
+    before = (dataclasses.replace(mode, name=mode.before) for mode in hysteresis_modes)
     return dataclasses.replace(
         features.with_equations({SlotKind.MODE: earlier, **({SlotKind.UPDATE: updated} if clocked else {})}),
         discrete=(*features.discrete, *before),
@@ -52,13 +52,13 @@ def with_modes_of_conditions(features: Features, located: Sequence[Condition]) -
         sides = {entry.name: _sided(quantities[entry.name], entry.closed) for entry in located}
         return {**equations[SlotKind.GUARD](at), **sides}
 
-    def answers(at: Arguments) -> dict[str, SX]:
+    def evaluated(at: Arguments) -> dict[str, SX]:
         quantities = equations[SlotKind.CONDITION](at)
         return {entry.name: _positive(quantities[entry.name], entry.closed) for entry in located}
 
     def contradictions(at: Arguments) -> Signals:
-        wrong = {name: SX(answer) != at.x[name] for name, answer in answers(at).items()}
-        return {**equations[SlotKind.CONTRADICTION](at), **wrong}
+        inconsistent = {name: SX(truth) != at.x[name] for name, truth in evaluated(at).items()}
+        return {**equations[SlotKind.CONTRADICTION](at), **inconsistent}
 
     def resets(at: Arguments) -> Signals:
         after = {
@@ -72,7 +72,7 @@ def with_modes_of_conditions(features: Features, located: Sequence[Condition]) -
     changed = features.with_equations(
         {
             SlotKind.GUARD: guards,
-            SlotKind.MODE: lambda at: {**equations[SlotKind.MODE](at), **answers(at)},
+            SlotKind.MODE: lambda at: {**equations[SlotKind.MODE](at), **evaluated(at)},
             SlotKind.CONTRADICTION: contradictions,
             SlotKind.RESET: resets,
         }
@@ -80,7 +80,7 @@ def with_modes_of_conditions(features: Features, located: Sequence[Condition]) -
     return dataclasses.replace(changed, modes=(*features.modes, *modes), guards=(*features.guards, *added))
 
 
-def condition_answers(features: Features, requested: Sequence[Condition], at: Arguments) -> Signals:
+def evaluated_conditions(features: Features, requested: Sequence[Condition], at: Arguments) -> Signals:
     """The conditions at the present values, each substituted into those after it."""
     if not requested:
         return {}
@@ -89,14 +89,14 @@ def condition_answers(features: Features, requested: Sequence[Condition], at: Ar
         for entry in requested
     }
     quantities = features.equations[SlotKind.CONDITION](at.with_states(unknown))
-    found: dict[str, SX] = {}
+    values: dict[str, SX] = {}
     for entry in requested:
         quantity = SX(quantities[entry.name])
-        for name, value in found.items():
+        for name, value in values.items():
             quantity = substitute(quantity, unknown[name], value)
-        answer = densify(SX(_positive(quantity, entry.closed)))
-        found[entry.name] = unflatten(spread(answer, entry.shape), entry.shape)
-    return found
+        truth = densify(SX(_positive(quantity, entry.closed)))
+        values[entry.name] = unflatten(spread(truth, entry.shape), entry.shape)
+    return values
 
 
 def _positive(quantity: SX, closed: bool) -> SX:

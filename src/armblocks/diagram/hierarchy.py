@@ -49,10 +49,10 @@ def _logged_views(diagram: Diagram, path: str = "") -> Iterator[tuple[str, View]
     for ref in diagram.logged:
         if diagram.commented.get(ref.block) == "out":
             continue
-        place = joined(path, ref.block)
+        block_path = joined(path, ref.block)
         named = diagram.signal_names.get(ref)
-        title = joined(path, named) if named else f"{place}/{ref.port}"
-        yield place, View(kind=ViewKind.TRACES, signals=(ref.port,), title=title)
+        title = joined(path, named) if named else f"{block_path}/{ref.port}"
+        yield block_path, View(kind=ViewKind.TRACES, signals=(ref.port,), title=title)
     for name, block in diagram.blocks.items():
         if isinstance(block, DiagramBlock) and name not in diagram.commented:
             yield from _logged_views(block.diagram, joined(path, name))

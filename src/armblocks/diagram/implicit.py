@@ -36,7 +36,7 @@ def solve_affine(w: SX, residual: SX) -> tuple[SX, list[int], list[tuple[list[in
         constant = substitute(residual[loop], unknowns, SX.zeros(len(loop)))
         solved = -_divided(densify(constant), derivative)
         # Earlier solutions are substituted last, into a small expression, so that the work grows linearly.
-        before = sorted({place for row in loop for place in needs[row]} - set(loop))
+        before = sorted({index for row in loop for index in needs[row]} - set(loop))
         solution[loop] = substituted(solved, w[before], solution[before]) if before else solved
     return solution, sorted(remaining), loops
 
@@ -72,12 +72,12 @@ def steps_with(expression: SX, unknowns: SX) -> bool:
         operation, inputs = function.instruction_id(k), function.instruction_input(k)
         if operation == casadi.OP_OUTPUT:
             continue
-        (place,) = function.instruction_output(k)
+        (output,) = function.instruction_output(k)
         if operation == casadi.OP_INPUT:
-            depends[place] = inputs[0] == 0
+            depends[output] = inputs[0] == 0
             continue
-        depends[place] = operation != casadi.OP_CONST and any(depends[i] for i in inputs)
-        if depends[place] and operation in _STEPS:
+        depends[output] = operation != casadi.OP_CONST and any(depends[i] for i in inputs)
+        if depends[output] and operation in _STEPS:
             return True
     return False
 

@@ -65,15 +65,15 @@ def mask_parameter(name: str, default: Any, *, doc: str = "", unit: str = "", **
     Raises ``InputError`` for a name that is not valid in formulas, for an unsupported kind, and for a default
     that violates the rules.
     """
-    given = rules.pop("kind", None)
-    kind = kind_of(default, rules) if given is None else ParameterKind(given)
+    stated_kind = rules.pop("kind", None)
+    kind = kind_of(default, rules) if stated_kind is None else ParameterKind(stated_kind)
     rule = Parameter(name=name, kind=kind, doc=doc, default=default, unit=unit, tunable=False, **rules)
     return checked_mask((rule,), "mask")[0]
 
 
 def checked_mask(mask: Sequence[Parameter], where: str) -> tuple[Parameter, ...]:
     """The parameters of a mask, their defaults in canonical form; raises ``InputError``."""
-    found: list[Parameter] = []
+    parameters: list[Parameter] = []
     for rule in mask:
         name = rule.name
         if not name.isidentifier() or keyword.iskeyword(name) or name in RESERVED:
@@ -83,7 +83,7 @@ def checked_mask(mask: Sequence[Parameter], where: str) -> tuple[Parameter, ...]
                 allowed="names of letters, digits and _ that have no other meaning in formulas",
                 fix="choose another name",
             )
-        if any(name == other.name for other in found):
+        if any(name == other.name for other in parameters):
             raise InputError(
                 f"the mask parameter '{name}' is declared twice",
                 where=where,
@@ -98,12 +98,12 @@ def checked_mask(mask: Sequence[Parameter], where: str) -> tuple[Parameter, ...]
                 allowed="a default, and one of the kinds " + ", ".join(kind.value for kind in _KINDS),
                 fix="give it a default of another kind",
             )
-        place = f"{where}, mask parameter '{name}'"
+        location = f"{where}, mask parameter '{name}'"
         # Whether a value is tunable follows from the parameters that depend on it: see mask_tuning.
         lists = {"choices": tuple(rule.choices), "dimensions": tuple(rule.dimensions)}
-        default = rule.check(rule.default, place)
-        found.append(dataclasses.replace(rule, tunable=False, default=default, **lists))
-    return tuple(found)
+        default = rule.check(rule.default, location)
+        parameters.append(dataclasses.replace(rule, tunable=False, default=default, **lists))
+    return tuple(parameters)
 
 
 def formula_names(text: str, where: str = "") -> frozenset[str]:
@@ -134,26 +134,26 @@ def formula_value(rule: Parameter, text: str, scope: Scope, where: str) -> Value
     A formula that consists of a parameter name gives its value of any kind; other formulas give numbers.
     Raises ``UnknownNameError`` for a name that is not in scope and ``InputError`` for other errors.
     """
-    place = f"{where}, parameter '{rule.name}'"
-    found = _parsed(text, place)
-    for name in sorted(found.names):
+    location = f"{where}, parameter '{rule.name}'"
+    parsed = _parsed(text, location)
+    for name in sorted(parsed.names):
         if name in scope:
             continue
-        if name in found.unknown_functions:
-            raise UnknownNameError("function or mask parameter", name, {*scope, *TABLE}, where=place)
-        raise UnknownNameError("mask parameter", name, scope, where=place)
+        if name in parsed.unknown_functions:
+            raise UnknownNameError("function or mask parameter", name, {*scope, *TABLE}, where=location)
+        raise UnknownNameError("mask parameter", name, scope, where=location)
     bare = text.strip()
     if bare in scope:
-        return rule.check(scope[bare], place)
+        return rule.check(scope[bare], location)
     if rule.kind not in _NUMBERS:
         raise InputError(
             f"the formula '{text[:60]}' gives numbers",
-            where=place,
+            where=location,
             allowed="the name of a mask parameter, as the value is " + rule.describe(),
             fix="use the name of a mask parameter with such a value",
         )
-    used = tuple((name, scope[name]) for name in sorted(parameters_read(text, scope, place)))
-    return rule.check(_of_kind(rule.kind, _evaluated(text, used, place)), place)
+    used = tuple((name, scope[name]) for name in sorted(parameters_read(text, scope, location)))
+    return rule.check(_of_kind(rule.kind, _evaluated(text, used, location)), location)
 
 
 def formula_symbols(text: str, names: Mapping[str, SX]) -> SX:
@@ -204,16 +204,16 @@ def _of_kind(kind: ParameterKind, value: float | list[Any]) -> float | list[Any]
     return value
 
 
-def values_of(mask: Sequence[Parameter], given: Mapping[str, object], where: str) -> dict[str, Value]:
+def values_of(mask: Sequence[Parameter], values: Mapping[str, object], where: str) -> dict[str, Value]:
     """The checked value of every parameter of a mask: the given value, else the default.
 
     Raises ``UnknownNameError`` for a name that is not in the mask, ``InputError`` for an invalid value.
     """
     known = [rule.name for rule in mask]
-    for name in given:
+    for name in values:
         if name not in known:
             raise UnknownNameError("mask parameter", name, known, where=where)
     return {
-        rule.name: rule.check(given.get(rule.name, cast("object", rule.default)), f"{where}.{rule.name}")
+        rule.name: rule.check(values.get(rule.name, cast("object", rule.default)), f"{where}.{rule.name}")
         for rule in mask
     }

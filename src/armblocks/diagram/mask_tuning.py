@@ -51,11 +51,13 @@ def followers(diagram: Diagram, path: str, symbol: SX | None = None) -> Follower
     if path not in known:
         raise UnknownNameError("mask parameter", path, known, where=f"diagram '{diagram.name}'")
     level, rule = known[path]
-    found = Followers()
+    dependents = Followers()
     value = as_symbols(level.mask_values[rule.name])
-    moved = symbol if symbol is not None else SX.sym(rule.name, *((1, 1) if value is None else value.shape))
-    _follow(path.rpartition(".")[0], level, {rule.name: moved}, found)
-    return found
+    perturbed = (
+        symbol if symbol is not None else SX.sym(rule.name, *((1, 1) if value is None else value.shape))
+    )
+    _follow(path.rpartition(".")[0], level, {rule.name: perturbed}, dependents)
+    return dependents
 
 
 def added_parameter(diagram: Diagram, path: str) -> AddedParameter:
@@ -69,8 +71,8 @@ def added_parameter(diagram: Diagram, path: str) -> AddedParameter:
         raise UnknownNameError("mask parameter", path, known, where=f"diagram '{diagram.name}'")
     level, rule = known[path]
     value = level.mask_values[rule.name]
-    now = as_symbols(value)
-    if now is None or isinstance(value, bool):
+    nominal = as_symbols(value)
+    if nominal is None or isinstance(value, bool):
         raise InputError(
             f"the mask parameter '{path}' is {type(value).__name__}, which has no derivative",
             where=f"diagram '{diagram.name}'",
@@ -79,18 +81,18 @@ def added_parameter(diagram: Diagram, path: str) -> AddedParameter:
         )
     slot = Slot(path, shape_of(value), rule.unit)
     change = SX.sym(rule.name, slot.size)
-    found = followers(diagram, path, now + unflatten(change, slot.shape))
-    if found.structural:
+    dependents = followers(diagram, path, nominal + unflatten(change, slot.shape))
+    if dependents.structural:
         raise InputError(
-            f"'{found.structural[0]}', which is not tunable, depends on '{path}'",
+            f"'{dependents.structural[0]}', which is not tunable, depends on '{path}'",
             where=f"diagram '{diagram.name}'",
             allowed="parameters on which only tunable parameters depend",
             fix="use the difference of two runs for this parameter",
         )
-    still = SX.zeros(slot.size)
+    no_change = SX.zeros(slot.size)
     changes = {
-        name: formula - SX(evalf(substituted(formula, change, still)))
-        for name, formula in found.tunable.items()
+        name: formula - SX(evalf(substituted(formula, change, no_change)))
+        for name, formula in dependents.tunable.items()
     }
     return AddedParameter(slot=slot, symbol=change, changes=changes)
 
@@ -107,9 +109,9 @@ def with_mask_parameters(system: HybridSystem, diagram: Diagram, names: Iterable
     return with_added_parameters(system, tuple(added_parameter(diagram, name) for name in added))
 
 
-def _follow(path: str, level: Diagram, moved: Mapping[str, SX], found: Followers) -> None:
+def _follow(path: str, level: Diagram, perturbed: Mapping[str, SX], dependents: Followers) -> None:
     """Find formulas of the perturbed parameters in one diagram and, recursively, in its subsystems."""
-    still = {
+    constants = {
         name: symbols
         for name, value in level.mask_values.items()
         if (symbols := as_symbols(value)) is not None
@@ -119,19 +121,21 @@ def _follow(path: str, level: Diagram, moved: Mapping[str, SX], found: Followers
             continue
         inner: dict[str, SX] = {}
         for parameter, text in block.formulas:
-            if not parameters_read(text, moved):
+            if not parameters_read(text, perturbed):
                 continue
             if isinstance(block, DiagramBlock) and parameter in block.diagram.mask_values:
                 if as_symbols(block.diagram.mask_values[parameter]) is None:
                     inner[parameter] = SX.sym(parameter)  # a choice or a robot: the only formula is its name
                 else:
-                    inner[parameter] = formula_symbols(text, {**still, **moved})
+                    inner[parameter] = formula_symbols(text, {**constants, **perturbed})
             elif _stays_input(block, parameter):
-                found.tunable[f"{joined(path, name)}.{parameter}"] = formula_symbols(text, {**still, **moved})
+                dependents.tunable[f"{joined(path, name)}.{parameter}"] = formula_symbols(
+                    text, {**constants, **perturbed}
+                )
             else:
-                found.structural.append(f"{joined(path, name)}.{parameter}")
+                dependents.structural.append(f"{joined(path, name)}.{parameter}")
         if inner and isinstance(block, DiagramBlock):
-            _follow(joined(path, name), block.diagram, inner, found)
+            _follow(joined(path, name), block.diagram, inner, dependents)
 
 
 def _stays_input(block: Block, parameter: str) -> bool:
@@ -145,13 +149,13 @@ def tunable_parameters(diagram: Diagram) -> list[tuple[str, Parameter, Value]]:
     """
     levels = levels_of(diagram)
     linked = [f"{path}/" for path, level in levels.items() if level.link]
-    decided = {
+    structural = {
         f"{joined(path, name)}.{parameter}"
         for path, level in levels.items()
         for name, block in level.blocks.items()
         for parameter, _ in block.formulas
     }
-    found = [
+    parameters = [
         (path, rule, level.mask_values[rule.name])
         for path, (level, rule) in mask_parameters(diagram).items()
         if as_symbols(level.mask_values[rule.name]) is not None and not followers(diagram, path).structural
@@ -159,7 +163,7 @@ def tunable_parameters(diagram: Diagram) -> list[tuple[str, Parameter, Value]]:
     flat = flat_diagram(diagram)
     # Blocks that share parameters have the same paths.
     owners = {flat.owner(name): block for name, block in flat.blocks.items()}
-    found += [
+    parameters += [
         (f"{name}.{rule.name}", rule, block.parameter_value(rule.name))
         for name, block in owners.items()
         for rule in block.inputs_of_the_run()
@@ -167,6 +171,6 @@ def tunable_parameters(diagram: Diagram) -> list[tuple[str, Parameter, Value]]:
     ]
     return [
         (path, rule, value)
-        for path, rule, value in found
-        if path not in decided and not any(path.startswith(inside) for inside in linked)
+        for path, rule, value in parameters
+        if path not in structural and not any(path.startswith(inside) for inside in linked)
     ]

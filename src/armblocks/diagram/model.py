@@ -47,21 +47,21 @@ def diagram_model(diagram: Diagram) -> Model:
     moving = moving_blocks(diagram, equations)
     for name in free:
         # Conditions that change at instants only need no events.
-        still = name not in moving and name not in diagram.gates
+        constant = name not in moving and name not in diagram.gates
         features = equations[name].features
-        if still and features.conditions and not features.states:
-            equations[name] = _equations(diagram, name, shapes, settled=not features.modes)
+        if constant and features.conditions and not features.states:
+            equations[name] = _equations(diagram, name, shapes, consistent_modes=not features.modes)
     for name, clock in sampling.clock_of.items():
         period = sampling.clocks[clock].period
         equations[name] = _equations(diagram, name, shapes, period=period)
     equations = {name: equations[name] for name in diagram.blocks}
     flow, tick = Network(diagram, equations), Network(diagram, equations, ticking=True)
     if sampling.clocks:
-        settled = {name: _equations(diagram, name, shapes, settled=True) for name in free}
+        consistent = {name: _equations(diagram, name, shapes, consistent_modes=True) for name in free}
         for name, clock in sampling.clock_of.items():
             period = sampling.clocks[clock].period
-            settled[name] = _equations(diagram, name, shapes, period=period, settled=True)
-        tick = Network(diagram, equations | settled, ticking=True)
+            consistent[name] = _equations(diagram, name, shapes, period=period, consistent_modes=True)
+        tick = Network(diagram, equations | consistent, ticking=True)
     return Model(
         shapes=shapes,
         sampling=sampling,
@@ -80,11 +80,13 @@ def _order(network: Network) -> Evaluation:
 
 
 def _equations(
-    diagram: Diagram, name: str, shapes: DiagramShapes, *, period: float = 1.0, settled: bool = False
+    diagram: Diagram, name: str, shapes: DiagramShapes, *, period: float = 1.0, consistent_modes: bool = False
 ) -> BlockEquations:
     block, hidden = diagram.blocks[name], diagram.gates.get(name, {})
     try:
-        return block_equations(block, shapes.inputs[name], period=period, settled=settled, hidden=hidden)
+        return block_equations(
+            block, shapes.inputs[name], period=period, consistent_modes=consistent_modes, hidden=hidden
+        )
     except DiagramError:
         raise
     except ArmblocksError as error:

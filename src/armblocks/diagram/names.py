@@ -14,15 +14,15 @@ NOT_SIGNALS = ("time", "run")
 """Names that no signal has: data files have the times of the rows and the description of the run there."""
 
 
-def check_block_name(name: str, where: str, thing: str = "block") -> None:
+def check_block_name(name: str, where: str, noun: str = "block") -> None:
     """Raise ``DiagramError`` for a name unfit for a path, ``block/port`` or ``block.parameter``."""
     allowed = f"1 to {LONGEST_NAME} characters, without '/', '.' and control characters"
     shown = repr(name if len(name) <= 60 else name[:57] + "...")
     if not name.strip():
-        raise DiagramError(f"a {thing} has an empty name", where=where, allowed=allowed, fix="name it")
+        raise DiagramError(f"a {noun} has an empty name", where=where, allowed=allowed, fix="name it")
     if len(name) > LONGEST_NAME:
         raise DiagramError(
-            f"the {thing} name {shown} has {len(name)} characters",
+            f"the {noun} name {shown} has {len(name)} characters",
             where=where,
             allowed=allowed,
             fix="shorten it",
@@ -31,7 +31,7 @@ def check_block_name(name: str, where: str, thing: str = "block") -> None:
         # Category C: control characters, and invisible marks that change the text direction.
         if character in "/." or unicodedata.category(character).startswith("C"):
             raise DiagramError(
-                f"the {thing} name {shown} contains {character!r}",
+                f"the {noun} name {shown} contains {character!r}",
                 where=where,
                 allowed=allowed,
                 fix="rename it",
@@ -47,7 +47,7 @@ def check_signal_names(blocks: Iterable[str], names: Mapping[PortRef, str], wher
     """Raise ``DiagramError`` for a name that another signal or a block of the sheet has, or that data files
     do not allow: columns of a vector are named ``signal[0]``.
     """
-    taken = {folded(name): f"the block '{name}'" for name in blocks}
+    used_names = {folded(name): f"the block '{name}'" for name in blocks}
     for ref, name in sorted(names.items()):
         check_block_name(name, f"{where}, signal '{ref}'", "signal")
         if folded(name) in NOT_SIGNALS or not {"[", "]"}.isdisjoint(name):
@@ -57,7 +57,7 @@ def check_signal_names(blocks: Iterable[str], names: Mapping[PortRef, str], wher
                 allowed=f"names without brackets, other than {', '.join(NOT_SIGNALS)}",
                 fix="choose another name",
             )
-        other = taken.get(folded(name))
+        other = used_names.get(folded(name))
         if other is not None:
             raise DiagramError(
                 f"the signal '{ref}' is named '{name}', like {other}",
@@ -65,4 +65,4 @@ def check_signal_names(blocks: Iterable[str], names: Mapping[PortRef, str], wher
                 allowed="names that no other signal and no block of the sheet has",
                 fix="choose another name",
             )
-        taken[folded(name)] = f"the signal '{ref}'"
+        used_names[folded(name)] = f"the signal '{ref}'"

@@ -187,9 +187,9 @@ def _loop(path: list[tuple[Node, tuple[str, ...]]], closing: tuple[Node, tuple[s
     """The signals of the loop, from the last visit of the closing node's group, in signal-flow order."""
     node = closing[0]
     start = max(
-        place
-        for place, (entry, _) in enumerate(path)
+        index
+        for index, (entry, _) in enumerate(path)
         if (entry.block, entry.group) == (node.block, node.group) and entry.order <= node.order
     )
-    needed = [entry for _, labels in (*path[start + 1 :], closing) for entry in labels]
-    return needed[::-1]
+    signals = [entry for _, labels in (*path[start + 1 :], closing) for entry in labels]
+    return signals[::-1]

@@ -30,28 +30,26 @@ class State:
 
     ``follows``: whether a mode is a following mode, that is, a function of the present signals. Following
     modes are made consistent before any event (an edge, a trigger, a reset) is processed. Other modes are
-    stateful. ``remembers``: whether a following mode has hysteresis, that is, also depends on its previous
-    value: the value before the instant, or before the latest event at it. A discrete state that ``remembers``
-    is captured at the same times. ``momentary``: whether a discrete state becomes 0 at the end of every
-    instant.
-    """
+    stateful. ``hysteresis``: whether a following mode also depends on its previous value: the value before
+    the instant, or before the latest event at it. A discrete state with ``hysteresis`` is captured at the
+    same times. ``momentary``: whether a discrete state becomes 0 at the end of every instant."""
 
     name: str
     shape: Shape
     doc: str
     unit: str = ""
     follows: bool = False
-    remembers: bool = False
+    hysteresis: bool = False
     momentary: bool = False
 
     @property
     def before(self) -> str:
-        """The name of what a mode that ``remembers`` was before."""
+        """The name of the discrete state with the previous value of this mode."""
         return name_before(self.name)
 
 
 def name_before(mode: str) -> str:
-    """The name of the discrete state that keeps what a mode was before."""
+    """The name of the discrete state with the previous value of a mode."""
     return f"{mode} before"
 
 
@@ -62,8 +60,8 @@ class Guard:
     ``direction``: +1 for upward crossings, -1 for downward, 0 for both. ``action``: effect on the run where
     it is positive: ``stop`` ends the run, ``fail`` is an error, ``warn`` is reported at the end. ``locates``:
     whether its zero only locates a change of a mode that follows the signals. ``silenced_by``: the momentary
-    state that keeps it from firing where it is not 0; at the end of the instant the guard begins anew, with
-    the sign that it has then.
+    state that disables the guard while it is not 0. At the end of the instant the guard is initialised again,
+    with its sign at that time.
     """
 
     name: str

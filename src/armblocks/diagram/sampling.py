@@ -44,13 +44,13 @@ def own_clock(block: Block) -> SampleClock | None:
 
     Raises ``InputError`` for an invalid sample time.
     """
-    given = np.atleast_1d(np.asarray(block.parameter_value("sample_time"), dtype=np.float64))
-    if given.tolist() == [INHERITED]:
+    sample_time = np.atleast_1d(np.asarray(block.parameter_value("sample_time"), dtype=np.float64))
+    if sample_time.tolist() == [INHERITED]:
         return None
-    period, offset = (float(given[0]), float(given[1]) if given.size > 1 else 0.0)
-    if given.size > 2 or period <= 0.0 or not 0.0 <= offset < period:
+    period, offset = (float(sample_time[0]), float(sample_time[1]) if sample_time.size > 1 else 0.0)
+    if sample_time.size > 2 or period <= 0.0 or not 0.0 <= offset < period:
         raise InputError(
-            f"the sample time is {given.tolist()}",
+            f"the sample time is {sample_time.tolist()}",
             where=f"{block.type_name()}.sample_time",
             allowed="-1 (that of the inputs), a period > 0, or (period, offset) with 0 <= offset < period",
             fix="give the period in seconds",
@@ -88,7 +88,7 @@ def resolve_sampling(diagram: Diagram, equations: Mapping[str, BlockEquations]) 
                 error.what, where=f"block '{name}', {error.where}", allowed=error.allowed, fix=error.fix
             ) from None
     begins: dict[str, Source] = {name: clock for name, clock in stated.items() if clock is not None}
-    begins.update({name: None for name, found in equations.items() if _flows(found)})
+    begins.update({name: None for name, clocks_by_block in equations.items() if _flows(clocks_by_block)})
     forward = {name: list[str]() for name in diagram.blocks}
     backward = {name: list[str]() for name in diagram.blocks}
     for wire in diagram.connections:
@@ -96,10 +96,10 @@ def resolve_sampling(diagram: Diagram, equations: Mapping[str, BlockEquations]) 
         backward[wire.target.block].append(wire.source.block)
     upstream = _reach(begins, forward)
     downstream: Mapping[str, Collection[tuple[str, Source]]] | None = None
-    found: dict[str, SampleClock] = {}
+    clocks_by_block: dict[str, SampleClock] = {}
     for name, clock in stated.items():
         if clock is not None:
-            found[name] = clock
+            clocks_by_block[name] = clock
             continue
         reaching = {source for entry in backward[name] for source in upstream[entry]}
         if not reaching:
@@ -107,9 +107,9 @@ def resolve_sampling(diagram: Diagram, equations: Mapping[str, BlockEquations]) 
                 clocked = {entry: own for entry, own in stated.items() if own is not None}
                 downstream = _reach(dict(clocked), backward)
             reaching = {source for entry in forward[name] for source in downstream[entry]}
-        found[name] = _fastest(name, diagram.blocks[name], reaching)
-    clocks = tuple(sorted(set(found.values()), key=lambda clock: (clock.period, clock.offset)))
-    return Sampling(clocks, {name: clocks.index(clock) for name, clock in found.items()})
+        clocks_by_block[name] = _fastest(name, diagram.blocks[name], reaching)
+    clocks = tuple(sorted(set(clocks_by_block.values()), key=lambda clock: (clock.period, clock.offset)))
+    return Sampling(clocks, {name: clocks.index(clock) for name, clock in clocks_by_block.items()})
 
 
 def moving_blocks(diagram: Diagram, equations: Mapping[str, BlockEquations]) -> frozenset[str]:
@@ -124,31 +124,31 @@ def moving_blocks(diagram: Diagram, equations: Mapping[str, BlockEquations]) -> 
     for wire in diagram.connections:
         if wire.source.block in wires and wire.target.block in wires:
             wires[wire.source.block].append((wire.source.port, wire.target))
-    around = _on_loops({name: [target.block for _, target in entries] for name, entries in wires.items()})
+    on_loops = _on_loops({name: [target.block for _, target in entries] for name, entries in wires.items()})
     inputs: dict[str, set[str]] = {name: set() for name in equations}
     queue = deque(equations)
     while queue:
         name = queue.popleft()
         outputs = _moving_outputs(diagram.blocks[name], equations[name], inputs[name])
         for port, target in wires[name]:
-            if (port in outputs or name in around) and target.port not in inputs[target.block]:
+            if (port in outputs or name in on_loops) and target.port not in inputs[target.block]:
                 inputs[target.block].add(target.port)
                 queue.append(target.block)
     flowing = {name for name, own in equations.items() if _flows(own)}
-    return frozenset(flowing | around | {name for name, ports in inputs.items() if ports})
+    return frozenset(flowing | on_loops | {name for name, ports in inputs.items() if ports})
 
 
 def check_triggered(diagram: Diagram, equations: Mapping[str, BlockEquations]) -> None:
     """Raise ``DiagramError`` for a block in a triggered subsystem with a continuous state or with a declared
     sample time.
     """
-    for name, found in equations.items():
+    for name, own in equations.items():
         block = diagram.blocks[name]
         if diagram.clocked(name) or "?fire" not in diagram.gates.get(name, {}):
             continue
         timed = block.sampled and own_clock(block) is not None
-        if found.states or timed:
-            kind = "ticks by itself" if timed else f"has the continuous state '{found.states[0].name}'"
+        if own.states or timed:
+            kind = "ticks by itself" if timed else f"has the continuous state '{own.states[0].name}'"
             raise DiagramError(
                 f"a block in a triggered subsystem {kind}",
                 where=f"block '{name}' ({block.title})",
@@ -167,11 +167,11 @@ def _moving_outputs(block: Block, equations: BlockEquations, moving: Collection[
     delayed = {line.name for line in equations.delays}
     outputs: set[str] = set()
     for port in block.output_ports():
-        place = equations.group_of.get((SlotKind.OUTPUT, port.name))
-        if place is None or port.name in block.implicit_outputs:
+        index = equations.group_of.get((SlotKind.OUTPUT, port.name))
+        if index is None or port.name in block.implicit_outputs:
             outputs.add(port.name)
             continue
-        group = equations.groups[place]
+        group = equations.groups[index]
         inputs = {name.removesuffix("'") for name in group.inputs}
         if group.timed or group.states or delayed & set(group.discrete) or inputs & set(moving):
             outputs.add(port.name)
@@ -180,12 +180,12 @@ def _moving_outputs(block: Block, equations: BlockEquations, moving: Collection[
 
 def _on_loops(following: Mapping[str, Iterable[str]]) -> set[str]:
     """The blocks on feedback loops."""
-    places = {name: place for place, name in enumerate(following)}
+    indices = {name: index for index, name in enumerate(following)}
     names = list(following)
-    needs = [[places[entry] for entry in entries] for entries in following.values()]
-    circles = (circle for circle in strongly_connected(needs) if len(circle) > 1)
-    around = {names[place] for circle in circles for place in circle}
-    return around | {name for name, entries in following.items() if name in entries}
+    needs = [[indices[entry] for entry in entries] for entries in following.values()]
+    components = (component for component in strongly_connected(needs) if len(component) > 1)
+    on_loops = {names[index] for component in components for index in component}
+    return on_loops | {name for name, entries in following.items() if name in entries}
 
 
 def _reach(

@@ -53,7 +53,7 @@ def known_shapes(diagram: Diagram) -> dict[PortRef, Shape]:
                 queued.add(consumer)
                 queue.append(consumer)
 
-    def spread() -> None:
+    def propagate() -> None:
         while queue:
             name = queue.popleft()
             queued.discard(name)
@@ -64,7 +64,7 @@ def known_shapes(diagram: Diagram) -> dict[PortRef, Shape]:
             try:
                 shapes = block.output_shapes(inputs)
             except ArmblocksError:
-                continue  # raised at the end, if still true when all shapes are known
+                continue  # raised at the end, if the error persists when all shapes are known
             for port, shape in shapes.items():
                 learn(PortRef(name, port), shape)
 
@@ -72,12 +72,12 @@ def known_shapes(diagram: Diagram) -> dict[PortRef, Shape]:
         for port in block.output_ports():
             if port.shape is not None:
                 known[PortRef(name, port.name)] = port.shape
-    spread()
+    propagate()
     for name, block in diagram.blocks.items():
         for port, shape in block.assumed_output_shapes().items():
             if PortRef(name, port) not in known:
                 learn(PortRef(name, port), shape)
-    spread()
+    propagate()
     # The remaining signals are in loops without state, or depend on them: scalars are assumed one by one.
     # Errors of blocks are raised first.
     open_outputs = [
@@ -90,7 +90,7 @@ def known_shapes(diagram: Diagram) -> dict[PortRef, Shape]:
         for _, ref in open_outputs:
             if ref not in known:
                 learn(ref, ())
-                spread()
+                propagate()
     return known
 
 
@@ -121,9 +121,9 @@ def signals_without_comments(levels: Mapping[str, Diagram]) -> KnownSignals:
         if not level.blocks[name].output_ports()
     }
     plain = {path: block for path, block in net.blocks.items() if not is_inside(path, sinks)}
-    kept = {path: level for path, level in levels.items() if not is_inside(path, sinks)}
+    active = {path: level for path, level in levels.items() if not is_inside(path, sinks)}
     try:
-        form = flat_form(dataclasses.replace(net, blocks=plain, levels=kept))
+        form = flat_form(dataclasses.replace(net, blocks=plain, levels=active))
         return KnownSignals(carried=form.carried, shapes=known_shapes(form.diagram))
     except ArmblocksError:
         return KnownSignals()

@@ -33,6 +33,6 @@ def broadcast(shapes: Mapping[str, Shape]) -> Shape:
     return result
 
 
-def shapes_agree(given: Shape, taken: Shape) -> bool:
+def shapes_agree(signal: Shape, port: Shape) -> bool:
     """Whether a signal fits a port: equal shapes, or one element each."""
-    return given == taken or math.prod(given) == math.prod(taken) == 1
+    return signal == port or math.prod(signal) == math.prod(port) == 1

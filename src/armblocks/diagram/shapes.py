@@ -26,10 +26,10 @@ class DiagramShapes:
 def check_stated(form: FlatForm, shapes: DiagramShapes) -> None:
     """Raise ``DiagramError`` where a signal at the end of a subsystem differs from the declared shape."""
     for target, (source, stated) in form.stated.items():
-        given = shapes.outputs[source.block][source.port]
-        if not shapes_agree(given, stated):
+        shape = shapes.outputs[source.block][source.port]
+        if not shapes_agree(shape, stated):
             raise DiagramError(
-                f"'{source}' gives shape {given} but '{target}' takes shape {stated}",
+                f"'{source}' gives shape {shape} but '{target}' takes shape {stated}",
                 where=f"block '{target.block}'",
                 allowed="the dimensions of the subsystem's In and Out blocks",
                 fix="change the dimensions of the block or the width of the signal",
@@ -59,11 +59,11 @@ def _checked(form: FlatForm, known: Mapping[PortRef, Shape]) -> DiagramShapes:
         for port in block.input_ports()
     }
     for wire in diagram.connections:
-        given, wanted = known.get(wire.source), stated[wire.target]
-        if given is not None and wanted is not None and not shapes_agree(given, wanted):
+        signal_shape, port_shape = known.get(wire.source), stated[wire.target]
+        if signal_shape is not None and port_shape is not None and not shapes_agree(signal_shape, port_shape):
             target = form.original_port(wire.target)
             raise DiagramError(
-                f"'{wire.source}' gives shape {given} but '{target}' takes shape {wanted}",
+                f"'{wire.source}' gives shape {signal_shape} but '{target}' takes shape {port_shape}",
                 where=f"block '{target.block}'",
                 allowed="both ends of a connection have the same shape",
                 fix="change the width of one end, or put a Mux, Demux or Matrix Gain in between",
@@ -72,23 +72,23 @@ def _checked(form: FlatForm, known: Mapping[PortRef, Shape]) -> DiagramShapes:
     outputs: dict[str, Shapes] = {}
     for name, block in diagram.blocks.items():
         # Still unknown: depends on a block whose error is raised below; any shape is valid until then.
-        taken: dict[str, Shape] = {}
+        input_shapes: dict[str, Shape] = {}
         complete = True
         for port in block.input_ports():
             shape = port.shape if port.shape is not None else known.get(drivers[PortRef(name, port.name)])
             complete = complete and shape is not None
-            taken[port.name] = shape or ()
+            input_shapes[port.name] = shape or ()
         try:
             if complete:
-                block.output_shapes(taken)
+                block.output_shapes(input_shapes)
         except InputError as error:
-            fed = ", ".join(f"'{port}' by '{drivers[PortRef(name, port)]}'" for port in taken)
+            fed = ", ".join(f"'{port}' by '{drivers[PortRef(name, port)]}'" for port in input_shapes)
             raise DiagramError(
                 error.what,
                 where=f"block '{name}' ({block.title}), fed at {fed}",
                 allowed=error.allowed,
                 fix=error.fix,
             ) from None
-        inputs[name] = taken
+        inputs[name] = input_shapes
         outputs[name] = {port.name: known.get(PortRef(name, port.name), ()) for port in block.output_ports()}
     return DiagramShapes(inputs=inputs, outputs=outputs)

@@ -36,7 +36,7 @@ def named_signals(form: FlatForm) -> Iterator[tuple[str, PortRef]]:
 
 def signal_titles(diagram: Diagram) -> dict[str, str]:
     """The name of every named signal by ``block/port``; of several names that of the outermost sheet."""
-    found: dict[str, str] = {}
+    titles: dict[str, str] = {}
     for name, ref in named_signals(flatten_hierarchy(diagram)):
-        found.setdefault(str(ref), name)
-    return found
+        titles.setdefault(str(ref), name)
+    return titles

@@ -35,18 +35,18 @@ ANY = -1.0
 
 def stated_shape(block: Inport | Outport) -> Shape | None:
     """The declared shape of an end of a diagram; ``None`` for any shape."""
-    given = np.atleast_1d(np.asarray(block.dimensions, dtype=np.float64)).tolist()
-    if given == [ANY]:
+    dimensions = np.atleast_1d(np.asarray(block.dimensions, dtype=np.float64)).tolist()
+    if dimensions == [ANY]:
         return None
-    return () if given == [1.0] else tuple(int(size) for size in given)
+    return () if dimensions == [1.0] else tuple(int(size) for size in dimensions)
 
 
 def _check_dimensions(block: Inport | Outport) -> None:
-    given = np.atleast_1d(np.asarray(block.dimensions, dtype=np.float64))
-    whole = bool(np.all((given >= 1.0) & (given == np.floor(given))))
-    if given.tolist() != [ANY] and not (whole and given.size <= 2):
+    dimensions = np.atleast_1d(np.asarray(block.dimensions, dtype=np.float64))
+    whole = bool(np.all((dimensions >= 1.0) & (dimensions == np.floor(dimensions))))
+    if dimensions.tolist() != [ANY] and not (whole and dimensions.size <= 2):
         raise InputError(
-            f"the dimensions are {given.tolist()}",
+            f"the dimensions are {dimensions.tolist()}",
             where=f"{block.type_name()}.dimensions",
             allowed="-1 (any), 1 (a scalar), n (a vector), or (m, n) (a matrix)",
             fix="give integers, at least 1",
@@ -169,13 +169,13 @@ class DiagramBlock(Block):
                     allowed="other names",
                     fix="rename it",
                 )
-        taken = {rule.name for rule in self.parameters()}
-        twice = next((rule.name for rule in self.diagram.mask if rule.name in taken), None)
-        if twice is not None:
+        used_names = {rule.name for rule in self.parameters()}
+        duplicate = next((rule.name for rule in self.diagram.mask if rule.name in used_names), None)
+        if duplicate is not None:
             raise InputError(
-                f"the mask parameter '{twice}' is also a parameter of every {self.title}",
+                f"the mask parameter '{duplicate}' is also a parameter of every {self.title}",
                 where=f"diagram '{self.diagram.name}'",
-                allowed=f"other names than {', '.join(sorted(taken))}",
+                allowed=f"other names than {', '.join(sorted(used_names))}",
                 fix="choose another name",
             )
 
@@ -213,9 +213,9 @@ def ends(diagram: Diagram, kind: type[Inport] | type[Outport]) -> tuple[tuple[st
 
     Raises ``DiagramError`` for duplicate numbers.
     """
-    found = [(name, block) for name, block in diagram.blocks.items() if isinstance(block, kind)]
-    found.sort(key=lambda entry: (entry[1].port or math.inf, entry[0]))
-    for (one, first), (two, second) in pairwise(found):
+    ports = [(name, block) for name, block in diagram.blocks.items() if isinstance(block, kind)]
+    ports.sort(key=lambda entry: (entry[1].port or math.inf, entry[0]))
+    for (one, first), (two, second) in pairwise(ports):
         if first.port and first.port == second.port:
             raise DiagramError(
                 f"'{one}' and '{two}' are both {kind.title} number {first.port}",
@@ -223,7 +223,7 @@ def ends(diagram: Diagram, kind: type[Inport] | type[Outport]) -> tuple[tuple[st
                 allowed="unique port numbers",
                 fix="give one of them another port number",
             )
-    return tuple(found)
+    return tuple(ports)
 
 
 def block_count(diagram: Diagram) -> int:

@@ -26,24 +26,24 @@ def sums_on_loops(network: Network, evaluation: Evaluation) -> dict[Node, tuple[
     """Nodes that add, in loops whose equations are linear in the fed-back signals; each with such a loop."""
     if not evaluation.loops:
         return {}
-    place_of = {node: place for place, node in enumerate(evaluation.order)}
-    needs = [[place_of[other] for other, _ in network.needs(node)] for node in evaluation.order]
-    found: dict[Node, tuple[str, ...]] = {}
-    for places in strongly_connected(needs):
-        if len(places) == 1 and places[0] not in needs[places[0]]:
+    index_of = {node: index for index, node in enumerate(evaluation.order)}
+    needs = [[index_of[other] for other, _ in network.needs(node)] for node in evaluation.order]
+    loop_of: dict[Node, tuple[str, ...]] = {}
+    for component in strongly_connected(needs):
+        if len(component) == 1 and component[0] not in needs[component[0]]:
             continue
-        tangle = {evaluation.order[place] for place in places}
-        if not all(_is_linear(network, node, tangle) for node in tangle):
+        nodes = {evaluation.order[index] for index in component}
+        if not all(_is_linear(network, node, nodes) for node in nodes):
             continue
-        loops = [loop for node, loop in evaluation.loops.items() if node in tangle]
-        cuts = [node for node in evaluation.loops if node in tangle]
-        sums = [node for node in (evaluation.order[place] for place in places) if _adds(network, node)]
+        loops = [loop for node, loop in evaluation.loops.items() if node in nodes]
+        cuts = [node for node in evaluation.loops if node in nodes]
+        sums = [node for node in (evaluation.order[index] for index in component) if _adds(network, node)]
         if _unknowns(network, sums) > max(MOST_UNKNOWNS, _unknowns(network, cuts)):
             continue
         for node in sums:
             through = [loop for loop in loops if any(path.rpartition("/")[0] == node.block for path in loop)]
-            found[node] = (through or loops)[0]
-    return found
+            loop_of[node] = (through or loops)[0]
+    return loop_of
 
 
 def _group(network: Network, node: Node) -> Group:
@@ -57,14 +57,14 @@ def _unknowns(network: Network, nodes: list[Node]) -> int:
     )
 
 
-def _is_linear(network: Network, node: Node, tangle: set[Node]) -> bool:
+def _is_linear(network: Network, node: Node, component: set[Node]) -> bool:
     """Whether a node is an explicit value that is linear in the outputs of its component."""
     if node.group == HELD or node.order or network.diagram.blocks[node.block].implicit_outputs:
         return False
     if network.diagram.clocked(node.block):
         return False
     group = _group(network, node)
-    inner = [network.input(node.block, port).node in tangle for port in group.inputs]
+    inner = [network.input(node.block, port).node in component for port in group.inputs]
     return not any(inner) or not any(which_depends(group.expression, group.z, 2))
 
 

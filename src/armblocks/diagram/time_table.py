@@ -49,9 +49,9 @@ class TimeTable:
         times = rows[:, 0]
         left = np.append(times[:-1] == times[1:], False)
         times[left] = np.nextafter(times[left], -np.inf)
-        wrong = np.flatnonzero(~(np.diff(rows[:, 0]) > 0.0) | ~np.isfinite(rows[1:]).all(axis=1))
-        if wrong.size or not np.isfinite(rows[0]).all():
-            row = int(wrong[0]) + 1 if np.isfinite(rows[0]).all() else 0
+        invalid = np.flatnonzero(~(np.diff(rows[:, 0]) > 0.0) | ~np.isfinite(rows[1:]).all(axis=1))
+        if invalid.size or not np.isfinite(rows[0]).all():
+            row = int(invalid[0]) + 1 if np.isfinite(rows[0]).all() else 0
             raise InputError(
                 f"row {row + 1} of the table is {np.array(self.rows, dtype=np.float64)[row].tolist()}",
                 where=self.source,

@@ -181,8 +181,8 @@ def _updated(model: Model, symbols: Symbols, flow: Tracing, loops: Implicit) -> 
 
 
 def _keeps_left_limits(model: Model) -> bool:
-    found = model.flow.equations.values()
-    return any(kind is SlotKind.CAPTURE for equations in found for kind, _ in equations.group_of)
+    own = model.flow.equations.values()
+    return any(kind is SlotKind.CAPTURE for equations in own for kind, _ in equations.group_of)
 
 
 def _captured(model: Model, symbols: Symbols, flow: Tracing, after_tick: Mapping[str, SX]) -> dict[str, SX]:
@@ -211,12 +211,12 @@ def _breakpoints(model: Model, symbols: Symbols) -> list[SX]:
 
 def _recorded(diagram: Diagram, flow: Tracing, value: Value) -> SX:
     """The recorded value of a signal; non-finite ones in an inactive subsystem are recorded as 0."""
-    worked_out, gate = flow.value(value), diagram.gates.get(value.node.block, {})
+    recorded, gate = flow.value(value), diagram.gates.get(value.node.block, {})
     for control in (ON, FIRE):
         if control in gate:
             works = flow.value(flow.network.input(value.node.block, control))
-            worked_out = if_else(logic_or(works, fabs(worked_out) <= sys.float_info.max), worked_out, 0.0)
-    return worked_out
+            recorded = if_else(logic_or(works, fabs(recorded) <= sys.float_info.max), recorded, 0.0)
+    return recorded
 
 
 def _same(network: Network, value: Value) -> Value:
@@ -257,27 +257,27 @@ def _contradictions(
 ) -> tuple[tuple[int, ...], tuple[bool, ...], list[SX]]:
     """The indices of all modes in ``z``; which ones follow the signals; which ones are inconsistent."""
     ranges = signature(*symbols.discrete_slots).ranges
-    places: list[int] = []
+    indices: list[int] = []
     follows: list[bool] = []
-    found: list[SX] = []
+    contradictions: list[SX] = []
     for name, equations in model.flow.equations.items():
         for mode in equations.modes:
-            place = ranges[f"{name}/{mode.name}"]
-            places += range(place.start, place.stop)
-            follows += [mode.follows] * (place.stop - place.start)
-            found.append(flow.value(_value(model.flow, name, SlotKind.CONTRADICTION, mode.name)))
-    return tuple(places), tuple(follows), found
+            entries = ranges[f"{name}/{mode.name}"]
+            indices += range(entries.start, entries.stop)
+            follows += [mode.follows] * (entries.stop - entries.start)
+            contradictions.append(flow.value(_value(model.flow, name, SlotKind.CONTRADICTION, mode.name)))
+    return tuple(indices), tuple(follows), contradictions
 
 
 def _remembered(model: Model, symbols: Symbols) -> tuple[tuple[int, int], ...]:
     """The indices in ``z`` of all hysteresis modes, each with the index of its previous value."""
     ranges = signature(*symbols.discrete_slots).ranges
     return tuple(
-        place
+        pair
         for name, equations in model.flow.equations.items()
         for mode in equations.modes
-        if mode.remembers
-        for place in zip(_places(ranges[f"{name}/{mode.name}"]), _places(ranges[f"{name}/{mode.before}"]))
+        if mode.hysteresis
+        for pair in zip(_indices(ranges[f"{name}/{mode.name}"]), _indices(ranges[f"{name}/{mode.before}"]))
     )
 
 
@@ -285,11 +285,11 @@ def _recaptured(model: Model, symbols: Symbols) -> tuple[int, ...]:
     """The indices in ``z`` of discrete states that are captured together with modes with hysteresis."""
     ranges = signature(*symbols.discrete_slots).ranges
     return tuple(
-        place
+        index
         for name, equations in model.flow.equations.items()
         for state in equations.discrete
-        if state.remembers and (SlotKind.CAPTURE, state.name) in equations.group_of
-        for place in _places(ranges[f"{name}/{state.name}"])
+        if state.hysteresis and (SlotKind.CAPTURE, state.name) in equations.group_of
+        for index in _indices(ranges[f"{name}/{state.name}"])
     )
 
 
@@ -315,7 +315,7 @@ def _silenced(
     )
 
 
-def _places(entries: slice) -> range:
+def _indices(entries: slice) -> range:
     return range(entries.start, entries.stop)
 
 
@@ -327,12 +327,12 @@ def _delays(
     model: Model, symbols: Symbols, flow: Tracing, loops: Implicit, ends: Mapping[str, SX], products: SX
 ) -> Delays | None:
     """The delayed signals and their delays. Raises ``DiagramError`` where a delay depends on itself."""
-    places = signature(*symbols.discrete_slots).ranges
+    ranges = signature(*symbols.discrete_slots).ranges
     values: list[int] = []
     derivatives: list[int] = []
     fixed: list[bool] = []
     columns: dict[str, list[SX]] = {"u": [], "du": [], "tau": [], "shortest": [], "longest": []}
-    looked_up: list[SX] = [loops.w]
+    delayed: list[SX] = [loops.w]
     for name, equations in model.flow.equations.items():
         if not equations.delays:
             continue
@@ -340,7 +340,7 @@ def _delays(
         for line in equations.delays:
             kinds = (SlotKind.DELAYED, SlotKind.DELAYED_RATE, SlotKind.DELAY)
             u, du, tau = (flow.value(_value(model.flow, name, kind, line.name)) for kind in kinds)
-            of_value, of_derivative = places[f"{name}/{line.name}"], places[f"{name}/{line.name}'"]
+            of_value, of_derivative = ranges[f"{name}/{line.name}"], ranges[f"{name}/{line.name}'"]
             values += range(of_value.start, of_value.stop)
             derivatives += range(of_derivative.start, of_derivative.stop)
             fixed += [line.name in equations.fixed_delays] * u.numel()
@@ -348,11 +348,11 @@ def _delays(
             parts = (u, du, tau * each, *(bound * each for bound in bounds[line.name]))
             for key, part in zip(columns, parts):
                 columns[key].append(part)
-            looked_up += [symbols.discrete[f"{name}/{line.name}{mark}"] for mark in ("", "'")]
+            delayed += [symbols.discrete[f"{name}/{line.name}{mark}"] for mark in ("", "'")]
     if not values:
         return None
     taus = loops.solved(columns["tau"])
-    if depends_on(taus, vertcat(*looked_up)):
+    if depends_on(taus, vertcat(*delayed)):
         raise DiagramError(
             "the delay time depends on a delayed signal, or on a nonlinear loop",
             where=f"diagram '{model.flow.diagram.name}'",
@@ -387,12 +387,12 @@ def _reset(model: Model, symbols: Symbols, flow: Tracing) -> dict[str, list[SX]]
                 (states if path in states else discrete)[path] = after
         for mode in equations.modes:
             path = f"{name}/{mode.name}"
-            settled = flow.value(_value(model.flow, name, SlotKind.MODE, mode.name))
+            consistent = flow.value(_value(model.flow, name, SlotKind.MODE, mode.name))
             requested = quiet
             if mode.follows:  # its value needs no event
-                wrong = flow.value(_value(model.flow, name, SlotKind.CONTRADICTION, mode.name))
-                requested = logic_or(quiet, wrong)
-            discrete[path] = if_else(requested, settled, discrete[path])
+                inconsistent = flow.value(_value(model.flow, name, SlotKind.CONTRADICTION, mode.name))
+                requested = logic_or(quiet, inconsistent)
+            discrete[path] = if_else(requested, consistent, discrete[path])
     return {"x": list(states.values()), "z": list(discrete.values())}
 
 
@@ -458,8 +458,8 @@ def _parameter_values(diagram: Diagram) -> dict[str, Any]:
 def _initial_values(model: Model, symbols: Symbols) -> list[SX]:
     values: list[SX] = []
     for name, equations in model.flow.equations.items():
-        given = equations.features.starts(symbols.parameters_of(name))
-        values.extend(spread(SX(given[state.name]), state.shape) for state in equations.states)
+        starts = equations.features.starts(symbols.parameters_of(name))
+        values.extend(spread(SX(starts[state.name]), state.shape) for state in equations.states)
     return values
 
 
@@ -467,8 +467,8 @@ def _initial_discrete(model: Model, symbols: Symbols) -> list[SX]:
     values: list[SX] = []
     for name, equations in model.flow.equations.items():
         features, p = equations.features, symbols.parameters_of(name)
-        given = {**features.starts(p), **features.past(p)}
-        values.extend(spread(SX(given.get(state.name, 0.0)), state.shape) for state in equations.discrete)
+        starts = {**features.starts(p), **features.history(p)}
+        values.extend(spread(SX(starts.get(state.name, 0.0)), state.shape) for state in equations.discrete)
         if name in model.sampling.clock_of:
             held = features.held(p)
             shapes = model.shapes.outputs[name]
@@ -480,16 +480,16 @@ def _aliases(form: FlatForm, layout: Signature) -> dict[str, str]:
     """Other names of signals: names given by the user, a block's bare name, the input ports, and the ports of
     virtual blocks."""
     aliases: dict[str, str] = {}
-    taken = set(layout.names)
+    used_names = set(layout.names)
     for name, block in form.diagram.blocks.items():
         outputs = block.output_ports()
         if len(outputs) == 1:
             aliases[name] = f"{name}/{outputs[0].name}"
     for wire in form.diagram.connections:
-        if str(wire.target) not in taken:
+        if str(wire.target) not in used_names:
             aliases[str(wire.target)] = str(wire.source)
         if isinstance(form.diagram.blocks[wire.target.block], Outport):
             aliases[wire.target.block] = str(wire.source)
-    aliases.update({name: str(ref) for name, ref in form.aliases.items() if name not in taken})
+    aliases.update({name: str(ref) for name, ref in form.aliases.items() if name not in used_names})
     aliases.update({name: str(ref) for name, ref in named_signals(form)})
     return aliases

@@ -43,8 +43,8 @@ class Symbols:
         ]
         self.state_slots = [
             Slot(f"{name}/{state.name}", state.shape, state.unit)
-            for name, found in equations.items()
-            for state in found.states
+            for name, own in equations.items()
+            for state in own.states
         ]
         self.discrete_slots: list[Slot] = []
         for name in blocks:
@@ -55,8 +55,8 @@ class Symbols:
                 self.discrete_slots += [Slot(f"{name}/{port}", shape) for port, shape in shapes.items()]
         guard_slots = [
             Slot(f"{name}/{guard.name}", guard.shape)
-            for name, found in equations.items()
-            for guard in found.guards
+            for name, own in equations.items()
+            for guard in own.guards
         ]
         self.t = SX.sym("t")
         self.x, self.states = _named_symbols("x", self.state_slots)
@@ -88,7 +88,7 @@ class Tracing:
         self.symbols = symbols
         self._clock_of = clock_of or {}
         self._values: dict[Node, dict[tuple[SlotKind, str], SX]] = {}
-        self._left_over: dict[Value, SX] = {}
+        self._residuals: dict[Value, SX] = {}
         self.products: list[SX] = []
         """The signals that are products of two numbers."""
         self.unknowns: dict[Value, SX] = {}
@@ -110,15 +110,17 @@ class Tracing:
                 for state in group.states
             ]
             # Discrete variables and events are constant between events.
-            still = [symbols.discrete[f"{node.block}/{name}"] for name in group.discrete]
+            constants = [symbols.discrete[f"{node.block}/{name}"] for name in group.discrete]
             events = [symbols.events[f"{node.block}/{name}"] for name in group.events]
             if order:
-                still, events = ([SX.zeros(part.numel()) for part in parts] for parts in (still, events))
-                for place, name in enumerate(group.discrete):
+                constants, events = (
+                    [SX.zeros(part.numel()) for part in parts] for parts in (constants, events)
+                )
+                for index, name in enumerate(group.discrete):
                     if name in {line.name for line in self.network.equations[node.block].delays}:
-                        still[place] = self._delayed_rate(node.block, name, order)
+                        constants[index] = self._delayed_rate(node.block, name, order)
             inputs = [self.value(self.network.input(node.block, port, order)) for port in group.inputs]
-            columns.append(vertcat(*states, *still, *inputs, *events, SX(0, 1)))
+            columns.append(vertcat(*states, *constants, *inputs, *events, SX(0, 1)))
         arguments = [symbols.t, symbols.parameters[node.block], *columns]
         flat = group.value(node.order, arguments)
         parts = _split(flat, [slot.size for slot in group.slots])
@@ -129,13 +131,13 @@ class Tracing:
         for name in self.network.diagram.blocks[node.block].implicit_outputs:
             if (SlotKind.OUTPUT, name) in self._values[node]:
                 unknown = Value(node, SlotKind.OUTPUT, name)
-                self._left_over[unknown] = self._values[node].pop((SlotKind.OUTPUT, name))
+                self._residuals[unknown] = self._values[node].pop((SlotKind.OUTPUT, name))
                 self.value(unknown)  # also if nothing reads it
         if node in self._sums:
             for slot in group.slots:
                 if slot.kind is SlotKind.OUTPUT:
                     unknown = Value(node, slot.kind, slot.name)
-                    self._left_over[unknown] = self._values[node].pop((slot.kind, slot.name)) - self.value(
+                    self._residuals[unknown] = self._values[node].pop((slot.kind, slot.name)) - self.value(
                         unknown
                     )
         if node.block in self._clock_of:
@@ -144,16 +146,16 @@ class Tracing:
                 ticks = logic_and(ticks, self.value(self.network.input(node.block, ON)))
             for slot in group.slots:
                 if slot.kind in (SlotKind.OUTPUT, SlotKind.UPDATE):
-                    fresh = self._values[node][slot.kind, slot.name]
+                    computed = self._values[node][slot.kind, slot.name]
                     held = symbols.discrete[f"{node.block}/{slot.name}"]
-                    self._values[node][slot.kind, slot.name] = if_else(ticks, fresh, held)
+                    self._values[node][slot.kind, slot.name] = if_else(ticks, computed, held)
 
     def _delayed_rate(self, block: str, name: str, order: int) -> SX:
         """The time derivative of a delayed value. Raises ``DiagramError`` where it is not available."""
         if order > 1 or name not in self.network.equations[block].fixed_delays:
-            what = "the second derivative" if order > 1 else "the derivative"
+            derivative = "the second derivative" if order > 1 else "the derivative"
             raise DiagramError(
-                f"{what} of a delayed signal is not available"
+                f"{derivative} of a delayed signal is not available"
                 + ("" if order > 1 else ", whose delay changes"),
                 where=f"block '{block}' ({self.network.diagram.blocks[block].title})",
                 allowed="the first derivative after a constant delay",
@@ -179,7 +181,7 @@ class Tracing:
         """The residual of each unknown."""
         return vertcat(
             *[
-                self._left_over[value] if value in self._left_over else self.value(value) - unknown
+                self._residuals[value] if value in self._residuals else self.value(value) - unknown
                 for value, unknown in self.unknowns.items()
             ]
         )
@@ -203,19 +205,19 @@ class Implicit:
         cuts = vertcat(*tracing.unknowns.values())
         residual = tracing.residuals()
         own = {value: (f"{value.node.block}/{value.name}",) for value in tracing.unknowns}
-        around = [
+        loop_signals = [
             loops.get(value.node, own[value])
             for value, cut in tracing.unknowns.items()
             for _ in range(cut.numel())
         ]
-        check_solvable(cuts, residual, symbols.p, values, around, where)
-        solution, remaining, circles = solve_affine(cuts, residual)
+        check_solvable(cuts, residual, symbols.p, values, loop_signals, where)
+        solution, remaining, solved_loops = solve_affine(cuts, residual)
         names = [
             _unknown_name(value) + (f"[{k}]" if cut.numel() > 1 else "")
             for value, cut in tracing.unknowns.items()
             for k in range(cut.numel())
         ]
-        self.linear = [(tuple(names[k] for k in circle), matrix) for circle, matrix in circles]
+        self.linear = [(tuple(names[k] for k in loop), matrix) for loop, matrix in solved_loops]
         self.slots = Signature(tuple(Slot(names[k]) for k in remaining))
         self.w = SX.sym("w", len(remaining))
         if remaining:

@@ -27,10 +27,10 @@ def infer_units(diagram: Diagram) -> Mapping[PortRef, str]:
         name = queue.popleft()
         block = diagram.blocks[name]
         sources = {port.name: drivers[PortRef(name, port.name)] for port in block.input_ports()}
-        given = {port: units[source] for port, source in sources.items()}
-        found = [(PortRef(name, port), unit) for port, unit in block.output_units(given).items()]
-        found += [(sources[port], unit) for port, unit in block.input_units(given).items()]
-        for port, unit in found:
+        input_units = {port: units[source] for port, source in sources.items()}
+        inferred = [(PortRef(name, port), unit) for port, unit in block.output_units(input_units).items()]
+        inferred += [(sources[port], unit) for port, unit in block.input_units(input_units).items()]
+        for port, unit in inferred:
             # A known unit does not change, so the iteration terminates.
             if unit and not units[port]:
                 units[port] = unit

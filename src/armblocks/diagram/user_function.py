@@ -110,10 +110,10 @@ class UserFunction:
 
 def _is_importable(function: FunctionType) -> bool:
     """Whether the function is the attribute of that name of its module."""
-    found: object = sys.modules.get(function.__module__)
+    attribute: object = sys.modules.get(function.__module__)
     for name in function.__qualname__.split("."):
-        found = getattr(found, name, None)
-    return found is function
+        attribute = getattr(attribute, name, None)
+    return attribute is function
 
 
 def _from_file(source: str) -> UserFunction:

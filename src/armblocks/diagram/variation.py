@@ -47,7 +47,7 @@ def with_comments(diagram: Diagram, comments: Mapping[str, Comment | None]) -> D
         _check_unlinked(outside, path)
         if comment is not None:
             check_comment(path, level.block(name), comment)
-        others = {other: how for other, how in level.commented.items() if other != name}
+        others = {other: mark for other, mark in level.commented.items() if other != name}
         commented = others if comment is None else {**others, name: comment}
         diagram = _rebuilt(outside, dataclasses.replace(level, commented=commented))
     check_diagram(diagram)
@@ -106,13 +106,13 @@ def _with_value(diagram: Diagram, path: str, parameter: str, value: object) -> D
 
 def _check_unlinked(outside: _Outside, path: str) -> None:
     """Raise ``DiagramError`` for a change inside a library block."""
-    linked = next((place for place, (_, _, inside) in enumerate(outside) if inside.diagram.link), None)
+    linked = next((k for k, (_, _, inside) in enumerate(outside) if inside.diagram.link), None)
     if linked is not None:
         subsystem = "/".join(name for _, name, _ in outside[: linked + 1])
-        found = outside[linked][2].diagram
-        own = ", ".join(f"{subsystem}.{rule.name}" for rule in found.mask)
+        library_diagram = outside[linked][2].diagram
+        own = ", ".join(f"{subsystem}.{rule.name}" for rule in library_diagram.mask)
         raise DiagramError(
-            f"'{path}' is inside the library block '{found.link}'",
+            f"'{path}' is inside the library block '{library_diagram.link}'",
             where=f"block '{subsystem}'",
             allowed=own or "nothing: the library block has no parameters",
             fix="change a parameter of its mask, or break the link",

@@ -9,7 +9,7 @@ from armblocks.diagram.block import Block
 from armblocks.diagram.parameter import parameter
 from armblocks.diagram.port import Port
 from armblocks.diagram.signs import Outline
-from armblocks.diagram.worked_example import WorkedExample, made
+from armblocks.diagram.worked_example import WorkedExample, driver
 from armblocks.errors import InputError
 
 _NAMES = "unique names of letters, digits and _, separated by commas"
@@ -32,11 +32,13 @@ def port_names(paths: tuple[str, ...]) -> tuple[str, ...]:
 def _check_list(text: str, where: str, *, nested: bool) -> None:
     entries = listed(text)
     parts = [part for entry in entries for part in (entry.split(".") if nested else [entry])]
-    wrong = [part for part in parts if not part.isidentifier()]
-    twice = [entry for entry in entries if entries.count(entry) > 1]
-    if wrong or twice or not entries:
+    invalid = [part for part in parts if not part.isidentifier()]
+    duplicates = [entry for entry in entries if entries.count(entry) > 1]
+    if invalid or duplicates or not entries:
         offender = (
-            f"'{(wrong or twice)[0]}' in '{text}' is not allowed" if wrong or twice else "the list is empty"
+            f"'{(invalid or duplicates)[0]}' in '{text}' is not allowed"
+            if invalid or duplicates
+            else "the list is empty"
         )
         raise InputError(offender, where=where, allowed=_PATHS if nested else _NAMES, fix="correct the list")
 
@@ -53,7 +55,7 @@ class Goto(Block):
     virtual: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A From block receives the signal of the Goto block with the same tag.",
-        shown=("u", made("From")),
+        shown=("u", driver("From")),
     )
 
     tag: str = parameter("A", doc="tag of the signal")
@@ -75,7 +77,7 @@ class From(Block):
     virtual: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A From block receives the signal of the Goto block with the same tag.",
-        besides=(made("Goto").by(u=made("SineWave")),),
+        extra_blocks=(driver("Goto").by(u=driver("SineWave")),),
     )
 
     tag: str = parameter("A", doc="tag of the signal")
@@ -122,7 +124,7 @@ class BusSelector(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The speed is selected from a bus of position and speed.",
         parameters={"elements": "speed"},
-        inputs={"bus": made("BusCreator", names="position, speed")},
+        inputs={"bus": driver("BusCreator", names="position, speed")},
         shown=("bus", "speed"),
     )
 
@@ -150,8 +152,8 @@ class BusAssignment(Block):
         shows="The speed in the bus is replaced by another signal; the position is unchanged.",
         parameters={"elements": "speed"},
         inputs={
-            "bus": made("BusCreator", names="position, speed"),
-            "speed": made("SineWave", frequency=3.0).named("new speed"),
+            "bus": driver("BusCreator", names="position, speed"),
+            "speed": driver("SineWave", frequency=3.0).named("new speed"),
         },
         shown=("bus assignment/bus",),
     )

@@ -13,7 +13,7 @@ from typing import Any
 
 
 @dataclass(frozen=True, kw_only=True)
-class Fed:
+class ExampleBlock:
     """A block of the example, by type name, with its inputs.
 
     ``inputs`` by port; ``port`` selects one of several outputs; ``name`` is the block's name in the diagram
@@ -22,31 +22,31 @@ class Fed:
 
     type_name: str
     parameters: Mapping[str, Any] = field(default_factory=dict[str, Any])
-    inputs: Mapping[str, Feed] = field(default_factory=dict[str, Any])
+    inputs: Mapping[str, Driver] = field(default_factory=dict[str, Any])
     port: str = ""
     name: str = ""
 
-    def by(self, **inputs: Feed) -> Fed:
-        """The same block with these inputs: ``made("Sum", signs="+-").by(u1=made("Step"), u2="y")``."""
+    def by(self, **inputs: Driver) -> ExampleBlock:
+        """The same block with these inputs: ``driver("Sum", signs="+-").by(u1=driver("Step"), u2="y")``."""
         return dataclasses.replace(self, inputs={**self.inputs, **inputs})
 
-    def at(self, port: str) -> Fed:
+    def at(self, port: str) -> ExampleBlock:
         """The same block with the selected output ``port``."""
         return dataclasses.replace(self, port=port)
 
-    def named(self, name: str) -> Fed:
+    def named(self, name: str) -> ExampleBlock:
         """The same block with an explicit name; equal names mean the same block."""
         return dataclasses.replace(self, name=name)
 
 
-Feed = Fed | str
+Driver = ExampleBlock | str
 """The driver of an input: another block, or text: ``"y"``, an output of the example's block; ``"u"``, the
 driver of its input u; ``"plant/y"``, an output of a named block."""
 
 
-def made(type_name: str, **parameters: Any) -> Fed:
-    """A block of the example by type name and parameters: ``made("SineWave", amplitude=2.0)``."""
-    return Fed(type_name=type_name, parameters=parameters)
+def driver(type_name: str, **parameters: Any) -> ExampleBlock:
+    """A block of the example by type name and parameters: ``driver("SineWave", amplitude=2.0)``."""
+    return ExampleBlock(type_name=type_name, parameters=parameters)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,16 +55,16 @@ class WorkedExample:
 
     ``shows``: a caption of one or two sentences. ``parameters`` of the block (robots by name). ``inputs`` by
     port; an omitted port gets a suitable signal. ``shown``: the signals of the scope; by default the inputs
-    and outputs of the block. ``across`` and ``up``: the signals of an x-y plot instead. ``besides``:
+    and outputs of the block. ``x_axis`` and ``y_axis``: the signals of an x-y plot instead. ``extra_blocks``:
     additional, unconnected blocks. ``stop_time`` (s) of the run and ``sample_time`` (s) of the record.
     """
 
     shows: str = ""
     parameters: Mapping[str, Any] = field(default_factory=dict[str, Any])
-    inputs: Mapping[str, Feed] = field(default_factory=dict[str, Any])
-    shown: tuple[Feed, ...] = ()
-    across: Feed | None = None
-    up: Feed | None = None
-    besides: tuple[Fed, ...] = ()
+    inputs: Mapping[str, Driver] = field(default_factory=dict[str, Any])
+    shown: tuple[Driver, ...] = ()
+    x_axis: Driver | None = None
+    y_axis: Driver | None = None
+    extra_blocks: tuple[ExampleBlock, ...] = ()
     stop_time: float = 10.0
     sample_time: float | None = None

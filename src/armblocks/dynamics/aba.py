@@ -30,7 +30,7 @@ def aba(
     """
     bodies = tree.bodies
     X = [_motion_transform(joint) for joint in joints]
-    S = [SX(vertcat(0.0, 0.0, body.turn, 0.0, 0.0, body.slide)) for body in bodies]
+    S = [SX(vertcat(0.0, 0.0, body.angular, 0.0, 0.0, body.linear)) for body in bodies]
     IA = [_matrix_of(body.inertia) for body in bodies]
     v: list[SX] = []
     c: list[SX] = []
@@ -74,7 +74,7 @@ def aba(
 
 def _motion_transform(joint: JointMotion) -> SX:
     """Motion vectors of the parent body in the body: ``[E 0; -E [p]x E]``."""
-    c, s = joint.turn
+    c, s = joint.rotation
     R = multiply(joint.body.placement.rotation, ((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
     E = _sx(R).T
     lower = -mtimes(E, _skew(joint.p))

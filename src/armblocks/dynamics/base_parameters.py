@@ -26,7 +26,7 @@ def regrouped(tree: KinematicTree) -> KinematicTree:
     inertias = [body.inertia for body in tree.bodies]
     for i in reversed(range(tree.n)):
         body = tree.bodies[i]
-        shared = _shared_with_parent(inertias[i], turn=body.turn, slide=body.slide)
+        shared = _shared_with_parent(inertias[i], angular=body.angular, linear=body.linear)
         inertias[i] = _without(inertias[i], shared)
         if body.parent != BASE:
             inertias[body.parent] = inertias[body.parent].plus(shared.moved(body.placement))
@@ -34,14 +34,14 @@ def regrouped(tree: KinematicTree) -> KinematicTree:
     return replace(tree, bodies=bodies)
 
 
-def _shared_with_parent(inertia: RigidInertia, *, turn: float, slide: float) -> RigidInertia:
+def _shared_with_parent(inertia: RigidInertia, *, angular: float, linear: float) -> RigidInertia:
     """The part of the inertia that can be assigned to either side of the joint."""
     second = inertia.second
-    if turn:
+    if angular:
         # Equal normal to the axis and zero about it: a rotation about the axis changes neither this inertia
         # nor its momentum.
         second = Symmetric(second.yy, second.yy, 0.0, 0.0, 0.0, 0.0)
-    if slide:
+    if linear:
         # Without mass a translation causes no momentum; without first moment it does not change the inertia.
         return RigidInertia(0.0, ZERO, second)
     return RigidInertia(inertia.mass, (0.0, 0.0, inertia.first[2]), second)

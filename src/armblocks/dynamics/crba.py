@@ -32,13 +32,13 @@ def crba(tree: KinematicTree, joints: Sequence[JointMotion]) -> SquareMatrix:
             composite[body.parent] = composite[body.parent].plus(_in_parent(inertia, joints[i]))
         # 2. The wrench that gives the composite body unit acceleration of joint i.
         h, S = inertia.first, inertia.second
-        force: Vector = (-body.turn * h[1], body.turn * h[0], body.slide * inertia.mass)
+        force: Vector = (-body.angular * h[1], body.angular * h[0], body.linear * inertia.mass)
         moment: Vector = (
-            body.turn * S.xz + body.slide * h[1],
-            body.turn * S.yz - body.slide * h[0],
-            body.turn * S.zz,
+            body.angular * S.xz + body.linear * h[1],
+            body.angular * S.yz - body.linear * h[0],
+            body.angular * S.zz,
         )
-        M[i][i] = body.turn * moment[2] + body.slide * force[2] + body.reflected_inertia
+        M[i][i] = body.angular * moment[2] + body.linear * force[2] + body.reflected_inertia
         # 3. Torque at the ancestor joints (toward the base).
         j = i
         while bodies[j].parent != BASE:
@@ -46,13 +46,13 @@ def crba(tree: KinematicTree, joints: Sequence[JointMotion]) -> SquareMatrix:
             moment = add(joints[j].to_parent(moment), cross(joints[j].p, force_in_parent))
             force = force_in_parent
             j = bodies[j].parent
-            M[i][j] = M[j][i] = bodies[j].turn * moment[2] + bodies[j].slide * force[2]
+            M[i][j] = M[j][i] = bodies[j].angular * moment[2] + bodies[j].linear * force[2]
     return M
 
 
 def _in_parent(inertia: RigidInertia, joint: JointMotion) -> RigidInertia:
     """A body's inertia in its parent's frame."""
-    second = rotate_symmetric(joint.body.placement.rotation, joint.turn.rotate_symmetric(inertia.second))
+    second = rotate_symmetric(joint.body.placement.rotation, joint.rotation.rotate_symmetric(inertia.second))
     return RigidInertia(inertia.mass, joint.to_parent(inertia.first), second).shifted(joint.p)
 
 

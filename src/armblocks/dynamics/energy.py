@@ -24,7 +24,7 @@ def kinetic_energy(tree: KinematicTree, joints: Sequence[JointMotion], qd: Seque
     2``."""
     omegas: list[Vector] = []
     velocities: list[Vector] = []
-    twice: Scalar = 0.0
+    doubled_energy: Scalar = 0.0
     for body, joint in zip(tree.bodies, joints):
         w, v = ZERO, ZERO
         if body.parent != BASE:
@@ -32,15 +32,15 @@ def kinetic_energy(tree: KinematicTree, joints: Sequence[JointMotion], qd: Seque
             w = joint.to_body(w_parent)
             v = joint.to_body(add(velocities[body.parent], cross(w_parent, joint.p)))
         rate = qd[body.joint]
-        w = (w[0], w[1], w[2] + body.turn * rate)
-        v = (v[0], v[1], v[2] + body.slide * rate)
+        w = (w[0], w[1], w[2] + body.angular * rate)
+        v = (v[0], v[1], v[2] + body.linear * rate)
         omegas.append(w)
         velocities.append(v)
         m, h, S = body.inertia
         momentum = add(scale(m, v), scale(2.0, cross(w, h)))
-        twice = twice + dot(v, momentum) + dot(w, multiply_symmetric(S, w))
-        twice = twice + body.reflected_inertia * (rate * rate)
-    return 0.5 * twice
+        doubled_energy = doubled_energy + dot(v, momentum) + dot(w, multiply_symmetric(S, w))
+        doubled_energy = doubled_energy + body.reflected_inertia * (rate * rate)
+    return 0.5 * doubled_energy
 
 
 def first_moment(tree: KinematicTree, joints: Sequence[JointMotion]) -> tuple[float, Vector]:

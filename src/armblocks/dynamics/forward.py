@@ -40,8 +40,8 @@ def forward_dynamics(
         return aba(tree, joints, qd, tau, tree.gravity, on_bodies)
     bias = rnea(tree, joints, qd, [0.0] * n, tree.gravity, on_bodies)
     order = [body.joint for body in tree.bodies]
-    left_over = [tau[j] - bias[j] for j in order]
-    solution = solve_factored(tree, crba(tree, joints), left_over)
+    net_torque = [tau[j] - bias[j] for j in order]
+    solution = solve_factored(tree, crba(tree, joints), net_torque)
     qdd: list[SX] = [SX(0.0)] * n
     for j, acceleration in zip(order, solution):
         qdd[j] = acceleration

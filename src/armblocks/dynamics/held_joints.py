@@ -1,8 +1,8 @@
 """Equations of motion of an arm with locked joints: by sticking friction or by a stop.
 
-:func:`settled` finds the locked joints at one time; the set is constant between events, so that the equations
-are smooth. Sources: Siciliano et al., *Robotics*, 2009, 7.3 (equations of motion); Pfeiffer, Glocker,
-*Multibody Dynamics with Unilateral Contacts*, 1996 (stick and slip as a complementarity, impacts).
+:func:`locked_joints` finds the locked joints at one time. The set is constant between events, so that the
+equations are smooth. Sources: Siciliano et al., *Robotics*, 2009, 7.3 (equations of motion); Pfeiffer,
+Glocker, *Multibody Dynamics with Unilateral Contacts*, 1996 (stick and slip as a complementarity, impacts).
 """
 
 from __future__ import annotations
@@ -87,11 +87,11 @@ class JointEquations:
             tree = carrying(tree, payload)
         self._tree = tree
         joints = joint_motions(tree, q)
-        still = [0.0] * tree.n
-        self.bias = SX(vertcat(*rnea(tree, joints, entries(qd), still, tree.gravity, on_bodies)))
+        no_acceleration = [0.0] * tree.n
+        self.bias = SX(vertcat(*rnea(tree, joints, entries(qd), no_acceleration, tree.gravity, on_bodies)))
         self._M: SquareMatrix = crba(tree, joints)
-        place = sorted(range(tree.n), key=lambda i: tree.bodies[i].joint)
-        self.M = SX(vertcat(*(vertcat(*(SX(self._M[i][j]) for j in place)).T for i in place)))
+        body_of_joint = sorted(range(tree.n), key=lambda i: tree.bodies[i].joint)
+        self.M = SX(vertcat(*(vertcat(*(SX(self._M[i][j]) for j in body_of_joint)).T for i in body_of_joint)))
 
     def solve(self, right: SX, free: SX) -> SX:
         """``x`` with ``M x = right`` in the rows of the free joints (1), and exactly 0 for the others (0)."""
@@ -142,7 +142,7 @@ def from_rest(held_torque: SX, contact: SX, forward: SX, backward: SX) -> SX:
     return forwards - backwards
 
 
-def settled(
+def locked_joints(
     equations: JointEquations, qd: SX, driving: SX, start: Rest, friction: DryFriction, breakaway: SX
 ) -> Rest:
     """The locked joints, and the sliding directions of the others.

@@ -39,10 +39,10 @@ def tool_columns(tree: KinematicTree, q: SX) -> list[Column]:
     joints = joint_motions(tree, q)
     pose = constant_pose(tree.tool.pose.inverse())
     for i in () if carrier == BASE else (carrier, *tree.ancestors(carrier)):
-        body, (c, s) = tree.bodies[i], joints[i].turn
-        w = scale(body.turn, pose.z)
+        body, (c, s) = tree.bodies[i], joints[i].rotation
+        w = scale(body.angular, pose.z)
         # Here the tool's origin is the reference point: z x (0 - p) = p x z.
-        v = add(cross(pose.p, w), scale(body.slide, pose.z))
+        v = add(cross(pose.p, w), scale(body.linear, pose.z))
         columns[body.joint] = (v, w)
         x = subtract(scale(c, pose.x), scale(s, pose.y))
         y = add(scale(s, pose.x), scale(c, pose.y))
@@ -53,7 +53,8 @@ def tool_columns(tree: KinematicTree, q: SX) -> list[Column]:
 
 
 def _columns(tree: KinematicTree, bodies: Sequence[Pose], tip: Vector) -> list[Column]:
-    """``v = turn z x (tip - p) + slide z``, ``w = turn z`` for the joints between base and tool, else zero.
+    """``v = angular z x (tip - p) + linear z``, ``w = angular z`` for the joints between base and tool, else
+    zero.
 
     Source: Siciliano, Sciavicco, Villani, Oriolo, *Robotics*, 3.1.3.
     """
@@ -61,9 +62,9 @@ def _columns(tree: KinematicTree, bodies: Sequence[Pose], tip: Vector) -> list[C
     carrier = tree.tool.body
     for i in () if carrier == BASE else (carrier, *tree.ancestors(carrier)):
         body, pose = tree.bodies[i], bodies[i]
-        w = scale(body.turn, pose.z)
-        v = cross(w, subtract(tip, pose.p)) if body.turn else ZERO
-        columns[body.joint] = (add(v, scale(body.slide, pose.z)), w)
+        w = scale(body.angular, pose.z)
+        v = cross(w, subtract(tip, pose.p)) if body.angular else ZERO
+        columns[body.joint] = (add(v, scale(body.linear, pose.z)), w)
     return columns
 
 
@@ -102,9 +103,9 @@ def _minors(rows: Sequence[Sequence[Scalar]]) -> list[SX]:
         grown: dict[tuple[int, ...], Scalar] = {}
         for chosen in combinations(range(width), height):
             total: Scalar = 0.0
-            for place, column in enumerate(chosen):
-                term = row[column] * known[chosen[:place] + chosen[place + 1 :]]
-                total = total + term if (height - 1 - place) % 2 == 0 else total - term
+            for index, column in enumerate(chosen):
+                term = row[column] * known[chosen[:index] + chosen[index + 1 :]]
+                total = total + term if (height - 1 - index) % 2 == 0 else total - term
             grown[chosen] = total
         known = grown
     assert len(known) == math.comb(width, len(rows))

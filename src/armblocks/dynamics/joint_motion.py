@@ -9,23 +9,23 @@ from dataclasses import dataclass
 from casadi import SX, cos, sin
 
 from armblocks.robot.tree import Body, KinematicTree
-from armblocks.spatial.vectors import Scalar, Turn, Vector, add, rotate
+from armblocks.spatial.vectors import RotationZ, Scalar, Vector, add, rotate
 
 
 @dataclass(frozen=True, eq=False)
 class JointMotion:
-    """The motion of a body's joint at one q: the rotation ``turn`` about z, and ``p``.
+    """The motion of a body's joint at one q: the ``rotation`` about z, and ``p``.
 
     ``p`` is the position of the body's origin in the parent body's frame, m.
     """
 
     body: Body
-    turn: Turn
+    rotation: RotationZ
     p: Vector
 
     def to_body(self, a: Vector) -> Vector:
         """A vector of the parent body's axes in the body's axes."""
-        return self.turn.rotate_back(self.to_joint(a))
+        return self.rotation.rotate_back(self.to_joint(a))
 
     def to_joint(self, a: Vector) -> Vector:
         """A vector of the parent body's axes in the axes of the joint before its rotation."""
@@ -34,7 +34,7 @@ class JointMotion:
 
     def to_parent(self, a: Vector) -> Vector:
         """A vector of the body's axes in the parent body's axes."""
-        return rotate(self.body.placement.rotation, self.turn.rotate(a))
+        return rotate(self.body.placement.rotation, self.rotation.rotate(a))
 
 
 def joint_motions(tree: KinematicTree, q: SX) -> list[JointMotion]:
@@ -47,7 +47,7 @@ def entries(x: SX | Sequence[Scalar]) -> list[Scalar]:
     return [x[i] for i in range(x.numel())] if isinstance(x, SX) else list(x)
 
 
-def cos_sin(variable: Scalar, constant: float) -> Turn:
+def cos_sin(variable: Scalar, constant: float) -> RotationZ:
     """cos and sin of ``variable + constant``; a constant multiple of 90 degrees needs no operations."""
     quarters = round(constant / (math.pi / 2))
     if abs(constant - quarters * (math.pi / 2)) > 4 * math.ulp(max(abs(constant), math.pi / 2)):
@@ -55,22 +55,22 @@ def cos_sin(variable: Scalar, constant: float) -> Turn:
     c, s = SX(cos(variable)), SX(sin(variable))
     match quarters % 4:
         case 0:
-            return Turn(c, s)
+            return RotationZ(c, s)
         case 1:
-            return Turn(-s, c)
+            return RotationZ(-s, c)
         case 2:
-            return Turn(-c, -s)
+            return RotationZ(-c, -s)
         case _:
-            return Turn(s, -c)
+            return RotationZ(s, -c)
 
 
 def _motion(body: Body, q: SX) -> JointMotion:
-    turn = cos_sin(body.turn * q, body.turn * body.offset) if body.turn else Turn(1.0, 0.0)
+    rotation = cos_sin(body.angular * q, body.angular * body.offset) if body.angular else RotationZ(1.0, 0.0)
     p: Vector = body.placement.translation
-    if body.slide:
-        shift = body.slide * q + body.slide * body.offset
+    if body.linear:
+        shift = body.linear * q + body.linear * body.offset
         p = add(p, rotate(body.placement.rotation, (0.0, 0.0, shift)))
-    return JointMotion(body, turn, p)
+    return JointMotion(body, rotation, p)
 
 
 def _column(R: tuple[tuple[float, float, float], ...], j: int) -> tuple[float, float, float]:

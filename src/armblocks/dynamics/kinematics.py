@@ -10,7 +10,7 @@ from casadi import SX, horzcat, vertcat
 from armblocks.dynamics.joint_motion import cos_sin
 from armblocks.robot.tree import BASE, Body, Frame, KinematicTree
 from armblocks.spatial import IDENTITY3, Transform
-from armblocks.spatial.vectors import ZERO, Scalar, Turn, Vector, add, scale
+from armblocks.spatial.vectors import ZERO, RotationZ, Scalar, Vector, add, scale
 
 
 class Pose(NamedTuple):
@@ -49,7 +49,7 @@ class _TurnedPose(NamedTuple):
     start: Pose
     variable: Scalar
     constant: float
-    turn: Turn
+    rotation: RotationZ
     pose: Pose
 
 
@@ -62,33 +62,33 @@ def constant_pose(T: Transform) -> Pose:
 
 def body_poses(tree: KinematicTree, q: Sequence[Scalar], ground: Pose) -> list[Pose]:
     """Poses of all bodies with the base at ``ground``; q in the robot's order, rad or m."""
-    base = _TurnedPose(ground, 0.0, 0.0, Turn(1.0, 0.0), ground)
+    base = _TurnedPose(ground, 0.0, 0.0, RotationZ(1.0, 0.0), ground)
     turned: list[_TurnedPose] = []
     for body in tree.bodies:
         parent = base if body.parent == BASE else turned[body.parent]
-        turned.append(_moved(parent, body, q[body.joint]))
+        turned.append(_body_pose(parent, body, q[body.joint]))
     return [entry.pose for entry in turned]
 
 
-def _moved(parent: _TurnedPose, body: Body, q: Scalar) -> _TurnedPose:
+def _body_pose(parent: _TurnedPose, body: Body, q: Scalar) -> _TurnedPose:
     """The pose of a body from its parent's."""
-    p = parent.start.rotate(parent.turn.rotate(body.placement.translation))
+    p = parent.start.rotate(parent.rotation.rotate(body.placement.translation))
     p = add(parent.pose.p, p)
     if body.placement.rotation == IDENTITY3:
         start, variable, constant = parent.start, parent.variable, parent.constant
     else:
         start = parent.pose.after(Transform(rotation=body.placement.rotation))
         variable, constant = 0.0, 0.0
-    if body.slide:
-        p = add(p, scale(body.slide * q + body.slide * body.offset, start.z))
-    if body.turn:
-        variable = variable + body.turn * q
-        constant = constant + body.turn * body.offset
-    turn = cos_sin(variable, constant) if isinstance(variable, SX) else Turn(1.0, 0.0)
-    x = add(scale(turn.c, start.x), scale(turn.s, start.y))
-    y = add(scale(turn.c, start.y), scale(-turn.s, start.x))
+    if body.linear:
+        p = add(p, scale(body.linear * q + body.linear * body.offset, start.z))
+    if body.angular:
+        variable = variable + body.angular * q
+        constant = constant + body.angular * body.offset
+    rotation = cos_sin(variable, constant) if isinstance(variable, SX) else RotationZ(1.0, 0.0)
+    x = add(scale(rotation.c, start.x), scale(rotation.s, start.y))
+    y = add(scale(rotation.c, start.y), scale(-rotation.s, start.x))
     start = Pose(start.x, start.y, start.z, ZERO)
-    return _TurnedPose(start, variable, constant, turn, Pose(x, y, start.z, p))
+    return _TurnedPose(start, variable, constant, rotation, Pose(x, y, start.z, p))
 
 
 def frame_pose(frame: Frame, bodies: Sequence[Pose], ground: Pose) -> Pose:

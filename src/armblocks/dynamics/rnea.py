@@ -65,7 +65,7 @@ def rnea(
     for i in reversed(range(len(bodies))):
         body = bodies[i]
         force, moment = wrenches[i]
-        tau[body.joint] = body.turn * moment[2] + body.slide * force[2]
+        tau[body.joint] = body.angular * moment[2] + body.linear * force[2]
         if body.parent != BASE:
             wrenches[body.parent] = _with_child_wrench(wrenches[body.parent], wrenches[i], joints[i])
     return tau
@@ -80,9 +80,9 @@ def _body_motion(
     w = joint.to_body(parent.omega)
     alpha = joint.to_body(parent.alpha)
     acceleration = joint.to_body(add(parent.acceleration, rotate(parent.U, joint.p)))
-    spin, spin_rate = body.turn * qd[j], body.turn * qdd[j]
-    if body.slide:
-        slip, slip_rate = body.slide * qd[j], body.slide * qdd[j]
+    spin, spin_rate = body.angular * qd[j], body.angular * qdd[j]
+    if body.linear:
+        slip, slip_rate = body.linear * qd[j], body.linear * qdd[j]
         # 2 w x (slip z) + slip_rate z; w without the joint's rotation, which is along z
         acceleration = (
             acceleration[0] + 2.0 * slip * w[1],

@@ -123,8 +123,8 @@ def trace_gravload(robot: Robot) -> TracedFunction:
     tree = regrouped(KinematicTree.of(robot))
 
     def equations(q: SX) -> SX:
-        still = [0.0] * tree.n
-        return _sum(rnea(tree, joint_motions(tree, q), still, still, tree.gravity))
+        no_motion = [0.0] * tree.n
+        return _sum(rnea(tree, joint_motions(tree, q), no_motion, no_motion, tree.gravity))
 
     return _trace("gravload", robot, ("q",), ("tau", (robot.n,), "N m"), equations)
 
@@ -132,11 +132,11 @@ def trace_gravload(robot: Robot) -> TracedFunction:
 def trace_inertia(robot: Robot) -> TracedFunction:
     """``M (n, n)``: joint-space inertia, rotors included; kg m2, kg m or kg."""
     tree = regrouped(KinematicTree.of(robot))
-    place = _body_of_joint(tree)
+    body_of_joint = _body_of_joint(tree)
 
     def equations(q: SX) -> SX:
         M = crba(tree, joint_motions(tree, q))
-        return _matrix([[M[i][j] for j in place] for i in place])
+        return _matrix([[M[i][j] for j in body_of_joint] for i in body_of_joint])
 
     return _trace("inertia", robot, ("q",), ("M", (robot.n, robot.n), "kg m2"), equations)
 
@@ -151,8 +151,8 @@ def trace_coriolis(robot: Robot) -> TracedFunction:
 
     def equations(q: SX, qd: SX) -> SX:
         weightless = (0.0, 0.0, 0.0)
-        still = [0.0] * tree.n
-        c = _sum(rnea(tree, joint_motions(tree, q), entries(qd), still, weightless))
+        no_acceleration = [0.0] * tree.n
+        c = _sum(rnea(tree, joint_motions(tree, q), entries(qd), no_acceleration, weightless))
         return 0.5 * jacobian(c, qd)
 
     return _trace("coriolis", robot, ("q", "qd"), ("C", (robot.n, robot.n), "N m s"), equations)
@@ -180,8 +180,8 @@ def trace_accel(robot: Robot) -> TracedFunction:
 
     def equations(q: SX, qd: SX, tau: SX) -> SX:
         rates = entries(qd)
-        left_over = _difference(entries(tau), joint_friction(robot, rates))
-        return _sum(forward_dynamics(tree, q, rates, left_over))
+        net_torque = _difference(entries(tau), joint_friction(robot, rates))
+        return _sum(forward_dynamics(tree, q, rates, net_torque))
 
     return _trace("accel", robot, ("q", "qd", "tau"), ("qdd", (robot.n,), "rad/s2"), equations)
 
@@ -197,9 +197,9 @@ def trace_accel_loaded(robot: Robot) -> TracedFunction:
 
     def equations(q: SX, qd: SX, tau: SX, wrench: SX, payload: SX) -> SX:
         rates = entries(qd)
-        left_over = _difference(entries(tau), joint_friction(robot, rates))
+        net_torque = _difference(entries(tau), joint_friction(robot, rates))
         loaded = carrying(tree, payload)
-        return _sum(forward_dynamics(loaded, q, rates, left_over, at_tip(tree, wrench)))
+        return _sum(forward_dynamics(loaded, q, rates, net_torque, at_tip(tree, wrench)))
 
     inputs = ("q", "qd", "tau", "wrench", "payload")
     return _trace("accel", robot, inputs, ("qdd", (robot.n,), "rad/s2"), equations)
@@ -301,10 +301,10 @@ def _inputs(robot: Robot, names: Sequence[str]) -> Signature:
 
 def _body_of_joint(tree: KinematicTree) -> list[int]:
     """For each joint in the order of q, the index of its body."""
-    place = [0] * tree.n
+    indices = [0] * tree.n
     for i, body in enumerate(tree.bodies):
-        place[body.joint] = i
-    return place
+        indices[body.joint] = i
+    return indices
 
 
 def _sum(*terms: Sequence[Scalar]) -> SX:

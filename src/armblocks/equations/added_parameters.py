@@ -36,25 +36,25 @@ def with_added_parameters(system: HybridSystem, added: tuple[AddedParameter, ...
     p = SX.sym("p", layout.size)
     columns = vertsplit(p, [0, *np.cumsum([slot.size for slot in layout]).tolist()])
     parts = dict(zip(layout.names, columns))
-    moved = {name: parts[name] for name in old.names}
+    changed = {name: parts[name] for name in old.names}
     for entry in added:
-        paths = [path for path in entry.changes if path in moved]
+        paths = [path for path in entry.changes if path in changed]
         flat = [flatten(entry.changes[path], old[path].shape) for path in paths]
         changes = Function("f", [entry.symbol], flat).call([parts[entry.slot.name]], True, False)
         for path, change in zip(paths, changes):
-            moved[path] = moved[path] + change
-    whole = vertcat(*moved.values(), SX(0, 1))
+            changed[path] = changed[path] + change
+    whole = vertcat(*changed.values(), SX(0, 1))
 
     def widened(traced: TracedFunction) -> TracedFunction:
         if "p" not in traced.inputs.names:
             return traced
-        place = traced.inputs.names.index("p")
-        given = [whole if k == place else symbol for k, symbol in enumerate(traced.arguments)]
+        index = traced.inputs.names.index("p")
+        values = [whole if k == index else symbol for k, symbol in enumerate(traced.arguments)]
         *results, rounded = Function("f", list(traced.arguments), [*traced.results, traced.rounded]).call(
-            given, True, False
+            values, True, False
         )
-        slots = [Slot("p", (layout.size,)) if k == place else slot for k, slot in enumerate(traced.inputs)]
-        arguments = tuple(p if k == place else symbol for k, symbol in enumerate(traced.arguments))
+        slots = [Slot("p", (layout.size,)) if k == index else slot for k, slot in enumerate(traced.inputs)]
+        arguments = tuple(p if k == index else symbol for k, symbol in enumerate(traced.arguments))
         return dataclasses.replace(
             traced,
             inputs=Signature(tuple(slots)),

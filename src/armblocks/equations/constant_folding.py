@@ -103,9 +103,9 @@ def call_with_constants(function: Function, arguments: Sequence[SX]) -> list[SX]
             work[target[0]] = whole[sources[0]][sources[1]]
         elif number == casadi.OP_CALL:
             called = function.instructions_sx()[k].which_function()
-            for place, value in zip(target, _called(called, [work[source] for source in sources])):
-                if place >= 0:
-                    work[place] = value
+            for slot, value in zip(target, _called(called, [work[source] for source in sources])):
+                if slot >= 0:
+                    work[slot] = value
         else:
             work[target[0]] = _operation(number, [work[source] for source in sources])
     return results

@@ -27,18 +27,18 @@ def continuous_system(
     aliases: Mapping[str, str],
 ) -> HybridSystem:
     """A continuous system; ``derivative`` and ``signals`` take ``t, x, p``."""
-    nothing = Signature()
+    no_slots = Signature()
     t, x, p = derivative.arguments
     z, w, m, e = (SX.sym(letter, 0) for letter in "zwme")
     flat = {"t": t, "x": x, "z": z, "w": w, "p": p, "m": m, "e": e}
 
     def function(
-        name: str, letters: str, outputs: Signature, results: tuple[SX, ...], given: TracedFunction | None
+        name: str, letters: str, outputs: Signature, results: tuple[SX, ...], traced: TracedFunction | None
     ) -> TracedFunction:
-        symbols = flat if given is None else {**flat, **dict(zip("txp", given.arguments))}
+        symbols = flat if traced is None else {**flat, **dict(zip("txp", traced.arguments))}
         ends = signature(*((letter, () if letter == "t" else (flat[letter].numel(),)) for letter in letters))
         return TracedFunction(
-            name if given is None else given.name,
+            name if traced is None else traced.name,
             ends,
             outputs,
             tuple(symbols[letter] for letter in letters),
@@ -51,8 +51,8 @@ def continuous_system(
     return HybridSystem(
         name=name,
         states=states,
-        discrete=nothing,
-        algebraic=nothing,
+        discrete=no_slots,
+        algebraic=no_slots,
         parameters=parameters,
         signals_layout=signals_layout,
         clocks=(),

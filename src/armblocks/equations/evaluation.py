@@ -49,11 +49,11 @@ class Jacobians:
     p: Array
 
 
-def refuse_called(system: HybridSystem, what: str) -> None:
+def refuse_called(system: HybridSystem, result: str) -> None:
     """Raise ``InputError`` if a block of the system is computed in Python, because it has no equations."""
     if system.called:
         raise InputError(
-            f"block '{system.called[0]}' calls Python, which has no {what}",
+            f"block '{system.called[0]}' calls Python, which has no {result}",
             where=system.name,
             allowed="blocks with equations",
             fix="use a traceable Python Function, or remove the block",
@@ -185,10 +185,10 @@ class EvaluatedSystem:
     def sampled(self) -> NDArray[np.bool_]:
         """The entries of ``z`` that a clock updates (nz,); the others are modes, which events change."""
         update = self.system.update
-        moved = np.zeros(self.system.discrete.size, dtype=np.bool_)
+        updated = np.zeros(self.system.discrete.size, dtype=np.bool_)
         if self.system.clocks:
-            moved[jacobian_sparsity(update.results[0], update.arguments[5]).row()] = True
-        return moved
+            updated[jacobian_sparsity(update.results[0], update.arguments[5]).row()] = True
+        return updated
 
 
 def _numbers(function: Function, arguments: Sequence[Array]) -> Array:

@@ -26,8 +26,8 @@ def linear_solution(A: SX, b: SX) -> SX:
 
 def solution_size(name: str) -> int | None:
     """The number of unknowns of a linear solution, from its name; ``None`` for other functions."""
-    found = _NAME.fullmatch(name)
-    return int(found[1]) if found else None
+    match = _NAME.fullmatch(name)
+    return int(match[1]) if match else None
 
 
 @cache
@@ -37,13 +37,13 @@ def derivative_rule(name: str) -> Function | None:
     The names are CasADi's: ``fwd2_linear_solution_3`` has two directions. Its arguments are those of the
     function, then its results (which are not used), then the directions side by side.
     """
-    found = _DERIVATIVE.fullmatch(name)
-    if found is None:
+    match = _DERIVATIVE.fullmatch(name)
+    if match is None:
         return None
-    mode, count, of = found[1], int(found[2]), found[3]
-    size = solution_size(of)
+    mode, count, base = match[1], int(match[2]), match[3]
+    size = solution_size(base)
     if size is None:
-        rule = derivative_rule(of)
+        rule = derivative_rule(base)
         if rule is None:
             return None
         return rule.forward(count) if mode == "fwd" else rule.reverse(count)

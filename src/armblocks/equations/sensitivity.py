@@ -36,9 +36,9 @@ def parameters_read_by_index(system: HybridSystem) -> frozenset[str]:
     (``table_reading``)."""
     functions = (system.derivative, system.signals, system.residual, system.update, system.guards)
     tables = {
-        (place, place + count)
+        (index, index + count)
         for traced in (*functions, system.reset)
-        for slot, place, count in tables_read(traced.casadi_function())
+        for slot, index, count in tables_read(traced.casadi_function())
         if traced.inputs.names[slot] == "p"
     }
     ranges = system.parameters.ranges
@@ -80,9 +80,9 @@ def _refuse(system: HybridSystem, *, sources: bool) -> None:
     """Raise ``InputError`` for implicit equations whose solutions jump other than at zeros of guards."""
     if system.algebraic.size and (sources or system.delays is not None):
         jumping = "the parameter that determines when a signal jumps"
-        what = jumping if system.delays is None else "the delayed signals"
+        cause = jumping if system.delays is None else "the delayed signals"
         raise InputError(
-            f"{what} and the implicit equation of '{system.algebraic.names[0]}' are in one diagram",
+            f"{cause} and the implicit equation of '{system.algebraic.names[0]}' are in one diagram",
             where=system.name,
             allowed="sensitivities of diagrams with one or the other",
             fix="break the loop with a state, or take the difference of two runs",
@@ -114,16 +114,16 @@ def _refuse_whole_numbers(system: HybridSystem, parameters: Sequence[str]) -> No
 def _functions(system: HybridSystem) -> list[TracedFunction]:
     """All functions of a system."""
     delays = () if system.delays is None else (system.delays.inputs, system.delays.times)
-    found = [getattr(system, entry.name) for entry in dataclasses.fields(system)]
-    return [*(value for value in found if isinstance(value, TracedFunction)), *delays]
+    values = [getattr(system, entry.name) for entry in dataclasses.fields(system)]
+    return [*(value for value in values if isinstance(value, TracedFunction)), *delays]
 
 
 def _direction(system: HybridSystem, name: str) -> SX:
     """A change of all entries of a parameter, in p."""
     direction = SX.zeros(system.parameters.size)
-    places = system.parameters.ranges[name]
-    for number, place in enumerate(range(places.start, places.stop)):
-        direction[place] = 1.0 + 0.37 * number
+    entries = system.parameters.ranges[name]
+    for number, index in enumerate(range(entries.start, entries.stop)):
+        direction[index] = 1.0 + 0.37 * number
     return direction
 
 
@@ -145,9 +145,9 @@ class _Augmented:
         if self.instants is None:
             return []
         elements = [element for slot in self.old.discrete for element in slot.elements]
-        delays = [elements[place].rpartition("/")[0] for place in self.delays.values]
-        moved = [self.instants.source(place) for place in self.instants.moved]
-        names = [self.old.name, self.old.name, *moved, *delays, *delays]
+        delays = [elements[index].rpartition("/")[0] for index in self.delays.values]
+        breakpoints = [self.instants.source(index) for index in self.instants.moving_breakpoints]
+        names = [self.old.name, self.old.name, *breakpoints, *delays, *delays]
         assert len(names) == count
         return names
 
@@ -180,11 +180,11 @@ class _Augmented:
         c, r = self.columns, self.columns.value(self.old.residual)
         parts = [r, *(self.rate(r, k) for k in range(len(c.names)))]
         if self.instants is not None and r.numel():
-            still = SX.zeros(r.numel())
+            zeros = SX.zeros(r.numel())
             by_time = self.instants.over_time(r)
             parts.append(by_time)
             # If S is the derivative along an instant, W is the derivative along this instant as well.
-            fixed = c.along(r, t=1.0, x=SX.zeros(c.x.numel()), z=self.delays.rate_along, w=still, p=0.0 * c.p)
+            fixed = c.along(r, t=1.0, x=SX.zeros(c.x.numel()), z=self.delays.rate_along, w=zeros, p=0.0 * c.p)
             for k, instant in enumerate(self.instants.instant_p):
                 parts[k + 1] = parts[k + 1] + self.instants.open * instant * fixed
         return c.function("residual", {}, r=vertcat(*parts))
@@ -241,7 +241,7 @@ class _Augmented:
             delays=self.delays.delays(),
             captures=old.captures or instants is not None,
             recaptured=tuple(
-                k * old.discrete.size + place for k in range(len(c.names) + 1) for place in old.recaptured
+                k * old.discrete.size + index for k in range(len(c.names) + 1) for index in old.recaptured
             ),
             loops=None if old.loops is None else self.loops(old.loops),
         )

@@ -78,19 +78,19 @@ class DelayedSensitivities:
 
     def _derivatives_are_read(self) -> bool:
         c, system = self.columns, self.columns.system
-        read = vertcat(*(c.z[place] for place in self.derivatives), SX(0, 1))
+        read = vertcat(*(c.z[index] for index in self.derivatives), SX(0, 1))
         functions = (system.derivative, system.signals, system.guards, self._delays.inputs)
         values = [c.value(function) for function in functions]
         values.append(c.value(system.reset, SX.sym("e", len(system.guard_directions))))
         values.append(c.value(system.update, SX.sym("m", len(system.clocks))))
         unchanged = {*self.derivatives}
         changed = [value[k] for value in values[:-2] for k in range(value.numel())]
-        places = range(c.z.numel())
+        indices = range(c.z.numel())
         n = c.x.numel()
         changed += [values[-2][k] for k in range(n)] + [
-            values[-2][n + k] for k in places if k not in unchanged
+            values[-2][n + k] for k in indices if k not in unchanged
         ]
-        changed += [values[-1][k] for k in places if k not in unchanged]
+        changed += [values[-1][k] for k in indices if k not in unchanged]
         return bool(read.numel() and depends_on(vertcat(*changed), read))
 
     def _before_start(self) -> SX:
@@ -105,9 +105,9 @@ class DelayedSensitivities:
         if not self.n:
             return
         c = self.columns
-        still = SX.zeros(c.z.numel())
+        zeros = SX.zeros(c.z.numel())
         self.delay_rate = c.along(
-            self.tau, t=1.0, x=flow, z=still, w=SX.zeros(c.w.numel()), p=SX.zeros(c.p.numel())
+            self.tau, t=1.0, x=flow, z=zeros, w=SX.zeros(c.w.numel()), p=SX.zeros(c.p.numel())
         )
         for i, (value, derivative) in enumerate(zip(self.values, self.derivatives)):
             self.rate_along[value] = c.z[derivative] * (1.0 - self.delay_rate[i])
@@ -189,26 +189,26 @@ class DelayedSensitivities:
         values, derivatives = list(self.values), list(self.derivatives)
         u, du = [self.u], [self.du]
         for k in range(count):
-            values += [nz * (k + 1) + place for place in self.values]
-            derivatives += [nz * (k + 1) + place for place in self.derivatives]
+            values += [nz * (k + 1) + index for index in self.values]
+            derivatives += [nz * (k + 1) + index for index in self.derivatives]
             u.append(self._sensitivity(self.u, k))
             du.append(self._sensitivity(self.du, k))
-        step_derivatives = self._places("derivative of steps", 2 + count)
+        step_derivatives = self._indices("derivative of steps", 2 + count)
         steps = {"jumps (delayed)": self.jumps, "before jump (delayed)": self.before_jump}
         steps |= {f"jump by {name} (delayed)": known for name, known in zip(c.names, self.jump_p)}
         for (name, signal), derivative in zip(steps.items(), step_derivatives):
-            values += self._places(name)[0]
+            values += self._indices(name)[0]
             derivatives += derivative
             u.append(signal)
             du.append(SX.zeros(n))
         if self.reads_derivatives:
             values += [
-                *self._places("derivative before jump (delayed)")[0],
-                *self._places("derivative (delayed)")[0],
+                *self._indices("derivative before jump (delayed)")[0],
+                *self._indices("derivative (delayed)")[0],
             ]
             derivatives += [
-                *self._places("derivative of steps of the derivative")[0],
-                *self._places("curvature")[0],
+                *self._indices("derivative of steps of the derivative")[0],
+                *self._indices("curvature")[0],
             ]
             u += [self.derivative_before_jump, self.du]
             du += [SX.zeros(n), self.ddu]
@@ -227,9 +227,9 @@ class DelayedSensitivities:
             ),
         )
 
-    def _places(self, name: str, count: int = 1) -> list[list[int]]:
+    def _indices(self, name: str, count: int = 1) -> list[list[int]]:
         """The places of an added variable in the augmented z, in ``count`` parts."""
-        start = self.columns.place(name)
+        start = self.columns.index(name)
         return [list(range(start + k * self.n, start + (k + 1) * self.n)) for k in range(count)]
 
     def _sensitivity(self, expression: SX, k: int) -> SX:

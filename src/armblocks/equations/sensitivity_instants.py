@@ -74,11 +74,11 @@ class Instants:
         delays.set_flow(self.flow)
         captured = c.value(system.update, SX.zeros(len(system.clocks)))
         self.captured = captured
-        self.kept = [i for i in range(c.z.numel()) if not is_equal(captured[i], c.z[i], 1)]
-        self.kept_rate = c.add("rate of left limits", len(self.kept))
+        self.left_limits = [i for i in range(c.z.numel()) if not is_equal(captured[i], c.z[i], 1)]
+        self.left_limit_rates = c.add("rate of left limits", len(self.left_limits))
         self.g = c.value(system.guards)
         self.g_rate = self.over_time(self.g)
-        self.times, self.moved = self._breakpoints()
+        self.times, self.moving_breakpoints = self._breakpoints()
 
     def _breakpoints(self) -> tuple[SX, list[int]]:
         """The breakpoints, and the indices of those that depend on the parameters."""
@@ -87,14 +87,14 @@ class Instants:
         times = vertcat(*c.system.breakpoints.results, SX(0, 1))
         (times,) = Function("f", [p], [times]).call([c.p], True, False)
         of_times = [jtimes(times, c.p, seed) for seed in c.seeds] if times.numel() else []
-        moved = [k for k in range(times.numel()) if any(not rates[k].is_zero() for rates in of_times)]
-        return times, moved
+        moving = [k for k in range(times.numel()) if any(not rates[k].is_zero() for rates in of_times)]
+        return times, moving
 
-    def source(self, place: int) -> str:
-        """The block with a parameter on which the breakpoint with index ``place`` depends."""
+    def source(self, index: int) -> str:
+        """The block with a parameter on which the breakpoint with this index depends."""
         c = self.columns
         names = zip(c.names, c.seeds)
-        movers = [name for name, seed in names if not jtimes(self.times, c.p, seed)[place].is_zero()]
+        movers = [name for name, seed in names if not jtimes(self.times, c.p, seed)[index].is_zero()]
         return movers[0].rpartition(".")[0]
 
     def over_time(self, expression: SX) -> SX:
@@ -117,13 +117,13 @@ class Instants:
         return vertcat(
             self.g,
             self.arms,
-            *(c.t - self.times[k] + 1e-300 for k in self.moved),
+            *(c.t - self.times[k] + 1e-300 for k in self.moving_breakpoints),
             *self.delays.guards(at_instant),
         )
 
     def directions(self) -> tuple[int, ...]:
         """The directions of the added guards."""
-        return 0, 0, *[1] * (len(self.moved) + 2 * self.delays.n)
+        return 0, 0, *[1] * (len(self.moving_breakpoints) + 2 * self.delays.n)
 
     # Just before an instant.
 
@@ -135,17 +135,22 @@ class Instants:
         Z = [self._captured_by(updated, k) for k in range(len(c.names))]
         near = fabs(self.g) <= LOCATED * fabs(self.g_rate) * fmax(1.0, c.t)
         located = logic_and(near, logic_and(self.g_rate != 0.0, c.t > 0.0))
-        fresh = {
+        left_values = {
             "instant": c.t,
             "known": SX(0.0),
             "open": SX(0.0),
             "ticked": SX(0.0),
             "located": located,
-            "rate of left limits": vertcat(*(self.over_time(self.captured)[k] for k in self.kept), SX(0, 1)),
+            "rate of left limits": vertcat(
+                *(self.over_time(self.captured)[k] for k in self.left_limits), SX(0, 1)
+            ),
             **{f"instant by {name}": SX(0.0) for name in c.names},
             **self.delays.begin(),
         }
-        added = {**c.added, **{name: if_else(begins, new, c.added[name]) for name, new in fresh.items()}}
+        added = {
+            **c.added,
+            **{name: if_else(begins, new, c.added[name]) for name, new in left_values.items()},
+        }
         added["ticked"] = if_else(begins, 0.0, 1.0)
         return vertcat(updated, *Z, *added.values())
 
@@ -161,20 +166,20 @@ class Instants:
     def reset(self, e: SX) -> tuple[SX, SX]:
         """All states and discrete variables after the events ``e``, including those of the added guards."""
         c, d, names = self.columns, self.delays, self.columns.names
-        ends = [self.guards, 2, len(self.moved), d.n, d.n]
+        ends = [self.guards, 2, len(self.moving_breakpoints), d.n, d.n]
         own, arms, sources, arrived, jumped = vertsplit(e, [0, *accumulate(ends)])
         fired, quiet = _any(own), logic_not(_any(e))
         others = logic_or(_any(vertcat(own, sources, arrived, jumped)), quiet)
         first = logic_not(self.known)
         instants, mixed = self._instants(own, quiet, sources, arrived)
-        leaving = logic_and(self.open, logic_not(others))
-        entering = logic_and(logic_not(self.open), _any(vertcat(*instants)))
+        leaves = logic_and(self.open, logic_not(others))
+        enters = logic_and(logic_not(self.open), _any(vertcat(*instants)))
 
         # The derivatives before or after the instant.
         left_side = logic_and(first, _any(sources))
         t = if_else(left_side, c.t * BEFORE, c.t)
         flow = c.value_at(c.system.derivative, t, c.x, d.before_arrival(arrived), c.w)
-        along = [flow * (if_else(leaving, -1.0, entering) * instant) for instant in instants]
+        along = [flow * (if_else(leaves, -1.0, enters) * instant) for instant in instants]
         S = [known + step for known, step in zip(c.S, along)]
         Z = [self._with_left_limits(c.Z[k], first, instants[k]) for k in range(len(names))]
 
@@ -186,19 +191,19 @@ class Instants:
                 t=instant,
                 x=S[k],
                 z=self._with_left_limits(d.Z[k], first, instant) + d.rate_along * instant,
-                w=c.W[k] + c.V * (entering * instant),
+                w=c.W[k] + c.V * (enters * instant),
                 p=c.seeds[k],
             )
             for k, instant in enumerate(instants)
         ]
         parts = [vertsplit(column, [0, n, n + c.z.numel()]) for column in (after, *changed)]
-        x = [if_else(jumps, part[0], now) for part, now in zip(parts, (c.x, *S))]
-        z = [if_else(jumps, part[1], now) for part, now in zip(parts, (c.z, *Z))]
+        x = [if_else(jumps, part[0], present) for part, present in zip(parts, (c.x, *S))]
+        z = [if_else(jumps, part[1], present) for part, present in zip(parts, (c.z, *Z))]
 
-        opened = logic_and(logic_or(self.open, entering), logic_not(leaving))
-        again = logic_and(opened, others)
-        second = logic_and(again, arms[0] != 0.0)
-        flips = vertcat(logic_and(again, logic_not(second)), second)
+        opened = logic_and(logic_or(self.open, enters), logic_not(leaves))
+        repeats = logic_and(opened, others)
+        second = logic_and(repeats, arms[0] != 0.0)
+        flips = vertcat(logic_and(repeats, logic_not(second)), second)
         caused = logic_or(logic_not(first), _any(vertcat(sources, arrived)))
         changes = {
             "known": SX(1.0),
@@ -209,14 +214,14 @@ class Instants:
             # A signal that jumped before the first reset jumped at a tick, whose time is fixed.
             **d.after(arrived, jumped, [if_else(caused, instant, 0.0) for instant in instants]),
         }
-        added = [changes.get(name, now) for name, now in c.added.items()]
+        added = [changes.get(name, present) for name, present in c.added.items()]
         return vertcat(*x), vertcat(*z, *added)
 
     def _with_left_limits(self, Z: SX, first: SX, instant: SX) -> SX:
         """Z with the sensitivities of left limits taken along the instant at the first reset."""
         corrected = SX(Z)
-        for number, place in enumerate(self.kept):
-            corrected[place] = corrected[place] + first * instant * self.kept_rate[number]
+        for number, index in enumerate(self.left_limits):
+            corrected[index] = corrected[index] + first * instant * self.left_limit_rates[number]
         return corrected
 
     def _instants(self, own: SX, quiet: SX, sources: SX, arrived: SX) -> tuple[list[SX], SX]:
@@ -225,9 +230,12 @@ class Instants:
         located = logic_and(logic_or(own != 0.0, quiet), self.located)
         marks = vertcat(located, SX.zeros(2), sources != 0.0, arrived != 0.0)
         # A guard that fired without a located zero was moved by a jump, perhaps by one at a fixed time.
-        at_fixed = [self.ticked, *(self._is_now(k) for k in range(self.times.numel()) if k not in self.moved)]
-        moved = logic_and(own != 0.0, logic_not(self.located))
-        follows = vertcat(moved, SX.zeros(2), sources != 0.0, SX.zeros(arrived.numel()))
+        at_fixed = [
+            self.ticked,
+            *(self._is_now(k) for k in range(self.times.numel()) if k not in self.moving_breakpoints),
+        ]
+        jumped = logic_and(own != 0.0, logic_not(self.located))
+        follows = vertcat(jumped, SX.zeros(2), sources != 0.0, SX.zeros(arrived.numel()))
         follows = logic_and(follows, _any(vertcat(*at_fixed)))
         instants: list[SX] = []
         apart = SX.zeros(marks.numel())
@@ -235,9 +243,9 @@ class Instants:
             steady = if_else(self.g_rate == 0.0, 1.0, self.g_rate)
             by_guards = -self.by_parameter(self.g, k) / steady
             by_arrivals = self.delays.arrival(k) if self.delays.n else SX(0, 1)
-            found = vertcat(by_guards, SX.zeros(2), self._times_by_parameter(k), by_arrivals)
-            mean = dot(if_else(marks, found, 0.0), marks) / fmax(dot(marks, marks), 1.0)
-            differs = fabs(found - mean) > SAME_DERIVATIVE * (1.0 + fabs(mean))
+            derivatives = vertcat(by_guards, SX.zeros(2), self._times_by_parameter(k), by_arrivals)
+            mean = dot(if_else(marks, derivatives, 0.0), marks) / fmax(dot(marks, marks), 1.0)
+            differs = fabs(derivatives - mean) > SAME_DERIVATIVE * (1.0 + fabs(mean))
             differs = logic_or(logic_and(marks, differs), logic_and(follows, mean != 0.0))
             apart = logic_or(apart, differs)
             instants.append(if_else(self.known, known, mean))
@@ -252,8 +260,8 @@ class Instants:
 
     def _times_by_parameter(self, k: int) -> SX:
         c = self.columns
-        moved = vertcat(*(self.times[place] for place in self.moved), SX(0, 1))
-        return densify(jtimes(moved, c.p, c.seeds[k])) if self.moved else moved
+        moving = vertcat(*(self.times[index] for index in self.moving_breakpoints), SX(0, 1))
+        return densify(jtimes(moving, c.p, c.seeds[k])) if self.moving_breakpoints else moving
 
 
 def _any(marks: SX) -> SX:

@@ -33,10 +33,10 @@ class Columns:
         self.seeds: list[SX] = []
         for name in parameters:
             slot = system.parameters[name]
-            places = range(*system.parameters.ranges[name].indices(system.parameters.size))
-            for element, place in zip(slot.elements, places):
+            indices = range(*system.parameters.ranges[name].indices(system.parameters.size))
+            for element, index in zip(slot.elements, indices):
                 seed = SX.zeros(self.p.numel())
-                seed[place] = 1.0
+                seed[index] = 1.0
                 self.names.append(name if slot.size == 1 else element)
                 self.seeds.append(seed)
         self.S = [SX.sym("S", self.x.numel()) for _ in self.names]
@@ -53,23 +53,23 @@ class Columns:
         self.starts[name] = densify(SX.ones(size) * SX(start))
         return symbol
 
-    def place(self, name: str) -> int:
+    def index(self, name: str) -> int:
         """The first index of an added discrete variable in the augmented ``z``."""
-        place = self.z.numel() * (1 + len(self.names))
+        index = self.z.numel() * (1 + len(self.names))
         for other, symbol in self.added.items():
             if other == name:
-                return place
-            place += symbol.numel()
+                return index
+            index += symbol.numel()
         raise KeyError(name)
 
-    def value(self, traced: TracedFunction, *more: SX) -> SX:
+    def value(self, traced: TracedFunction, *arguments: SX) -> SX:
         """The results of a system function of ``t, x, z, w, p`` as expressions in these symbols."""
-        return self.value_at(traced, self.t, self.x, self.z, self.w, *more)
+        return self.value_at(traced, self.t, self.x, self.z, self.w, *arguments)
 
-    def value_at(self, traced: TracedFunction, t: SX, x: SX, z: SX, w: SX, *more: SX) -> SX:
+    def value_at(self, traced: TracedFunction, t: SX, x: SX, z: SX, w: SX, *arguments: SX) -> SX:
         """The results of a system function at another point."""
         function = Function("f", list(traced.arguments), [vertcat(*traced.results, SX(0, 1))])
-        (result,) = function.call([t, x, z, w, self.p, *more], True, False)
+        (result,) = function.call([t, x, z, w, self.p, *arguments], True, False)
         return densify(result)
 
     def along(self, expression: SX, *, t: SX | float, x: SX, z: SX, w: SX, p: SX) -> SX:
@@ -81,12 +81,14 @@ class Columns:
 
     def widened(self, layout: Signature, letter: str) -> Signature:
         """The slots of ``x``, ``z`` or ``w`` with those of their sensitivities."""
-        more = [Slot(sensitivity_name(slot.name, name), slot.shape) for name in self.names for slot in layout]
+        added = [
+            Slot(sensitivity_name(slot.name, name), slot.shape) for name in self.names for slot in layout
+        ]
         if letter == "z":
-            more += [Slot(OWN + name, (symbol.numel(),)) for name, symbol in self.added.items()]
+            added += [Slot(OWN + name, (symbol.numel(),)) for name, symbol in self.added.items()]
         if letter == "w" and self.V.numel():
-            more += [Slot(f"{slot.name}'", slot.shape) for slot in layout]
-        return Signature((*layout.slots, *more))
+            added += [Slot(f"{slot.name}'", slot.shape) for slot in layout]
+        return Signature((*layout.slots, *added))
 
     def _parts(self, letter: str) -> list[SX]:
         parts = {
@@ -96,27 +98,27 @@ class Columns:
         }
         return parts[letter]
 
-    def function(self, name: str, more: Mapping[str, SX], **results: SX) -> TracedFunction:
+    def function(self, name: str, inputs: Mapping[str, SX], **results: SX) -> TracedFunction:
         """A function of the augmented system, with flat symbols for all inputs."""
         inside: dict[str, list[SX]] = {"t": [self.t]}
         inside |= {letter: self._parts(letter) for letter in "xzw"}
-        inside |= {"p": [self.p]} | {letter: [column] for letter, column in more.items()}
+        inside |= {"p": [self.p]} | {letter: [column] for letter, column in inputs.items()}
         plain: list[SX] = []
-        given: list[SX] = []
-        fresh: dict[str, SX] = {}
+        parts_given: list[SX] = []
+        symbols: dict[str, SX] = {}
         for letter, parts in inside.items():
-            fresh[letter] = SX.sym(letter, sum(part.numel() for part in parts))
+            symbols[letter] = SX.sym(letter, sum(part.numel() for part in parts))
             start = 0
             for part in parts:
                 plain.append(part)
-                given.append(fresh[letter][start : start + part.numel()])
+                parts_given.append(symbols[letter][start : start + part.numel()])
                 start += part.numel()
-        values = Function("f", plain, list(results.values())).call(given, True, False)
+        values = Function("f", plain, list(results.values())).call(parts_given, True, False)
 
         def ends(columns: Mapping[str, SX]) -> Signature:
             shapes = {key: () if key == "t" else (column.numel(),) for key, column in columns.items()}
             return Signature(tuple(Slot(key, shape) for key, shape in shapes.items()))
 
         return TracedFunction(
-            name, ends(fresh), ends(results), tuple(fresh.values()), tuple(densify(v) for v in values)
+            name, ends(symbols), ends(results), tuple(symbols.values()), tuple(densify(v) for v in values)
         )

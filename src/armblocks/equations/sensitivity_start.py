@@ -65,12 +65,12 @@ class _Start:
                 break
         self.after = (x, z)
 
-    def _at(self, traced: TracedFunction, x: Array, z: Array, *more: Array) -> tuple[Array, ...]:
-        return tuple(value.ravel() for value in traced(0.0, x, z, np.empty(0), self.p, *more))
+    def _at(self, traced: TracedFunction, x: Array, z: Array, *arguments: Array) -> tuple[Array, ...]:
+        return tuple(value.ravel() for value in traced(0.0, x, z, np.empty(0), self.p, *arguments))
 
     def moving_guards(self, entries: slice) -> list[int]:
         """The guards that are zero, depend on one of these parameters, and whose two sides differ."""
-        found: set[int] = set()
+        guards: set[int] = set()
         for point in (self.before, self.after):
             g, rate, moves = self._guards(*point, entries)
             zero = np.isfinite(rate) & (np.abs(g) <= AT_ZERO * np.abs(rate)) & (rate != 0.0)
@@ -79,8 +79,8 @@ class _Start:
                 # A guard of one direction fires in that direction only.
                 fires = direction * rate[guard] > 0.0
                 if fires or (direction == 0 and self._sides_differ(guard, rate[guard])):
-                    found.add(guard)
-        return sorted(found)
+                    guards.add(guard)
+        return sorted(guards)
 
     def held_states(self, entries: slice) -> list[str]:
         """The blocks with states whose derivative by these parameters is changed by the reset at the
@@ -91,26 +91,26 @@ class _Start:
         changes: list[SX] = []
         for of_states, of_discrete, seed in self._initial_rates(p, entries):
             changes.append(jtimes(after, vertcat(x, z, p), vertcat(of_states, of_discrete, seed)) - of_states)
-        moved = self._numbers([t, x, z, w, p, e], changes, self.after, np.zeros(e.numel()))
-        found = np.abs(np.array(moved)).max(axis=0)
+        values = self._numbers([t, x, z, w, p, e], changes, self.after, np.zeros(e.numel()))
+        largest = np.abs(np.array(values)).max(axis=0)
         names = [element for slot in system.states for element in slot.elements]
-        return [names[place].rpartition("/")[0] for place in np.flatnonzero(found > AT_ZERO)]
+        return [names[index].rpartition("/")[0] for index in np.flatnonzero(largest > AT_ZERO)]
 
     def _initial_rates(self, p: SX, entries: slice) -> list[tuple[SX, SX, SX]]:
         """For each parameter entry the derivatives of the initial states and discrete variables, and its unit
         vector."""
-        found: list[tuple[SX, SX, SX]] = []
-        for place in range(entries.start, entries.stop):
+        rates_by_entry: list[tuple[SX, SX, SX]] = []
+        for index in range(entries.start, entries.stop):
             seed = SX.zeros(p.numel())
-            seed[place] = 1.0
+            seed[index] = 1.0
             rates: list[SX] = []
             for traced in (self.system.initial_states, self.system.initial_discrete):
                 (own,) = traced.arguments
                 initial = Function("i", [own], [vertcat(*traced.results, SX(0, 1))])
                 (value,) = initial.call([p], True, False)
                 rates.append(densify(jtimes(value, p, seed)) if value.numel() else value)
-            found.append((rates[0], rates[1], seed))
-        return found
+            rates_by_entry.append((rates[0], rates[1], seed))
+        return rates_by_entry
 
     def _guards(self, x: Array, z: Array, entries: slice) -> tuple[Array, Array, Array]:
         """The guards, their time derivatives, and their largest derivative by the parameters, each (ng,)."""
@@ -124,15 +124,16 @@ class _Start:
             for rates in self._initial_rates(p, entries)
         ]
         rate = jtimes(g, vertcat(t, states), vertcat(SX(1.0), f))
-        found = self._numbers([t, states, discrete, w, p], [g, rate, *moves], (x, z))
-        return found[0], found[1], np.abs(np.array(found[2:])).max(axis=0)
+        values = self._numbers([t, states, discrete, w, p], [g, rate, *moves], (x, z))
+        return values[0], values[1], np.abs(np.array(values[2:])).max(axis=0)
 
     def _numbers(
-        self, symbols: list[SX], results: list[SX], point: tuple[Array, Array], *more: Array
+        self, symbols: list[SX], results: list[SX], point: tuple[Array, Array], *further_arguments: Array
     ) -> list[Array]:
-        """The values of expressions in ``symbols`` at the start; ``more`` follows after ``t, x, z, w, p``."""
-        given = [np.zeros(1), *point, np.empty(0), self.p, *more]
-        values = Function("f", symbols, [densify(result) for result in results]).call(given)
+        """The values of expressions in ``symbols`` at the start; ``further_arguments`` follow ``t, x, z, w,
+        p``."""
+        arguments = [np.zeros(1), *point, np.empty(0), self.p, *further_arguments]
+        values = Function("f", symbols, [densify(result) for result in results]).call(arguments)
         return [np.array(value, dtype=np.float64).ravel() for value in values]
 
     def _sides_differ(self, guard: int, rate: float) -> bool:
@@ -140,9 +141,9 @@ class _Start:
         event = np.zeros(len(self.system.guard_directions))
         event[guard] = -np.sign(rate)
         other = self._at(self.system.reset, *self.after, event)
-        here, there = (
+        before, after = (
             np.concatenate([*self._at(self.system.derivative, *side), *self._at(self.system.signals, *side)])
             for side in (self.after, other)
         )
         with np.errstate(invalid="ignore"):
-            return bool((np.abs(here - there) > ALIKE * (1.0 + np.abs(here))).any())
+            return bool((np.abs(before - after) > ALIKE * (1.0 + np.abs(before))).any())

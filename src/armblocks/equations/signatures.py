@@ -53,8 +53,8 @@ class Slot:
         scalar."""
         if self.entries:
             return self.entries
-        places = itertools.product(*(range(count) for count in self.shape))
-        return tuple(",".join(map(str, place)) for place in places)
+        indices = itertools.product(*(range(count) for count in self.shape))
+        return tuple(",".join(map(str, index)) for index in indices)
 
 
 @dataclass(frozen=True)
@@ -64,15 +64,15 @@ class Signature:
     slots: tuple[Slot, ...] = ()
 
     def __post_init__(self) -> None:
-        seen: set[str] = set()
+        names: set[str] = set()
         for slot in self.slots:
-            if slot.name in seen:
+            if slot.name in names:
                 raise InputError(
                     f"the name '{slot.name}' occurs twice in one signature",
                     fix="rename one of them",
                     where="signature",
                 )
-            seen.add(slot.name)
+            names.add(slot.name)
 
     @cached_property
     def size(self) -> int:
@@ -87,12 +87,12 @@ class Signature:
     @cached_property
     def ranges(self) -> Mapping[str, slice]:
         """The slice of each slot in the flat vector."""
-        places: dict[str, slice] = {}
+        slices: dict[str, slice] = {}
         start = 0
         for slot in self.slots:
-            places[slot.name] = slice(start, start + slot.size)
+            slices[slot.name] = slice(start, start + slot.size)
             start += slot.size
-        return places
+        return slices
 
     @cached_property
     def _by_name(self) -> Mapping[str, Slot]:

@@ -37,14 +37,14 @@ def last_at_or_below(table: SX, value: SX, count: int | None = None, stride: int
     """
     count = count or table.numel()
     step = 1 << (count.bit_length() - 1)
-    place = SX(-1.0)
+    index = SX(-1.0)
     while step:
-        there = place + float(step)
-        entry = read_entry(table, float(stride) * there)
-        fits = casadi.logic_and(there < float(count), entry <= value)
-        place = if_else(fits, there, place)
+        candidate = index + float(step)
+        entry = read_entry(table, float(stride) * candidate)
+        fits = casadi.logic_and(candidate < float(count), entry <= value)
+        index = if_else(fits, candidate, index)
         step >>= 1
-    return place
+    return index
 
 
 def reads_tables(function: Function) -> bool:
@@ -54,9 +54,9 @@ def reads_tables(function: Function) -> bool:
 
 def tables_read(function: Function) -> set[tuple[int, int, int]]:
     """The tables that a function reads: the input of each, its first index there, its length."""
-    found: set[tuple[int, int, int]] = set()
+    tables: set[tuple[int, int, int]] = set()
     if not reads_tables(function):
-        return found
+        return tables
     inputs: dict[int, tuple[int, int]] = {}  # which input a work slot holds now
     constants: dict[int, float] = {}
     for k in range(function.n_instructions()):
@@ -66,8 +66,8 @@ def tables_read(function: Function) -> set[tuple[int, int, int]]:
             continue
         target = targets[0]
         if number == casadi.OP_PRINTME and sources[0] in inputs and constants.get(sources[1], 0.0) < 0.0:
-            slot, place = inputs[sources[0]]
-            found.add((slot, place, int(-constants[sources[1]])))
+            slot, offset = inputs[sources[0]]
+            tables.add((slot, offset, int(-constants[sources[1]])))
         for written in targets:
             inputs.pop(written, None)
             constants.pop(written, None)
@@ -75,27 +75,27 @@ def tables_read(function: Function) -> set[tuple[int, int, int]]:
             inputs[target] = (sources[0], sources[1])
         elif number == casadi.OP_CONST:
             constants[target] = function.instruction_constant(k)
-    return found
+    return tables
 
 
 def evaluate_with_reads(function: Function, arguments: Sequence[NDArray[np.float64]]) -> list[Any]:
     """The values of a function that reads tables: operations by CasADi, reads here. Slow."""
     outputs = [np.zeros(function.numel_out(k)) for k in range(function.n_out())]
-    places = [function.sparsity_out(k).row() for k in range(function.n_out())]
+    rows = [function.sparsity_out(k).row() for k in range(function.n_out())]
     work = [0.0] * function.sz_w()
     origins: dict[int, tuple[int, int]] = {}  # which input a work slot holds now
     for k in range(function.n_instructions()):
         number, sources = function.instruction_id(k), function.instruction_input(k)
         target = function.instruction_output(k)
         if number == casadi.OP_OUTPUT:
-            outputs[target[0]][places[target[0]][target[1]]] = work[sources[0]]
+            outputs[target[0]][rows[target[0]][target[1]]] = work[sources[0]]
             continue
         if number == casadi.OP_CALL:
             called = function.instructions_sx()[k].which_function()
-            for place, value in zip(target, _called(called, [work[source] for source in sources])):
-                if place >= 0:
-                    work[place] = value
-                    origins.pop(place, None)
+            for position, value in zip(target, _called(called, [work[source] for source in sources])):
+                if position >= 0:
+                    work[position] = value
+                    origins.pop(position, None)
             continue
         origin = None
         if number == casadi.OP_CONST:
@@ -103,11 +103,11 @@ def evaluate_with_reads(function: Function, arguments: Sequence[NDArray[np.float
         elif number == casadi.OP_INPUT:
             origin, value = (sources[0], sources[1]), float(arguments[sources[0]][sources[1]])
         elif number == casadi.OP_PRINTME:
-            slot, place = origins[sources[0]]
+            slot, position = origins[sources[0]]
             if work[sources[1]] < 0.0:
-                origin, value = (slot, place), work[sources[0]]
+                origin, value = (slot, position), work[sources[0]]
             else:
-                value = float(arguments[slot][place + int(work[sources[1]])])
+                value = float(arguments[slot][position + int(work[sources[1]])])
         elif len(sources) == 1:
             value = float(SX.unary(number, SX(work[sources[0]])))
         else:

@@ -60,7 +60,7 @@ class TracedFunction:
 
     def joined(self, other: TracedFunction) -> TracedFunction:
         """This function with the results of another one with the same inputs appended."""
-        *more, rounded = Function("f", list(other.arguments), [*other.results, other.rounded]).call(
+        *results, rounded = Function("f", list(other.arguments), [*other.results, other.rounded]).call(
             list(self.arguments), True, False
         )
         return TracedFunction(
@@ -68,7 +68,7 @@ class TracedFunction:
             inputs=self.inputs,
             outputs=Signature((*self.outputs.slots, *other.outputs.slots)),
             arguments=self.arguments,
-            results=(*self.results, *more),
+            results=(*self.results, *results),
             rounded=vertcat(self.rounded, rounded),
         )
 

@@ -21,14 +21,14 @@ from armblocks.diagram import (
     BlockHandle,
     Diagram,
     DiagramBuilder,
-    Fed,
-    Feed,
+    Driver,
+    ExampleBlock,
     ParameterKind,
     Port,
     PortRef,
     Shapes,
     WorkedExample,
-    made,
+    driver,
 )
 from armblocks.equations import Shape, SimulationOptions
 from armblocks.errors import InertiaWarning, InputError, check_type
@@ -89,63 +89,63 @@ class _Assembly:
         )
         self._block = example_block(kind)
         self._handles: dict[str, BlockHandle] = {self._name: self._builder.add(self._name, self._block)}
-        self._wires: list[tuple[Feed, PortRef]] = []
-        self._feeds: dict[str, PortRef] = {}
+        self._wires: list[tuple[Driver, PortRef]] = []
+        self._drivers: dict[str, PortRef] = {}
 
     def diagram(self) -> Diagram:
         """The checked diagram."""
-        feeds = fitting_feeds(self._block, self._example.inputs)
-        for port, feed in feeds.items():
-            self._feeds[port] = self._source(feed)
-        for port, source in self._feeds.items():
+        drivers = fitting_drivers(self._block, self._example.inputs)
+        for port, signal in drivers.items():
+            self._drivers[port] = self._source(signal)
+        for port, source in self._drivers.items():
             self._builder.connect(source, PortRef(self._name, port))
-        for feed in self._example.besides:
-            self._added(feed)
+        for signal in self._example.extra_blocks:
+            self._block_of(signal)
         self._show()
-        for feed, target in self._wires:
-            self._builder.connect(self._source(feed), target)
+        for signal, target in self._wires:
+            self._builder.connect(self._source(signal), target)
         return self._builder.build()
 
     def _show(self) -> None:
         """The sink: a scope of the shown signals, unless the block is a sink itself."""
-        across, up = self._example.across, self._example.up
-        if across is not None and up is not None:
-            self._builder.add("XY graph", XYGraph(), self._source(across), self._source(up))
+        x_axis, y_axis = self._example.x_axis, self._example.y_axis
+        if x_axis is not None and y_axis is not None:
+            self._builder.add("XY graph", XYGraph(), self._source(x_axis), self._source(y_axis))
             return
-        shown = [self._source(feed) for feed in self._example.shown]
+        shown = [self._source(signal) for signal in self._example.shown]
         if not shown and not self._block.views():
             outputs = [PortRef(self._name, port.name) for port in self._block.output_ports()]
-            shown = [*self._feeds.values(), *outputs]
+            shown = [*self._drivers.values(), *outputs]
         shown = list(dict.fromkeys(shown))
         if shown:
             self._builder.add("scope", Scope(inputs=len(shown)), *shown)
 
-    def _source(self, feed: Feed) -> PortRef:
+    def _source(self, signal: Driver) -> PortRef:
         """The output port of a driver; adds its block if necessary."""
-        if isinstance(feed, str):
-            block, slash, port = feed.rpartition("/")
+        if isinstance(signal, str):
+            block, slash, port = signal.rpartition("/")
             if slash:
                 return PortRef(block, port)
-            return self._feeds.get(feed) or PortRef(self._name, feed)
-        name = self._added(feed)
-        return PortRef(name, feed.port or self._handles[name].block.output_ports()[0].name)
+            return self._drivers.get(signal) or PortRef(self._name, signal)
+        name = self._block_of(signal)
+        return PortRef(name, signal.port or self._handles[name].block.output_ports()[0].name)
 
-    def _added(self, feed: Fed) -> str:
+    def _block_of(self, signal: ExampleBlock) -> str:
         """The block name of a driver, after adding the block and its drivers."""
-        block = _block(BLOCKS[feed.type_name], feed.parameters)
-        name = self._free_name(feed, block)
+        block = _block(BLOCKS[signal.type_name], signal.parameters)
+        name = self._free_name(signal, block)
         if name not in self._handles:
             self._handles[name] = self._builder.add(name, block)
-            for port, deeper in fitting_feeds(block, feed.inputs).items():
-                self._wires.append((deeper, PortRef(name, port)))
+            for port, further_signal in fitting_drivers(block, signal.inputs).items():
+                self._wires.append((further_signal, PortRef(name, port)))
             while self._wires:  # add its drivers now, so that names are assigned in reading order
-                deeper, target = self._wires.pop(0)
-                self._builder.connect(self._source(deeper), target)
+                further_signal, target = self._wires.pop(0)
+                self._builder.connect(self._source(further_signal), target)
         return name
 
-    def _free_name(self, feed: Fed, block: Block) -> str:
-        if feed.name:
-            return feed.name
+    def _free_name(self, signal: ExampleBlock, block: Block) -> str:
+        if signal.name:
+            return signal.name
         stem = block_name(type(block))
         return next(name for name in _numbered(stem) if name not in self._handles)
 
@@ -175,21 +175,21 @@ def shipped_robot(name: str) -> Robot:
         return formats.load_robot(name)
 
 
-def fitting_feeds(block: Block, stated: Mapping[str, Feed]) -> Mapping[str, Feed]:
+def fitting_drivers(block: Block, stated: Mapping[str, Driver]) -> Mapping[str, Driver]:
     """The driver of each input: the given one, else a signal with a shape that the block accepts."""
     shapes = _fitting_shapes(block)
     ports = block.input_ports()
     robot = next(
         (v for rule in block.parameters() if isinstance(v := block.parameter_value(rule.name), Robot)), None
     )
-    feeds: dict[str, Feed] = {}
+    drivers: dict[str, Driver] = {}
     for number, port in enumerate(ports):
         if port.name in stated:
-            feeds[port.name] = stated[port.name]
+            drivers[port.name] = stated[port.name]
             continue
-        feed = _signal(port, shapes[port.name], number, robot)
-        feeds[port.name] = feed if feed.name or len(ports) == 1 else feed.named(port.name)
-    return feeds
+        signal = _signal(port, shapes[port.name], number, robot)
+        drivers[port.name] = signal if signal.name or len(ports) == 1 else signal.named(port.name)
+    return drivers
 
 
 def _fitting_shapes(block: Block) -> Shapes:
@@ -205,28 +205,28 @@ def _fitting_shapes(block: Block) -> Shapes:
     return shapes
 
 
-def _signal(port: Port, shape: Shape, number: int, robot: Robot | None) -> Fed:
+def _signal(port: Port, shape: Shape, number: int, robot: Robot | None) -> ExampleBlock:
     """A signal that fits a port, the ``number``-th of its block."""
     if robot is not None and port.name in ("q", "qd", "qdd") and shape == (robot.n,):
         start, end = [0.0] * robot.n, [1.0 - 0.5 * j for j in range(robot.n)]
-        return made("JTraj", q0=start, qf=end, tmax=8.0).named("motion").at(port.name)
+        return driver("JTraj", q0=start, qf=end, tmax=8.0).named("motion").at(port.name)
     if shape == (4, 4):
         return turning_pose().named(port.name)
     if shape == (3, 3) and port.name == "R":
-        return made("T2Rp").by(T=turning_pose()).at("R")
-    spread = np.arange(int(np.prod(shape)), dtype=np.float64).reshape(shape)
+        return driver("T2Rp").by(T=turning_pose()).at("R")
+    entries = np.arange(int(np.prod(shape)), dtype=np.float64).reshape(shape)
     if len(shape) == 2 and shape[0] == shape[1]:
         # regular at all times: diagonally dominant
-        return made(
+        return driver(
             "SineWave",
-            amplitude=(0.5 + 0 * spread).tolist(),
-            phase=spread.tolist(),
-            bias=(3 * np.eye(len(spread))).tolist(),
+            amplitude=(0.5 + 0 * entries).tolist(),
+            phase=entries.tolist(),
+            bias=(3 * np.eye(len(entries))).tolist(),
         )
-    return made("SineWave", frequency=1.0 + 0.5 * number, phase=spread.tolist() if shape else 0.0)
+    return driver("SineWave", frequency=1.0 + 0.5 * number, phase=entries.tolist() if shape else 0.0)
 
 
-def turning_pose() -> Fed:
+def turning_pose() -> ExampleBlock:
     """A pose that rotates about z with a period of ten seconds."""
-    still = made("Ground").named("zero")
-    return made("Rpy2T").by(roll=still, pitch=still, yaw=made("Ramp", slope=0.6).named("yaw"))
+    zero = driver("Ground").named("zero")
+    return driver("Rpy2T").by(roll=zero, pitch=zero, yaw=driver("Ramp", slope=0.6).named("yaw"))

@@ -49,8 +49,8 @@ class FilesAnywhere(DataFiles):
 
     def table(self, reference: TableReference, folder: Path | None) -> TimeTable:
         """The table of a file."""
-        place = Path(reference.file) if folder is None else folder / reference.file
-        return load_table(place, time=reference.time, columns=reference.columns)
+        path = Path(reference.file) if folder is None else folder / reference.file
+        return load_table(path, time=reference.time, columns=reference.columns)
 
     def function(self, reference: str, folder: Path | None) -> UserFunction:
         """The function of a file, if code is trusted. **Runs the file.**"""

@@ -72,19 +72,21 @@ class _Listing:
 
     def __init__(self, robots: Mapping[Robot, str]) -> None:
         self._robots = robots
-        self._taken = {*_PACKAGE_NAMES, *robots.values()}
+        self._used_names = {*_PACKAGE_NAMES, *robots.values()}
 
     def lines(self, diagram: Diagram, builder: str, *, inside: bool = False) -> list[str]:
         """The lines that add the blocks and connections to a builder of this name."""
         order = _reading_order(diagram)
-        names = _identifiers({name: name for name in order}, self._taken)
-        self._taken |= set(names.values())
+        names = _identifiers({name: name for name in order}, self._used_names)
+        self._used_names |= set(names.values())
         written = [f"{builder} = ab.DiagramBuilder({_text(diagram.name)})"]
         for rule in diagram.mask:
             written += _call(f"{builder}.parameter", self._declaration(diagram, rule, inside=inside))
         added: set[str] = set()
-        late = _late(diagram, order)
-        used = {wire.source.block for wire in diagram.connections} | {wire.target.block for wire in late}
+        late_connections = _late(diagram, order)
+        used = {wire.source.block for wire in diagram.connections} | {
+            wire.target.block for wire in late_connections
+        }
         used |= {ref.block for ref in (*diagram.logged, *diagram.signal_names)} | set(diagram.commented)
         before: list[str] = []
         for name in order:
@@ -94,7 +96,7 @@ class _Listing:
             target = f"{names[name]} = " if name in used else ""
             written += _call(f"{target}{builder}.add", arguments)
             added.add(name)
-        for wire in late:
+        for wire in late_connections:
             source = _end(diagram, wire.source, names)
             written.append(f'{builder}.connect({source}, {names[wire.target.block]}["{wire.target.port}"])')
         written += [f"{builder}.log({_end(diagram, ref, names)})" for ref in diagram.logged]
@@ -102,7 +104,7 @@ class _Listing:
             f"{builder}.name_signal({_end(diagram, ref, names)}, {_text(name)})"
             for ref, name in diagram.signal_names.items()
         ]
-        written += [f"{builder}.comment_{how}({names[name]})" for name, how in diagram.commented.items()]
+        written += [f"{builder}.comment_{mark}({names[name]})" for name, mark in diagram.commented.items()]
         return [*before, *written]
 
     def _construction(self, block: Block, name: str, before: list[str]) -> str:
@@ -127,17 +129,17 @@ class _Listing:
         if not isinstance(block, DiagramBlock):
             return f"{block.type_name()}({', '.join(stated)})"
         if _is_whole_link(block):
-            made = _library_block(block.diagram.link)
+            expression = _library_block(block.diagram.link)
         elif block.diagram.link:
             linked = f"diagram={_library_block(block.diagram.link)}.diagram"
-            made = f"{block.type_name()}({', '.join([linked, *stated])})"
+            expression = f"{block.type_name()}({', '.join([linked, *stated])})"
         else:
-            inner = next(iter(_identifiers({"": f"{name} inside"}, self._taken).values()))
-            self._taken.add(inner)
+            inner = next(iter(_identifiers({"": f"{name} inside"}, self._used_names).values()))
+            self._used_names.add(inner)
             before += [*self.lines(block.diagram, inner, inside=True), ""]
-            made = f"{block.type_name()}({', '.join([f'diagram={inner}.build()', *stated])})"
+            expression = f"{block.type_name()}({', '.join([f'diagram={inner}.build()', *stated])})"
         masked = own(block.diagram.mask)
-        return f"{made}.with_parameters({', '.join(masked)})" if masked else made
+        return f"{expression}.with_parameters({', '.join(masked)})" if masked else expression
 
     def _declaration(self, diagram: Diagram, rule: Parameter, *, inside: bool) -> list[str]:
         def shown(value: object) -> str:
@@ -212,8 +214,10 @@ def _reading_order(diagram: Diagram) -> list[str]:
 
 def _late(diagram: Diagram, order: list[str]) -> list[Connection]:
     """The connections to a block that precedes their source."""
-    place = {name: number for number, name in enumerate(order)}
-    return [wire for wire in diagram.connections if place[wire.source.block] >= place[wire.target.block]]
+    position = {name: number for number, name in enumerate(order)}
+    return [
+        wire for wire in diagram.connections if position[wire.source.block] >= position[wire.target.block]
+    ]
 
 
 def _sources(diagram: Diagram, name: str, added: set[str], names: Mapping[str, str]) -> list[str]:
@@ -238,13 +242,13 @@ def _end(diagram: Diagram, source: PortRef, names: Mapping[str, str]) -> str:
 
 def _robots(diagrams: Iterable[Diagram]) -> dict[Robot, tuple[str, str]]:
     """A name for every robot of the blocks, and the expression that loads it."""
-    found: dict[Robot, tuple[str, str]] = {}
+    loadings: dict[Robot, tuple[str, str]] = {}
     for name, block in ((name, block) for diagram in diagrams for name, block in diagram.blocks.items()):
         for rule in block.own_parameters():
             robot = block.parameter_value(rule.name)
-            if isinstance(robot, Robot) and robot not in found:
-                found[robot] = _loading(robot, f"block '{name}'")
-    return found
+            if isinstance(robot, Robot) and robot not in loadings:
+                loadings[robot] = _loading(robot, f"block '{name}'")
+    return loadings
 
 
 def _loading(robot: Robot, where: str) -> tuple[str, str]:
@@ -266,18 +270,18 @@ def _loading(robot: Robot, where: str) -> tuple[str, str]:
 
 def _identifiers(names: Mapping[_Named, str], others: Iterable[str]) -> dict[_Named, str]:
     """A unique Python name for each block or robot, similar to its name and different from the ``others``."""
-    taken = set(others)
-    found: dict[_Named, str] = {}
+    used_names = set(others)
+    identifiers: dict[_Named, str] = {}
     for key, name in names.items():
         stem = re.sub(r"\W+", "_", name).strip("_").lower() or "block"
         if stem[0].isdigit() or keyword.iskeyword(stem):
             stem = f"block_{stem}"
-        wish, number = stem, 2
-        while wish in taken:
-            wish, number = f"{stem}_{number}", number + 1
-        taken.add(wish)
-        found[key] = wish
-    return found
+        identifier, number = stem, 2
+        while identifier in used_names:
+            identifier, number = f"{stem}_{number}", number + 1
+        used_names.add(identifier)
+        identifiers[key] = identifier
+    return identifiers
 
 
 def _value(value: object) -> str:

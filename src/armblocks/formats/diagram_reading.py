@@ -72,8 +72,8 @@ class DiagramReader:
             extras=extras,
             description=members["description"].text() if "description" in members else "",
         )
-        given = members["parameters"].members() if "parameters" in members else {}
-        self._declare(builder, members["mask"].elements() if "mask" in members else [], given)
+        values = members["parameters"].members() if "parameters" in members else {}
+        self._declare(builder, members["mask"].elements() if "mask" in members else [], values)
         for key, block in blocks.items():
             with located(block_nodes[key]):
                 builder.add(key, block)
@@ -89,8 +89,8 @@ class DiagramReader:
         for key, entry in (members["signal_names"].members() if "signal_names" in members else {}).items():
             with located(entry):
                 builder.name_signal(_port(entry, key), entry.text())
-        for key, place in layout.places.items():
-            builder.place(key, **dataclasses.asdict(place))
+        for key, placement in layout.placements.items():
+            builder.place(key, **dataclasses.asdict(placement))
         for wire, bends in layout.bends.items():
             builder.bend(wire, bends)
         for key, note in layout.notes.items():
@@ -121,8 +121,8 @@ class DiagramReader:
         mask = {rule.name: rule for value in values.values() for rule in cast("Diagram", value).mask}
         known = {**mask, **{name: rule for name, rule in rules.items() if name not in inside}}
         masked: dict[str, object] = {}
-        for name, given in self._given(members, known, kind).items():
-            (masked if name in mask else values)[name] = given
+        for name, parameter_value in self._parameter_values(members, known, kind).items():
+            (masked if name in mask else values)[name] = parameter_value
         missing = [name for name, rule in rules.items() if rule.required and name not in values]
         if missing:
             raise node.error(
@@ -133,40 +133,40 @@ class DiagramReader:
         with located(node):
             return kind(**values).with_parameters(**masked)  # pyright: ignore[reportArgumentType]
 
-    def _given(
+    def _parameter_values(
         self, members: Mapping[str, Node], rules: Mapping[str, Parameter], kind: type[Block]
     ) -> dict[str, object]:
         """The values and formulas of a block's parameters."""
-        found: dict[str, object] = {}
+        values: dict[str, object] = {}
         for key in ("parameters", "formulas"):
             for name, member in (members[key].members() if key in members else {}).items():
                 if name not in rules:
-                    what = f"parameter of {kind.type_name()}"
-                    raise UnknownNameError(what, name, rules, where=member.where)
-                if name in found:
+                    noun = f"parameter of {kind.type_name()}"
+                    raise UnknownNameError(noun, name, rules, where=member.where)
+                if name in values:
                     raise member.error(f"'{name}' has a value and a formula", allowed="one of the two")
                 if key == "parameters":
-                    found[name] = parameter_from(rules[name], member, self.robots)
+                    values[name] = parameter_from(rules[name], member, self.robots)
                 else:
                     with located(member):
-                        found[name] = formula(member.text())
-        return found
+                        values[name] = formula(member.text())
+        return values
 
     def _default(self, rule: Parameter, node: Node) -> object:
         return parameter_from(rule, node, self.robots)
 
-    def _declare(self, builder: DiagramBuilder, mask: Sequence[Node], given: Mapping[str, Node]) -> None:
+    def _declare(self, builder: DiagramBuilder, mask: Sequence[Node], values: Mapping[str, Node]) -> None:
         """The declared parameters of a diagram, and for the outermost diagram their values."""
         rules: list[Parameter] = []
         for node in mask:
             with located(node):
                 rules.append(mask_parameter_from(node, self._default))
-        for name, member in given.items():
+        for name, member in values.items():
             if name not in [rule.name for rule in rules]:
                 known = [rule.name for rule in rules]
                 raise UnknownNameError("mask parameter", name, known, where=member.where)
         for rule, node in zip(rules, mask):
-            value = parameter_from(rule, given[rule.name], self.robots) if rule.name in given else None
+            value = parameter_from(rule, values[rule.name], self.robots) if rule.name in values else None
             with located(node):
                 builder.declare(rule, value)
 

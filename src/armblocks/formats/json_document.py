@@ -34,8 +34,8 @@ class Document:
     def where(self, path: KeyPath) -> str:
         """``model.json:12, blocks.jtraj.parameters.q0[2]``"""
         line = _line_of(self.text, path)
-        place = f"{self.name}:{line}" if line else self.name
-        return f"{place}, {path_text(path)}" if path else place
+        location = f"{self.name}:{line}" if line else self.name
+        return f"{location}, {path_text(path)}" if path else location
 
 
 @dataclass(frozen=True)
@@ -105,8 +105,8 @@ class Node:
             )
         return word
 
-    def _wrong(self, wanted: str) -> FormatError:
-        return self.error(f"the value is {describe(self.value)}", allowed=wanted)
+    def _wrong(self, allowed: str) -> FormatError:
+        return self.error(f"the value is {describe(self.value)}", allowed=allowed)
 
 
 def read_document(data: bytes, name: str, most_bytes: int, deepest: int = DEEPEST) -> Node:
@@ -238,9 +238,11 @@ def _unique_members(pairs: list[tuple[str, object]]) -> dict[str, object]:
     members = dict(pairs)
     if len(members) < len(pairs):
         keys = [key for key, _ in pairs]
-        twice = next(key for i, key in enumerate(keys) if key in keys[:i])
+        duplicate = next(key for i, key in enumerate(keys) if key in keys[:i])
         raise _RefusedError(
-            f"the key '{_short(twice)}' occurs twice in one object", json.dumps(twice), "every key once"
+            f"the key '{_short(duplicate)}' occurs twice in one object",
+            json.dumps(duplicate),
+            "every key once",
         )
     return members
 
@@ -270,8 +272,8 @@ _TOKEN = re.compile(r'"(?:[^"\\]|\\.)*"?|[\[\]{}:,]|\n|[^\s\[\]{}:,"]+', re.DOTA
 def _check_depth(document: Document, deepest: int) -> None:
     """Check the depth before parsing, because Python's parser is recursive."""
     depth, line = 0, 1
-    for found in _TOKEN.finditer(document.text):
-        token = found.group()
+    for match in _TOKEN.finditer(document.text):
+        token = match.group()
         line += token.count("\n")
         if token in "[{":
             depth += 1
@@ -288,16 +290,16 @@ def _check_depth(document: Document, deepest: int) -> None:
 
 def _check_text(root: Node) -> None:
     """Reject halves of surrogate pairs, which ``"\\ud800"`` creates and a file cannot contain."""
-    waiting = [root]
-    while waiting:
-        node = waiting.pop()
+    pending = [root]
+    while pending:
+        node = pending.pop()
         texts = [node.value] if isinstance(node.value, str) else []
         if isinstance(node.value, dict):
             members = node.members()
             texts += list(members)
-            waiting += members.values()
+            pending += members.values()
         elif isinstance(node.value, list):
-            waiting += node.elements()
+            pending += node.elements()
         for text in texts:
             if any("\ud800" <= character <= "\udfff" for character in text):
                 raise node.error(
@@ -322,8 +324,8 @@ def _line_of(text: str, path: KeyPath) -> int:
     """The line on which the value at ``path`` starts, or 0. The text is known to be valid JSON."""
     stack: list[_Level] = []
     line, key = 1, ""
-    for found in _TOKEN.finditer(text):
-        token = found.group()
+    for match in _TOKEN.finditer(text):
+        token = match.group()
         level = stack[-1] if stack else None
         if token == "\n":
             line += 1

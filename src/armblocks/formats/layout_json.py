@@ -20,17 +20,17 @@ _CONNECTION = re.compile(r"([^/]+)/([^/]+?) -> ([^/]+)/([^/]+)")
 
 def connection_from(node: Node) -> tuple[PortRef, PortRef]:
     """The two ends of a connection from its text."""
-    found = _CONNECTION.fullmatch(node.text())
-    if found is None:
+    match = _CONNECTION.fullmatch(node.text())
+    if match is None:
         raise node.error(f"'{node.text()[:80]}' is not a connection", allowed='"block/output -> block/input"')
-    return PortRef(found[1], found[2]), PortRef(found[3], found[4])
+    return PortRef(match[1], match[2]), PortRef(match[3], match[4])
 
 
 class Layout:
     """The layout of an object: positions of blocks, routes of wires, and notes."""
 
     def __init__(self) -> None:
-        self.places: dict[str, Placement] = {}
+        self.placements: dict[str, Placement] = {}
         self.bends: dict[Connection, list[float]] = {}
         self.notes: dict[str, Note] = {}
 
@@ -39,10 +39,10 @@ class Layout:
         preserved."""
         stated = _members_if_any(node)
         if key in blocks:
-            self.places[key] = _placement(key, node, extras)
-        elif "bends" in stated and (found := _CONNECTION.fullmatch(key)):
+            self.placements[key] = _placement(key, node, extras)
+        elif "bends" in stated and (match := _CONNECTION.fullmatch(key)):
             members = split_extras(node, ("bends",), extras, "layout", key)
-            wire = Connection(PortRef(found[1], found[2]), PortRef(found[3], found[4]))
+            wire = Connection(PortRef(match[1], match[2]), PortRef(match[3], match[4]))
             self.bends[wire] = [entry.number() for entry in members["bends"].elements()]
         elif key.startswith("/") and {"x", "y", "text"} <= stated.keys():
             members = split_extras(node, ("x", "y", "text"), extras, "layout", key)
@@ -55,9 +55,11 @@ class Layout:
 def layout_to(diagram: Diagram, extras: Mapping[str, object]) -> dict[str, object]:
     """The layout of a diagram as plain values; ``extras`` are the unknown members of its entries."""
     layout = dict(extras)
-    for key, place in diagram.layout.items():
+    for key, placement in diagram.layout.items():
         stated = {
-            name: value for name, default in _PLACEMENT.items() if (value := getattr(place, name)) != default
+            name: value
+            for name, default in _PLACEMENT.items()
+            if (value := getattr(placement, name)) != default
         }
         layout[key] = {**members_of(extras.get(key)), **stated}
     for wire, bends in diagram.bends.items():

@@ -264,13 +264,13 @@ def _angle(node: Node, *, per_second: bool = False) -> float:
     """An angle in rad, or text in degrees; an angular speed likewise."""
     if not isinstance(node.value, str):
         return node.number()
-    found = _DEGREES.fullmatch(node.value)
+    match = _DEGREES.fullmatch(node.value)
     unit = "deg/s" if per_second else "deg"
-    if found is None or (found.group(2) is not None) != per_second or len(node.value) > 40:
+    if match is None or (match.group(2) is not None) != per_second or len(node.value) > 40:
         raise node.error(
             f"'{node.value[:40]}' is not an angle", allowed=f'rad as a number, or text such as "90 {unit}"'
         )
-    return math.radians(float(found.group(1)))
+    return math.radians(float(match.group(1)))
 
 
 # -- writing -----------------------------------------------------------------------------------------------

@@ -79,8 +79,8 @@ class RobotReader:
         try:
             return self._data.table(_table_reference(node), self._folder)
         except ArmblocksError as error:
-            what = f"{error.where}: {error.what}" if error.where else error.what
-            raise node.error(what, allowed=error.allowed, fix=error.fix) from error
+            problem = f"{error.where}: {error.what}" if error.where else error.what
+            raise node.error(problem, allowed=error.allowed, fix=error.fix) from error
 
     def function(self, node: Node) -> UserFunction:
         """The Python function of a file beside the document, if code is trusted."""
@@ -111,8 +111,8 @@ class RobotReader:
             known = [*error.known, *self._own]
             raise UnknownNameError(error.kind, error.name, known, where=node.where) from error
         except ArmblocksError as error:
-            what = f"{error.where}: {error.what}" if error.where else error.what
-            raise node.error(what, allowed=error.allowed, fix=error.fix) from error
+            problem = f"{error.where}: {error.what}" if error.where else error.what
+            raise node.error(problem, allowed=error.allowed, fix=error.fix) from error
 
 
 class RobotWriter:
@@ -171,18 +171,18 @@ class RobotWriter:
 
     def _path(self, source: str) -> str:
         """The path of a file from the diagram's folder, through other folders of the project if necessary."""
-        place = Path(source)
-        if self._project is not None and self._folder is not None and place.is_relative_to(self._project):
-            return Path(os.path.relpath(place, self._folder)).as_posix()
+        path = Path(source)
+        if self._project is not None and self._folder is not None and path.is_relative_to(self._project):
+            return Path(os.path.relpath(path, self._folder)).as_posix()
         return relative_to_folder(source, self._folder)
 
     def _new_key(self, robot: Robot) -> str:
         """A unique key: the previous key of the robot or its name, changed if another robot has it."""
-        wish = robot.source.removeprefix(OWN) if robot.source.startswith(OWN) else robot.name
-        taken = {*self.table, *list_robots()}
-        stem = "robot" if is_path(wish) or not wish else wish
-        keys = (stem if number == 1 else f"{stem} {number}" for number in range(1, len(taken) + 2))
-        return next(key for key in keys if key not in taken)
+        name = robot.source.removeprefix(OWN) if robot.source.startswith(OWN) else robot.name
+        used_keys = {*self.table, *list_robots()}
+        stem = "robot" if is_path(name) or not name else name
+        keys = (stem if number == 1 else f"{stem} {number}" for number in range(1, len(used_keys) + 2))
+        return next(key for key in keys if key not in used_keys)
 
 
 def _is_unchanged(table: TimeTable) -> bool:

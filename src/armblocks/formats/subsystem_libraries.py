@@ -99,19 +99,19 @@ class Libraries:
         read_entry: ReadEntry,
         read_file: ReadFile = read_library_file,
         *,
-        around: Libraries | None = None,
+        parent: Libraries | None = None,
     ) -> None:
         self._folder = folder
         self._read_entry = read_entry
         self._read_file = read_file
-        self._roots: dict[Path, Node] = {} if around is None else around._roots
-        self._made: dict[tuple[Path, str], Diagram] = {} if around is None else around._made
-        self._chain: list[tuple[Path, str]] = [] if around is None else around._chain
+        self._roots: dict[Path, Node] = {} if parent is None else parent._roots
+        self._diagrams: dict[tuple[Path, str], Diagram] = {} if parent is None else parent._diagrams
+        self._chain: list[tuple[Path, str]] = [] if parent is None else parent._chain
 
     def linked(self, node: Node) -> Diagram:
         """The diagram of a reference ``"file#name"``."""
-        file, sharp, name = node.text().partition("#")
-        if not (file and sharp and name):
+        file, separator, name = node.text().partition("#")
+        if not (file and separator and name):
             raise node.error(
                 f"'{node.text()[:80]}' is not an entry of a library",
                 allowed='"file.json#Name", or "shipped#Name"',
@@ -133,8 +133,8 @@ class Libraries:
 
     def _entry(self, path: Path, name: str) -> Diagram:
         key = (path, name)
-        if key in self._made:
-            return self._made[key]
+        if key in self._diagrams:
+            return self._diagrams[key]
         shown = [f"{file.name}#{entry}" for file, entry in (*self._chain, key)]
         if key in self._chain:
             first = self._chain.index(key)
@@ -156,15 +156,15 @@ class Libraries:
         known = root.members()["library"].members()
         if name not in known:
             raise UnknownNameError("library block", name, known, where=str(path))
-        inner = Libraries(path.parent, self._read_entry, self._read_file, around=self)
+        inner = Libraries(path.parent, self._read_entry, self._read_file, parent=self)
         self._chain.append(key)
         try:
-            made = self._read_entry(root, known[name], name, path.parent, inner)
+            diagram = self._read_entry(root, known[name], name, path.parent, inner)
         finally:
             self._chain.pop()
-        made = replace(made, link=f"{_named(path)}#{name}")
-        self._made[key] = made
-        return made
+        diagram = replace(diagram, link=f"{_named(path)}#{name}")
+        self._diagrams[key] = diagram
+        return diagram
 
     def _root(self, path: Path) -> Node:
         """The document of a library file."""

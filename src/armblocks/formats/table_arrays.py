@@ -55,15 +55,15 @@ def read_mat(data: bytes) -> ColumnFile:
 
 def _members(contents: Mapping[str, Any]) -> dict[str, Any]:
     """The variables, and those in structures of one element, as ``structure/member``."""
-    found: dict[str, Any] = {}
+    members: dict[str, Any] = {}
     for name, value in contents.items():
         array = np.asarray(value)
         if array.dtype.names and array.size == 1:
             inside = _members({field: array[field].item() for field in array.dtype.names})
-            found |= {f"{name}/{field}": member for field, member in inside.items()}
+            members |= {f"{name}/{field}": member for field, member in inside.items()}
         else:
-            found[name] = value
-    return found
+            members[name] = value
+    return members
 
 
 def read_parquet(data: bytes) -> ColumnFile:
@@ -86,24 +86,24 @@ _INDEX = "__index_level_"
 """Names that pandas gives to an index without a name."""
 
 
-def _parquet_column(name: str, given: Any) -> Column:
+def _parquet_column(name: str, values: Any) -> Column:
     import pyarrow as pa
 
     arrow = cast("Any", pa)
     kinds = arrow.types
-    if kinds.is_dictionary(given.type):
-        given = given.cast(given.type.value_type)
-    if kinds.is_decimal(given.type):
-        given = given.cast(arrow.float64())
-    if kinds.is_date(given.type) or kinds.is_timestamp(given.type) or kinds.is_duration(given.type):
-        return _column(name, given.to_numpy())
-    if kinds.is_boolean(given.type) and given.null_count:
-        given = given.cast(arrow.int8())
-    if kinds.is_integer(given.type) and given.null_count:
-        given = given.cast(arrow.float64(), safe=True)
-    if not (kinds.is_integer(given.type) or kinds.is_floating(given.type) or kinds.is_boolean(given.type)):
-        return Column(name=name, kind="text", fault=f"its values are of type {str(given.type)[:40]}")
-    return _column(name, given.to_numpy())
+    if kinds.is_dictionary(values.type):
+        values = values.cast(values.type.value_type)
+    if kinds.is_decimal(values.type):
+        values = values.cast(arrow.float64())
+    if kinds.is_date(values.type) or kinds.is_timestamp(values.type) or kinds.is_duration(values.type):
+        return _column(name, values.to_numpy())
+    if kinds.is_boolean(values.type) and values.null_count:
+        values = values.cast(arrow.int8())
+    if kinds.is_integer(values.type) and values.null_count:
+        values = values.cast(arrow.float64(), safe=True)
+    if not (kinds.is_integer(values.type) or kinds.is_floating(values.type) or kinds.is_boolean(values.type)):
+        return Column(name=name, kind="text", fault=f"its values are of type {str(values.type)[:40]}")
+    return _column(name, values.to_numpy())
 
 
 def _check_size(numbers: int) -> None:
@@ -122,7 +122,7 @@ def _columns(arrays: Mapping[str, Any]) -> ColumnFile:
     The first axis is time. An array whose last axis, and not its first, has the length of the times is read
     along that axis, as Simulink stores signals beside a row of times.
     """
-    plain = {name: np.asarray(given) for name, given in arrays.items()}
+    plain = {name: np.asarray(values) for name, values in arrays.items()}
     flat = {
         name: array.ravel() if array.ndim >= 2 and max(array.shape) == array.size else array
         for name, array in plain.items()
@@ -131,13 +131,13 @@ def _columns(arrays: Mapping[str, Any]) -> ColumnFile:
     notes: list[str] = []
     key = time_column(ColumnFile(columns=with_units(vectors)))
     count = next((column.rows for column in vectors if column.name == key), 0)
-    found: list[Column] = []
+    selected: list[Column] = []
     for name, array in flat.items():
         if array.ndim < 2:
-            found.append(_column(name, np.atleast_1d(array)))
+            selected.append(_column(name, np.atleast_1d(array)))
             continue
         if array.dtype.kind not in "biuf" or not array.size:
-            found.append(Column(name=name, kind="text", fault=_unusable(array)))
+            selected.append(Column(name=name, kind="text", fault=_unusable(array)))
             continue
         if not count:
             array = _upright(name, array, notes)
@@ -145,8 +145,8 @@ def _columns(arrays: Mapping[str, Any]) -> ColumnFile:
             array = np.moveaxis(array, -1, 0)
             notes.append(f"The rows of '{name}' are its signals.")
         columns = array.reshape(array.shape[0], -1)
-        found += [_column(f"{name}[{k}]", columns[:, k]) for k in range(columns.shape[1])]
-    return ColumnFile(columns=with_units(found), notes=tuple(notes))
+        selected += [_column(f"{name}[{k}]", columns[:, k]) for k in range(columns.shape[1])]
+    return ColumnFile(columns=with_units(selected), notes=tuple(notes))
 
 
 def _upright(name: str, array: Array, notes: list[str]) -> Array:
@@ -187,8 +187,8 @@ def _column(name: str, array: Array) -> Column:
     if kind == "m":
         return Column(name=name, values=_seconds(array))
     if kind in "iu" and max(abs(int(array.max())), abs(int(array.min()))) > LARGEST_EXACT:
-        what = "its integers exceed 2^53, so they are not exact as numbers; subtract an offset"
-        return Column(name=name, fault=what)
+        fault = "its integers exceed 2^53, so they are not exact as numbers; subtract an offset"
+        return Column(name=name, fault=fault)
     values = np.ascontiguousarray(array, dtype=np.float64)
     return Column(name=name, kind="boolean" if kind == "b" else "number", values=values)
 

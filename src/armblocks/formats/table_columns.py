@@ -118,30 +118,30 @@ class ColumnFile:
 
 def unique_names(names: Sequence[str]) -> list[str]:
     """The names, with ``(2)``, ``(3)``, … after repeated ones; an empty name becomes ``c0``, ``c1``, …"""
-    taken = {name for name in names if name}
-    found: list[str] = []
+    used_names = {name for name in names if name}
+    unique: list[str] = []
     for k, name in enumerate(names):
-        wish, number = name or f"c{k}", 2
-        while wish in found or (wish != name and wish in taken):
-            wish, number = f"{name or f'c{k}'} ({number})", number + 1
-        found.append(wish)
-    return found
+        candidate, number = name or f"c{k}", 2
+        while candidate in unique or (candidate != name and candidate in used_names):
+            candidate, number = f"{name or f'c{k}'} ({number})", number + 1
+        unique.append(candidate)
+    return unique
 
 
 def repeated_notes(names: Sequence[str]) -> Iterator[str]:
     """A note where several columns have the same name."""
-    found = sorted(name for name, count in Counter(names).items() if name and count > 1)
-    if found:
-        yield f"Several columns have the same name; a number is appended: {', '.join(found[:8])}."
+    repeated = sorted(name for name, count in Counter(names).items() if name and count > 1)
+    if repeated:
+        yield f"Several columns have the same name; a number is appended: {', '.join(repeated[:8])}."
 
 
 def header_unit(name: str) -> str:
     """The unit in a header such as ``q1 [rad]``, ``time (ms)``, ``t/ms`` or ``time_ms``; ``""`` for none."""
-    if found := _BRACKETS.match(name):
-        unit = (found["square"] if found["square"] is not None else found["round"]).strip()
+    if match := _BRACKETS.match(name):
+        unit = (match["square"] if match["square"] is not None else match["round"]).strip()
         return unit if _is_unit(unit) and not unit.isdigit() else ""
-    if (found := _TIME.match(name.strip())) and found["unit"].lower() in _SECONDS:
-        return found["unit"]
+    if (match := _TIME.match(name.strip())) and match["unit"].lower() in _SECONDS:
+        return match["unit"]
     return ""
 
 
@@ -159,12 +159,12 @@ def time_column(file: ColumnFile) -> str:
     ends in ``/time``, else the first column of numbers. A column of dates counts as numbers.
     """
     names = [column.name for column in file.columns]
-    for wanted in _TIME_NAMES:
-        if wanted in names:
-            return wanted
-    for wanted in _TIME_NAMES:
+    for time_name in _TIME_NAMES:
+        if time_name in names:
+            return time_name
+    for time_name in _TIME_NAMES:
         for name in names:
-            if _bare(name).casefold() == wanted:
+            if _bare(name).casefold() == time_name:
                 return name
     inside = [name for name in names if name.casefold().endswith("/time")]
     if len(inside) == 1:
@@ -177,8 +177,8 @@ def _bare(name: str) -> str:
     """A name without its unit."""
     if not header_unit(name):
         return name.strip()
-    found = _BRACKETS.match(name) or _TIME.match(name.strip())
-    return found["name"].strip() if found else name
+    match = _BRACKETS.match(name) or _TIME.match(name.strip())
+    return match["name"].strip() if match else name
 
 
 def table_of(
@@ -239,14 +239,14 @@ def seconds_of(column: Column, source: str) -> NDArray[np.float64]:
     times = np.asarray(values * factor / divisor)
     _check_gaps(column, source)
     steps = np.diff(times)
-    again = np.append(False, (steps[1:] == 0.0) & (steps[:-1] == 0.0))  # a time for the third time
-    wrong = np.flatnonzero((steps < 0.0) | again)
-    if wrong.size:
-        row = int(wrong[0]) + 1
-        now, before = float(values[row]), float(values[row - 1])
-        repeated = now == before
+    third = np.append(False, (steps[1:] == 0.0) & (steps[:-1] == 0.0))  # a time for the third time
+    invalid = np.flatnonzero((steps < 0.0) | third)
+    if invalid.size:
+        row = int(invalid[0]) + 1
+        time, before = float(values[row]), float(values[row - 1])
+        repeated = time == before
         raise InputError(
-            f"the times '{column.name}' are not ascending: row {row + 1} of the table is {now:.12g}, "
+            f"the times '{column.name}' are not ascending: row {row + 1} of the table is {time:.12g}, "
             f"{'as in the two rows before' if repeated else f'after {before:.12g}'}",
             where=source,
             allowed="ascending times; a time twice for a jump",
@@ -292,13 +292,13 @@ def _numbers(column: Column, source: str, use: str = "values") -> Column:
 
 def _check_gaps(column: Column, source: str) -> None:
     assert column.values is not None
-    wrong = np.flatnonzero(~np.isfinite(column.values))
-    if wrong.size:
-        row = int(wrong[0])
+    gaps = np.flatnonzero(~np.isfinite(column.values))
+    if gaps.size:
+        row = int(gaps[0])
         raise InputError(
             f"row {row + 1} of the column '{column.name}' is "
             f"{'empty or NaN' if np.isnan(column.values[row]) else 'infinite'}"
-            f"{f', as are {wrong.size - 1} others' if wrong.size > 1 else ''}",
+            f"{f', as are {gaps.size - 1} others' if gaps.size > 1 else ''}",
             where=source,
             allowed="finite numbers in every row",
             fix="complete or drop these rows, or choose other columns",

@@ -303,8 +303,8 @@ def _column(name: str, fields: list[str], lines: list[int], *, points: bool) -> 
         if not _COMMA.fullmatch(field):
             return Column(name=name, kind="text", fault=f"line {line} contains '{field[:40]}'")
         if points:
-            what = f"line {line} contains '{field[:40]}', and other numbers have decimal points"
-            return Column(name=name, kind="text", fault=what)
+            fault = f"line {line} contains '{field[:40]}', and other numbers have decimal points"
+            return Column(name=name, kind="text", fault=fault)
     values = [np.nan if field.casefold() in _GAPS else float(field.replace(",", ".")) for field in fields]
     return Column(name=name, values=np.array(values))
 
@@ -318,28 +318,28 @@ def _dates(name: str, fields: Sequence[str]) -> Column:
     moments: list[int] = []
     zoned: set[bool] = set()
     for field in fields:
-        found = _DATE.fullmatch(field)
-        if found is None:
+        match = _DATE.fullmatch(field)
+        if match is None:
             return Column(name=name, kind="date", fault="a row has no date")
         try:
-            moments.append(_nanoseconds(found))
+            moments.append(_nanoseconds(match))
         except ValueError:
             return Column(name=name, kind="date", fault=f"'{field[:40]}' is not a date")
-        zoned.add(found[8] is not None)
+        zoned.add(match[8] is not None)
     if len(zoned) > 1:
         return Column(name=name, kind="date", fault="some dates have a time zone and others have none")
     return Column(name=name, kind="date", values=np.array([(m - moments[0]) / 1e9 for m in moments]))
 
 
-def _nanoseconds(found: re.Match[str]) -> int:
+def _nanoseconds(match: re.Match[str]) -> int:
     """The time of a date since 0001-01-01, ns. Raises ``ValueError``."""
-    year, month, day = (int(found[k]) for k in (1, 2, 3))
-    hours, minutes, seconds = (int(found[k] or 0) for k in (4, 5, 6))
+    year, month, day = (int(match[k]) for k in (1, 2, 3))
+    hours, minutes, seconds = (int(match[k] or 0) for k in (4, 5, 6))
     if hours > 23 or minutes > 59 or seconds > 60:
         raise ValueError
     whole = ((date(year, month, day).toordinal() * 24 + hours) * 60 + minutes) * 60 + seconds
-    zone = found[8]
+    zone = match[8]
     if zone and zone != "Z":
         offset = int(zone[1:3]) * 60 + int(zone[-2:])
         whole -= 60 * (offset if zone[0] == "+" else -offset)
-    return whole * 10**9 + int((found[7] or "").ljust(9, "0"))
+    return whole * 10**9 + int((match[7] or "").ljust(9, "0"))

@@ -31,41 +31,41 @@ def load_table(path: str | PathLike[str], *, time: str = "", columns: Sequence[s
     ``UnknownNameError`` for a column that it does not have.
     """
     check_type(path, (str, PathLike), "the path of a file", where="load_table")
-    place = Path(fspath(path))
-    return table_of(load_columns(place), fspath(place), time, columns, strict=is_strict(place))
+    file = Path(fspath(path))
+    return table_of(load_columns(file), fspath(file), time, columns, strict=is_strict(file))
 
 
-def is_strict(place: Path) -> bool:
+def is_strict(file: Path) -> bool:
     """Whether text in a column is an error where no columns are chosen: a typing error loses no column."""
-    return place.suffix.lower() == ".csv"
+    return file.suffix.lower() == ".csv"
 
 
-def load_columns(place: Path) -> ColumnFile:
+def load_columns(file: Path) -> ColumnFile:
     """All columns of a file, with the reasons why some have no numbers. Raises ``FormatError``."""
-    check_suffix(place)
-    return columns_of(read_bounded(place, MOST_BYTES), place)
+    check_suffix(file)
+    return columns_of(read_bounded(file, MOST_BYTES), file)
 
 
-def check_suffix(place: Path) -> None:
+def check_suffix(file: Path) -> None:
     """Raise ``UnknownNameError`` for a file of another kind."""
-    if place.suffix.lower() not in _READERS:
-        raise UnknownNameError("file type", place.suffix or place.name, list(_READERS), where=str(place))
+    if file.suffix.lower() not in _READERS:
+        raise UnknownNameError("file type", file.suffix or file.name, list(_READERS), where=str(file))
 
 
-def columns_of(data: bytes, place: Path) -> ColumnFile:
+def columns_of(data: bytes, file: Path) -> ColumnFile:
     """All columns of a file with this content. Raises ``FormatError``."""
-    check_suffix(place)
+    check_suffix(file)
     try:
-        return _READERS[place.suffix.lower()](data)
+        return _READERS[file.suffix.lower()](data)
     except MissingLibraryError:
         raise
     except ArmblocksError as error:
-        raise type(error)(error.what, where=str(place), allowed=error.allowed, fix=error.fix) from None
+        raise type(error)(error.what, where=str(file), allowed=error.allowed, fix=error.fix) from None
     except Exception as error:
         raise FormatError(
             f"the file cannot be read: {error}"[:300],
-            where=str(place),
-            allowed=f"a {place.suffix} file",
+            where=str(file),
+            allowed=f"a {file.suffix} file",
             fix="write the file again with the program that created it",
         ) from None
 

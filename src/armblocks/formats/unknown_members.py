@@ -15,12 +15,12 @@ Extras = dict[str, dict[str, object]]
 
 
 def split_extras(
-    node: Node, known: tuple[str, ...], extras: Extras, place: str, key: str = ""
+    node: Node, known: tuple[str, ...], extras: Extras, section: str, key: str = ""
 ) -> dict[str, Node]:
-    """The known members; the others are stored in ``extras[place]``, under ``key`` if it is given."""
+    """The known members; the others are stored in ``extras[section]``, under ``key`` if it is not empty."""
     members, unknown = split_members(node, known)
     if unknown:
-        extras.setdefault(place, {}).update({key: unknown} if key else unknown)
+        extras.setdefault(section, {}).update({key: unknown} if key else unknown)
     return members
 
 

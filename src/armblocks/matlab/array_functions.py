@@ -28,58 +28,62 @@ MOST_ELEMENTS = 100_000
 # Whole arrays.
 
 
-def _mean(by: Arithmetic, x: Any) -> Any:
-    rows, columns = by.shape(x)
-    return by.quotient(by.total(x), by.constant(np.array([[float(rows if rows != 1 else columns)]])))
+def _mean(ops: Arithmetic, x: Any) -> Any:
+    rows, columns = ops.shape(x)
+    return ops.quotient(ops.total(x), ops.constant(np.array([[float(rows if rows != 1 else columns)]])))
 
 
-def _norm(by: Arithmetic, x: Any, kind: Any = None) -> Any:
-    if kind is None and 1 not in by.shape(x):
+def _norm(ops: Arithmetic, x: Any, kind: Any = None) -> Any:
+    if kind is None and 1 not in ops.shape(x):
         raise MismatchError("the argument is a matrix, whose norm(A) would be its largest singular value")
     if not (kind is None or (isinstance(kind, str) and kind == "fro")):
         raise MismatchError("the option is not known; allowed is 'fro'")
-    return by.length_of(x)
+    return ops.length_of(x)
 
 
-def _vectors(by: Arithmetic, name: str, count: int | None, *vectors: Any) -> list[list[Any]]:
-    found = [by.entries(vector) for vector in vectors]
-    sizes = {len(entries) for entries in found}
-    if any(1 not in by.shape(vector) for vector in vectors) or len(sizes) > 1 or (count and sizes != {count}):
-        wanted = f"vectors of {count} numbers" if count else "vectors of equal length"
-        raise MismatchError(f"the arguments of {name} are not {wanted}")
-    return found
+def _vectors(ops: Arithmetic, name: str, count: int | None, *vectors: Any) -> list[list[Any]]:
+    vectors_entries = [ops.entries(vector) for vector in vectors]
+    sizes = {len(entries) for entries in vectors_entries}
+    if (
+        any(1 not in ops.shape(vector) for vector in vectors)
+        or len(sizes) > 1
+        or (count and sizes != {count})
+    ):
+        expected = f"vectors of {count} numbers" if count else "vectors of equal length"
+        raise MismatchError(f"the arguments of {name} are not {expected}")
+    return vectors_entries
 
 
-def _dot(by: Arithmetic, a: Any, b: Any) -> Any:
-    left, right = _vectors(by, "dot", None, a, b)
+def _dot(ops: Arithmetic, a: Any, b: Any) -> Any:
+    left, right = _vectors(ops, "dot", None, a, b)
     products = [x * y for x, y in zip(left, right)]
-    return by.total(by.vector_like(products, a)) if products else by.constant(np.zeros((1, 1)))
+    return ops.total(ops.vector_like(products, a)) if products else ops.constant(np.zeros((1, 1)))
 
 
-def _cross(by: Arithmetic, a: Any, b: Any) -> Any:
-    (a1, a2, a3), (b1, b2, b3) = _vectors(by, "cross", 3, a, b)
-    return by.vector_like([a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1], a)
+def _cross(ops: Arithmetic, a: Any, b: Any) -> Any:
+    (a1, a2, a3), (b1, b2, b3) = _vectors(ops, "cross", 3, a, b)
+    return ops.vector_like([a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1], a)
 
 
-def _trace(by: Arithmetic, x: Any) -> Any:
-    rows, columns = by.shape(x)
+def _trace(ops: Arithmetic, x: Any) -> Any:
+    rows, columns = ops.shape(x)
     if rows != columns:
         raise MismatchError(f"a {rows} x {columns} matrix has no trace")
-    return by.total(by.diagonal(x)) if rows > 1 else x
+    return ops.total(ops.diagonal(x)) if rows > 1 else x
 
 
 def _count(measure: Callable[[int, int], int]) -> Callable[..., Any]:
-    def compute(by: Arithmetic, x: Any) -> Any:
-        return by.constant(np.array([[float(measure(*by.shape(x)))]]))
+    def compute(ops: Arithmetic, x: Any) -> Any:
+        return ops.constant(np.array([[float(measure(*ops.shape(x)))]]))
 
     return compute
 
 
-def _size(by: Arithmetic, x: Any, dimension: Any = None) -> Any:
+def _size(ops: Arithmetic, x: Any, dimension: Any = None) -> Any:
     if dimension is None:
-        return by.constant(np.array([[float(extent) for extent in by.shape(x)]]))
-    along = dimension_of(by, x, dimension)
-    return by.constant(np.array([[float(by.shape(x)[along - 1])]]))
+        return ops.constant(np.array([[float(extent) for extent in ops.shape(x)]]))
+    along = dimension_of(ops, x, dimension)
+    return ops.constant(np.array([[float(ops.shape(x)[along - 1])]]))
 
 
 # Arrays of a given size, from plain numbers.
@@ -120,10 +124,10 @@ def range_of(first: float, step: float, last: float) -> NDArray[np.float64]:
     end = first + count * step
     end = last if direction * (end - last) > -tolerance else end
     k = np.arange(count + 1.0)
-    found = np.where(2.0 * k <= count, first + k * step, end - (count - k) * step)
+    elements = np.where(2.0 * k <= count, first + k * step, end - (count - k) * step)
     if count > 0.0 and count % 2.0 == 0.0:
-        found[int(count) // 2] = (first + end) / 2.0
-    return found.reshape(1, -1)
+        elements[int(count) // 2] = (first + end) / 2.0
+    return elements.reshape(1, -1)
 
 
 def _linspace(first: Any, last: Any, count: Any = 100.0) -> NDArray[np.float64]:
@@ -137,53 +141,53 @@ def _linspace(first: Any, last: Any, count: Any = 100.0) -> NDArray[np.float64]:
 # Rigid motions.
 
 
-def _translation(by: Arithmetic, *given: Any) -> Any:
-    if len(given) == 1 and by.shape(given[0]) == (4, 4):
-        return by.from_rows([[entry] for entry in by.entries(given[0])[12:15]])
-    entries = [entry for value in given for entry in by.entries(value)]
-    if len(given) not in (1, 3) or len(entries) != 3:
+def _translation(ops: Arithmetic, *arguments: Any) -> Any:
+    if len(arguments) == 1 and ops.shape(arguments[0]) == (4, 4):
+        return ops.from_rows([[entry] for entry in ops.entries(arguments[0])[12:15]])
+    entries = [entry for value in arguments for entry in ops.entries(value)]
+    if len(arguments) not in (1, 3) or len(entries) != 3:
         raise MismatchError(
-            f"{len(given)} arguments with {len(entries)} elements are no translation; "
+            f"{len(arguments)} arguments with {len(entries)} elements are no translation; "
             "allowed are x, y, z, or [x y z], or a 4x4 pose"
         )
     x, y, z = entries
-    return by.from_rows([[1.0, 0.0, 0.0, x], [0.0, 1.0, 0.0, y], [0.0, 0.0, 1.0, z], [0.0, 0.0, 0.0, 1.0]])
+    return ops.from_rows([[1.0, 0.0, 0.0, x], [0.0, 1.0, 0.0, y], [0.0, 0.0, 1.0, z], [0.0, 0.0, 0.0, 1.0]])
 
 
-def _pose(by: Arithmetic, *given: Any) -> Any:
+def _pose(ops: Arithmetic, *arguments: Any) -> Any:
     """``SE3()``, ``SE3(T)``, ``SE3(x, y, z)``, ``SE3([x y z])`` of release 10: a 4x4 matrix here."""
-    if not given:
-        return by.constant(np.eye(4))
-    if len(given) == 1 and by.shape(given[0]) == (4, 4):
-        return given[0]
-    return _translation(by, *given)
+    if not arguments:
+        return ops.constant(np.eye(4))
+    if len(arguments) == 1 and ops.shape(arguments[0]) == (4, 4):
+        return arguments[0]
+    return _translation(ops, *arguments)
 
 
 def _rotation(name: str, axis: int, extent: int) -> Callable[..., Any]:
     """``rotx(angle)`` (extent 3) or ``trotx(angle)`` (extent 4) for the axes 0, 1, 2."""
 
-    def compute(by: Arithmetic, angle: Any, unit: Any = None) -> Any:
-        if by.shape(angle) != (1, 1):
+    def compute(ops: Arithmetic, angle: Any, unit: Any = None) -> Any:
+        if ops.shape(angle) != (1, 1):
             raise MismatchError(f"the angle of {name} is not one number")
         if unit is not None:
             if not (isinstance(unit, str) and unit == "deg"):
                 raise MismatchError(f"the option of {name} is not known; allowed is 'deg'")
-            angle = by.constant(np.array([[math.pi / 180]])) * angle
-        c, s = by.cosine_sine(angle)
+            angle = ops.constant(np.array([[math.pi / 180]])) * angle
+        c, s = ops.cosine_sine(angle)
         rows: list[list[Any]] = [[1.0 if i == j else 0.0 for j in range(extent)] for i in range(extent)]
         j, k = (axis + 1) % 3, (axis + 2) % 3
         rows[j][j], rows[j][k], rows[k][j], rows[k][k] = c, 0.0 - s, s, c
-        return by.from_rows(rows)
+        return ops.from_rows(rows)
 
     return compute
 
 
 def _rotations() -> Mapping[str, Function]:
-    found: dict[str, Function] = {}
+    functions: dict[str, Function] = {}
     for prefix, extent, kind in (("rot", 3, "rotation matrix"), ("trot", 4, "pose")):
         for axis, letter in enumerate("xyz"):
             name = f"{prefix}{letter}"
-            found[name] = whole(
+            functions[name] = whole(
                 "angle, 'deg'",
                 f"The {extent}x{extent} {kind} of a rotation about {letter}; "
                 "the angle in rad, with `'deg'` in degrees.",
@@ -192,7 +196,7 @@ def _rotations() -> Mapping[str, Function]:
                 optional=1,
                 takes_text=True,
             )
-    return found
+    return functions
 
 
 FUNCTIONS_OF_ARRAYS: Mapping[str, Function] = {
@@ -206,9 +210,9 @@ FUNCTIONS_OF_ARRAYS: Mapping[str, Function] = {
     "linspace": created(
         "first, last, n", "n numbers with equal distances; 100 without n.", _linspace, optional=1
     ),
-    "sum": along_dimension("The sum of the elements.", ARRAYS, lambda by, x: by.total(x), reserved=True),
+    "sum": along_dimension("The sum of the elements.", ARRAYS, lambda ops, x: ops.total(x), reserved=True),
     "prod": along_dimension(
-        "The product of the elements.", ARRAYS, lambda by, x: by.folded(lambda a, b: a * b, x)
+        "The product of the elements.", ARRAYS, lambda ops, x: ops.folded(lambda a, b: a * b, x)
     ),
     "mean": along_dimension("The mean of the elements.", ARRAYS, _mean),
     "norm": whole(
@@ -223,16 +227,16 @@ FUNCTIONS_OF_ARRAYS: Mapping[str, Function] = {
     "dot": whole("a, b", "The scalar product of two vectors.", ARRAYS, _dot),
     "cross": whole("a, b", "The vector product of two vectors with 3 elements.", ARRAYS, _cross),
     "transpose": whole(
-        "A", "The transpose, as `A'`.", ARRAYS, lambda by, x: by.transposed_matrix(x), reserved=True
+        "A", "The transpose, as `A'`.", ARRAYS, lambda ops, x: ops.transposed_matrix(x), reserved=True
     ),
     "diag": whole(
         "x",
         "The diagonal of a matrix, or the matrix with this diagonal.",
         ARRAYS,
-        lambda by, x: by.diagonal(x),
+        lambda ops, x: ops.diagonal(x),
         reserved=True,
     ),
-    "inv": whole("A", "The inverse of a matrix.", ARRAYS, lambda by, x: by.inverse(x), reserved=True),
+    "inv": whole("A", "The inverse of a matrix.", ARRAYS, lambda ops, x: ops.inverse(x), reserved=True),
     "trace": whole("A", "The sum of the diagonal.", ARRAYS, _trace),
     "numel": whole("x", "The number of elements.", ARRAYS, _count(lambda m, n: m * n)),
     "length": whole(

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.matlab.array_functions import MOST_ELEMENTS
-from armblocks.matlab.source import Place
+from armblocks.matlab.source import Location
 from armblocks.rounded_functions import power
 
 Array = NDArray[np.float64]
@@ -39,11 +39,11 @@ class Budget:
 
     left: int = MOST_WORK
 
-    def spend(self, place: Place, count: int) -> None:
+    def spend(self, location: Location, count: int) -> None:
         """Subtract ``count`` elements; raises an error if the limit is exceeded."""
         self.left -= count
         if self.left < 0:
-            raise place.error(
+            raise location.error(
                 "the script exceeds the computation limit of robot scripts",
                 allowed=f"{MOST_WORK} elements in all",
             )
@@ -88,63 +88,67 @@ def kind_of(value: object) -> str:
     return "text" if isinstance(value, str) else "an element that is not set"
 
 
-def number_of(place: Place, value: object, what: str) -> float:
+def number_of(location: Location, value: object, what: str) -> float:
     """A value that must be one number; ``what`` is its name in the error."""
     if is_array(value) and value.size == 1:
         return float(value[0, 0])
-    raise place.error(f"{what} is {kind_of(value)}", allowed="one number")
+    raise location.error(f"{what} is {kind_of(value)}", allowed="one number")
 
 
-def count_of(place: Place, value: object, what: str, most: int = MOST_ELEMENTS) -> int:
-    """A value that must be a whole number from 0 to ``most``."""
-    number = number_of(place, value, what)
-    if not (0 <= number <= most) or number != int(number):
-        raise place.error(f"{what} is {number:g}", allowed=f"a whole number from 0 to {most}")
+def count_of(location: Location, value: object, what: str, maximum: int = MOST_ELEMENTS) -> int:
+    """A value that must be a whole number from 0 to ``maximum``."""
+    number = number_of(location, value, what)
+    if not (0 <= number <= maximum) or number != int(number):
+        raise location.error(f"{what} is {number:g}", allowed=f"a whole number from 0 to {maximum}")
     return int(number)
 
 
-def text_of(place: Place, value: object, what: str) -> str:
+def text_of(location: Location, value: object, what: str) -> str:
     """A value that must be text."""
     if isinstance(value, str):
         return value
-    raise place.error(f"{what} is {kind_of(value)}", allowed="text in quotes")
+    raise location.error(f"{what} is {kind_of(value)}", allowed="text in quotes")
 
 
-def array_of(place: Place, value: object, what: str) -> Array:
+def array_of(location: Location, value: object, what: str) -> Array:
     """A value that must be a matrix; logical values become numbers."""
     if is_array(value):
         return np.asarray(value, dtype=np.float64)
-    raise place.error(f"{what} is {kind_of(value)}", allowed="numbers")
+    raise location.error(f"{what} is {kind_of(value)}", allowed="numbers")
 
 
-def check_size(place: Place, rows: int, columns: int) -> None:
+def check_size(location: Location, rows: int, columns: int) -> None:
     """Raise an error for a matrix with too many elements."""
     if rows * columns > MOST_ELEMENTS:
-        raise place.error(
+        raise location.error(
             f"a matrix would have {rows}x{columns} elements", allowed=f"at most {MOST_ELEMENTS} elements"
         )
 
 
-def operate(place: Place, budget: Budget, operator: str, left: object, right: object) -> Array:
+def operate(location: Location, budget: Budget, operator: str, left: object, right: object) -> Array:
     """``left operator right`` of arithmetic or a comparison."""
-    a = array_of(place, left, f"the left operand of '{operator}'")
-    b = array_of(place, right, f"the right operand of '{operator}'")
+    a = array_of(location, left, f"the left operand of '{operator}'")
+    b = array_of(location, right, f"the right operand of '{operator}'")
     with np.errstate(all="ignore"):
         if operator in _ELEMENTWISE or a.size == 1 == b.size:
-            return _elementwise(place, budget, operator.lstrip("."), a, b)
+            return _elementwise(location, budget, operator.lstrip("."), a, b)
         if operator == "*":
             return (
-                _elementwise(place, budget, "*", a, b)
+                _elementwise(location, budget, "*", a, b)
                 if 1 in (a.size, b.size)
-                else _matmul(place, budget, a, b)
+                else _matmul(location, budget, a, b)
             )
         if operator == "/":
             return (
-                _elementwise(place, budget, "/", a, b) if b.size == 1 else _solve(place, budget, b.T, a.T).T
+                _elementwise(location, budget, "/", a, b)
+                if b.size == 1
+                else _solve(location, budget, b.T, a.T).T
             )
         if operator == "\\":
-            return _elementwise(place, budget, "\\", a, b) if a.size == 1 else _solve(place, budget, a, b)
-        return _matrix_power(place, budget, a, b)
+            return (
+                _elementwise(location, budget, "\\", a, b) if a.size == 1 else _solve(location, budget, a, b)
+            )
+        return _matrix_power(location, budget, a, b)
 
 
 _COMPARED: dict[str, Callable[[Array, Array], NDArray[np.bool_]]] = {
@@ -166,51 +170,51 @@ _SCALAR_OPERATIONS: dict[str, Callable[[Array, Array], Array]] = {
 }
 
 
-def _elementwise(place: Place, budget: Budget, operator: str, a: Array, b: Array) -> Array:
+def _elementwise(location: Location, budget: Budget, operator: str, a: Array, b: Array) -> Array:
     if a.shape != b.shape and 1 not in (a.size, b.size):
-        raise place.error(
+        raise location.error(
             f"'{operator}' of {kind_of(a)} and {kind_of(b)}", allowed="equal sizes, or a number on one side"
         )
-    budget.spend(place, max(a.size, b.size) * (ROUNDED_WORK if operator == "^" else 1))
+    budget.spend(location, max(a.size, b.size) * (ROUNDED_WORK if operator == "^" else 1))
     if operator == "^" and np.any((a < 0) & (b != np.floor(b))):
-        raise place.error("a root of a negative number is complex", allowed="real numbers")
+        raise location.error("a root of a negative number is complex", allowed="real numbers")
     if operator in _COMPARED:
         return cast("Array", _COMPARED[operator](a, b))
     return _SCALAR_OPERATIONS[operator](a, b)
 
 
-def _matmul(place: Place, budget: Budget, a: Array, b: Array) -> Array:
+def _matmul(location: Location, budget: Budget, a: Array, b: Array) -> Array:
     if a.shape[1] != b.shape[0]:
-        raise place.error(
+        raise location.error(
             f"'*' of {kind_of(a)} and {kind_of(b)}",
             allowed="as many columns on the left as rows on the right",
         )
-    check_size(place, a.shape[0], b.shape[1])
-    budget.spend(place, a.size * b.shape[1] // 8 + a.shape[0] * b.shape[1])
+    check_size(location, a.shape[0], b.shape[1])
+    budget.spend(location, a.size * b.shape[1] // 8 + a.shape[0] * b.shape[1])
     return _product(a, b)
 
 
-def _solve(place: Place, budget: Budget, a: Array, b: Array) -> Array:
+def _solve(location: Location, budget: Budget, a: Array, b: Array) -> Array:
     n = a.shape[0]
     if a.shape != (n, n) or b.shape[0] != n:
-        raise place.error(f"division by {kind_of(a)}", allowed="a number, or a square matrix that fits")
-    budget.spend(place, n * n * (n + b.shape[1]) // 8 + b.size)
+        raise location.error(f"division by {kind_of(a)}", allowed="a number, or a square matrix that fits")
+    budget.spend(location, n * n * (n + b.shape[1]) // 8 + b.size)
     try:
         return np.asarray(np.linalg.solve(a, b), dtype=np.float64)
     except np.linalg.LinAlgError:
-        raise place.error("division by a singular matrix", allowed="a matrix with an inverse") from None
+        raise location.error("division by a singular matrix", allowed="a matrix with an inverse") from None
 
 
-def _matrix_power(place: Place, budget: Budget, a: Array, b: Array) -> Array:
+def _matrix_power(location: Location, budget: Budget, a: Array, b: Array) -> Array:
     exponent = float(b[0, 0]) if b.size == 1 else math.nan
     if a.shape[0] != a.shape[1] or exponent not in EXPONENTS:
-        raise place.error(
+        raise location.error(
             f"'^' of {kind_of(a)} and {kind_of(b)}",
             allowed=POWERS_OF_MATRICES,
             fix="write .^ for powers element by element",
         )
-    budget.spend(place, a.size * (a.shape[0] + 8))
-    factor = _solve(place, budget, a, np.eye(len(a))) if exponent < 0 else a
+    budget.spend(location, a.size * (a.shape[0] + 8))
+    factor = _solve(location, budget, a, np.eye(len(a))) if exponent < 0 else a
     return reduce(_product, [factor] * abs(int(exponent)), np.eye(len(a)))
 
 
@@ -223,47 +227,47 @@ def _product(a: Array, b: Array) -> Array:
     return total
 
 
-def stacked(place: Place, budget: Budget, rows: Sequence[Sequence[object]]) -> Array:
+def stacked(location: Location, budget: Budget, rows: Sequence[Sequence[object]]) -> Array:
     """``[a b; c d]`` of arrays."""
     bands: list[Array] = []
     for row in rows:
-        parts = [array_of(place, value, "an element of a matrix") for value in row]
+        parts = [array_of(location, value, "an element of a matrix") for value in row]
         parts = [part for part in parts if part.size] or parts[:1]
         if len({part.shape[0] for part in parts}) > 1:
-            raise place.error("the elements of a row differ in height", allowed="equal heights in a row")
+            raise location.error("the elements of a row differ in height", allowed="equal heights in a row")
         bands.append(np.hstack(parts))
     bands = [band for band in bands if band.size]
     if not bands:
         return empty()
     widths = [band.shape[1] for band in bands]
     if len(set(widths)) > 1:
-        raise place.error(
+        raise location.error(
             f"the rows of the matrix have {', '.join(map(str, widths[:8]))} elements",
             allowed="as many elements in every row",
             fix="complete the short row, or put '...' at the end of a continued line",
         )
-    check_size(place, sum(band.shape[0] for band in bands), widths[0])
-    budget.spend(place, sum(band.size for band in bands))
-    found = np.vstack(bands)
+    check_size(location, sum(band.shape[0] for band in bands), widths[0])
+    budget.spend(location, sum(band.size for band in bands))
+    matrix = np.vstack(bands)
     logical = all(is_logical(value) for row in rows for value in row)
-    return cast("Array", found != 0.0) if logical else found
+    return cast("Array", matrix != 0.0) if logical else matrix
 
 
-def index_of(place: Place, value: object, most: int, shown: str = "") -> int:
+def index_of(location: Location, value: object, maximum: int, shown: str = "") -> int:
     """A 1-based index as a 0-based one; ``shown`` is the name of the indexed value in messages."""
-    number = number_of(place, value, "an index")
-    if not (1 <= number <= most) or number != int(number):
-        raise place.error(
+    number = number_of(location, value, "an index")
+    if not (1 <= number <= maximum) or number != int(number):
+        raise location.error(
             f"the index {number:g} is not possible here",
-            allowed=f"{shown}(1) to {shown}({most})"
-            if shown and most
-            else f"a whole number from 1 to {most}",
+            allowed=f"{shown}(1) to {shown}({maximum})"
+            if shown and maximum
+            else f"a whole number from 1 to {maximum}",
         )
     return int(number) - 1
 
 
 def positions(
-    place: Place, shape: tuple[int, int], indices: Sequence[object], shown: str
+    location: Location, shape: tuple[int, int], indices: Sequence[object], shown: str
 ) -> NDArray[np.intp]:
     """The positions that ``array(i)`` or ``array(i, j)`` selects, counted column by column from 0.
 
@@ -272,54 +276,54 @@ def positions(
     rows, columns = shape
     extents = {1: (rows * columns,), 2: shape}.get(len(indices))
     if extents is None:
-        raise place.error(f"{len(indices)} indices are given", allowed="1 or 2")
-    chosen = [_chosen(place, index, extent, shown) for index, extent in zip(indices, extents)]
+        raise location.error(f"{len(indices)} indices are given", allowed="1 or 2")
+    chosen = [_chosen(location, index, extent, shown) for index, extent in zip(indices, extents)]
     if rows * columns == 0 and any(part.size for part in chosen):
-        raise place.error("an element of an empty matrix is read", allowed="elements that exist")
+        raise location.error("an element of an empty matrix is read", allowed="elements that exist")
     if len(chosen) == 2:
-        check_size(place, chosen[0].size, chosen[1].size)
+        check_size(location, chosen[0].size, chosen[1].size)
         return chosen[0].reshape(-1, 1) + rows * chosen[1].reshape(1, -1)
     index = indices[0]
     if index is None:
         return chosen[0].reshape(-1, 1)
-    given = index.shape if is_array(index) else (0, 0)
+    selected_shape = index.shape if is_array(index) else (0, 0)
     if is_logical(index):
-        given = (1, chosen[0].size) if given[0] == 1 else (chosen[0].size, 1)
-    if 1 in shape and rows * columns != 1 and (1 in given or 0 in given):
+        selected_shape = (1, chosen[0].size) if selected_shape[0] == 1 else (chosen[0].size, 1)
+    if 1 in shape and rows * columns != 1 and (1 in selected_shape or 0 in selected_shape):
         return chosen[0].reshape((-1, 1) if columns == 1 else (1, -1))
-    return chosen[0].reshape(given, order="F")
+    return chosen[0].reshape(selected_shape, order="F")
 
 
-def _chosen(place: Place, index: object, extent: int, shown: str) -> NDArray[np.intp]:
+def _chosen(location: Location, index: object, extent: int, shown: str) -> NDArray[np.intp]:
     if index is None:
         return np.arange(extent)
     if is_logical(index):
         chosen = np.flatnonzero(index.ravel(order="F"))
         if chosen.size and chosen[-1] >= extent:
-            index_of(place, scalar(float(chosen[-1] + 1)), extent, shown)
+            index_of(location, scalar(float(chosen[-1] + 1)), extent, shown)
         return chosen
-    numbers = array_of(place, index, "an index").ravel(order="F")
-    found = [index_of(place, scalar(float(number)), max(extent, 1), shown) for number in numbers]
-    return np.array(found, dtype=np.intp)
+    numbers = array_of(location, index, "an index").ravel(order="F")
+    indices = [index_of(location, scalar(float(number)), max(extent, 1), shown) for number in numbers]
+    return np.array(indices, dtype=np.intp)
 
 
-def with_element(place: Place, array: Array, indices: Sequence[object], number: float) -> Array:
+def with_element(location: Location, array: Array, indices: Sequence[object], number: float) -> Array:
     """A copy of ``array`` with one element set; it grows with zeros where needed."""
     if len(indices) == 1:
         column = array.shape[1] == 1 and array.shape[0] > 1
-        flat = index_of(place, indices[0], MOST_ELEMENTS)
+        flat = index_of(location, indices[0], MOST_ELEMENTS)
         if min(array.shape, default=0) > 1:
             if flat >= array.size:
-                raise place.error(f"the matrix has no element {flat + 1}", allowed=f"1 to {array.size}")
+                raise location.error(f"the matrix has no element {flat + 1}", allowed=f"1 to {array.size}")
             i, j = flat % array.shape[0], flat // array.shape[0]
         else:
             i, j = (flat, 0) if column else (0, flat)
     elif len(indices) == 2:
-        i, j = (index_of(place, index, MOST_ELEMENTS) for index in indices)
+        i, j = (index_of(location, index, MOST_ELEMENTS) for index in indices)
     else:
-        raise place.error(f"{len(indices)} indices are given", allowed="1 or 2")
+        raise location.error(f"{len(indices)} indices are given", allowed="1 or 2")
     rows, columns = max(array.shape[0], i + 1), max(array.shape[1], j + 1)
-    check_size(place, rows, columns)
+    check_size(location, rows, columns)
     grown = np.zeros((rows, columns))
     grown[: array.shape[0], : array.shape[1]] = array
     grown[i, j] = number

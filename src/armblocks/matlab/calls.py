@@ -10,45 +10,47 @@ from numpy.typing import NDArray
 
 from armblocks.matlab.function_kinds import Arithmetic, Function, MismatchError
 from armblocks.matlab.functions import TABLE
-from armblocks.matlab.source import Place
+from armblocks.matlab.source import Location
 
 
 def call_function(
-    by: Arithmetic,
-    place: Place,
+    ops: Arithmetic,
+    location: Location,
     name: str,
     arguments: Sequence[Any],
     constant: Callable[[Any], NDArray[np.float64] | None],
 ) -> Any:
     """The value of ``name(arguments)`` of a function in the table, with the given arithmetic.
 
-    ``constant`` returns the numbers of an argument, or ``None`` where it depends on symbols. Raises the error
-    of the place for arguments that do not fit.
+    ``constant`` returns the numbers of an argument, or ``None`` where it depends on symbols. Raises an error
+    at ``location`` for arguments that do not fit.
     """
     function = TABLE[name]
-    _check_count(place, name, function, len(arguments))
+    _check_count(location, name, function, len(arguments))
     try:
         if not function.creates:
-            return function.compute(by, *arguments)
+            return function.compute(ops, *arguments)
         numbers = [constant(argument) for argument in arguments]
         if any(number is None for number in numbers):
-            raise place.error(
-                f"the size of an array made by {name} is not constant", allowed="constant numbers"
+            raise location.error(
+                f"the size of an array created by {name} is not constant", allowed="constant numbers"
             )
         with np.errstate(all="ignore"):
-            return by.constant(function.compute(*numbers))
+            return ops.constant(function.compute(*numbers))
     except MismatchError as mismatch:
-        raise place.error(f"{name}: {mismatch}", allowed=f"{name}({function.arguments})") from None
+        raise location.error(f"{name}: {mismatch}", allowed=f"{name}({function.arguments})") from None
 
 
-def _check_count(place: Place, name: str, function: Function, count: int) -> None:
+def _check_count(location: Location, name: str, function: Function, count: int) -> None:
     if function.fewest <= count <= function.most:
         return
     if count == 0:
-        raise place.error(f"the function '{name}' has no arguments", allowed=f"{name}({function.arguments})")
-    few, most = function.fewest, function.most
-    allowed = f"{few}" if few == most else f"{few} to {most}"
-    raise place.error(
+        raise location.error(
+            f"the function '{name}' has no arguments", allowed=f"{name}({function.arguments})"
+        )
+    minimum, maximum = function.fewest, function.most
+    allowed = f"{minimum}" if minimum == maximum else f"{minimum} to {maximum}"
+    raise location.error(
         f"{name} is called with {count} argument{'s' * (count != 1)}",
-        allowed=f"{allowed}: {name}({function.arguments})" if most else "no arguments",
+        allowed=f"{allowed}: {name}({function.arguments})" if maximum else "no arguments",
     )

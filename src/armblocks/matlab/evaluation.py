@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Generic, Protocol, TypeVar
 
 from armblocks.matlab.operators import LOGIC
-from armblocks.matlab.source import Place, Source
+from armblocks.matlab.source import Location, Source
 from armblocks.matlab.syntax import (
     All,
     Braces,
@@ -31,73 +31,74 @@ V = TypeVar("V")
 
 
 class Values(Protocol[V]):
-    """The operations on one kind of values. Each raises the error of ``place`` for values that do not fit."""
+    """The operations on one kind of values. Each raises an error at ``location`` for values that do not
+    fit."""
 
     def number(self, value: float) -> V:
         """A number."""
         ...
 
-    def text(self, place: Place, value: str) -> V:
+    def text(self, location: Location, value: str) -> V:
         """A text in quotes."""
         ...
 
-    def negative(self, place: Place, value: V) -> V:
+    def negative(self, location: Location, value: V) -> V:
         """``-value``"""
         ...
 
-    def logical_not(self, place: Place, value: V) -> V:
+    def logical_not(self, location: Location, value: V) -> V:
         """``~value``: 1 where the value is 0, else 0."""
         ...
 
-    def operate(self, place: Place, operator: str, left: V, right: V) -> V:
+    def operate(self, location: Location, operator: str, left: V, right: V) -> V:
         """``left operator right`` of arithmetic or a comparison."""
         ...
 
-    def logic(self, place: Place, operator: str, values: Sequence[V]) -> V:
+    def logic(self, location: Location, operator: str, values: Sequence[V]) -> V:
         """All values joined by one of ``&& || & |``."""
         ...
 
-    def matrix(self, place: Place, rows: Sequence[Sequence[V]]) -> V:
+    def matrix(self, location: Location, rows: Sequence[Sequence[V]]) -> V:
         """``[a b; c d]``"""
         ...
 
-    def cell(self, place: Place, elements: Sequence[V]) -> V:
+    def cell(self, location: Location, elements: Sequence[V]) -> V:
         """``{a, b}``"""
         ...
 
-    def range(self, place: Place, parts: Sequence[V]) -> V:
+    def range(self, location: Location, parts: Sequence[V]) -> V:
         """``first:last`` or ``first:step:last``"""
         ...
 
-    def transposed(self, place: Place, value: V) -> V:
+    def transposed(self, location: Location, value: V) -> V:
         """``value'``"""
         ...
 
-    def index(self, place: Place, value: V, written: Expression) -> V:
+    def index(self, location: Location, value: V, written: Expression) -> V:
         """The value of an index that is ``written`` so."""
         ...
 
-    def element(self, place: Place, value: V, indices: Sequence[V | None], shown: str) -> V:
+    def element(self, location: Location, value: V, indices: Sequence[V | None], shown: str) -> V:
         """``value(indices)``, where ``None`` is ``:``; ``shown`` is its name in messages, or empty."""
         ...
 
-    def last_index(self, place: Place, value: V, position: int, count: int) -> V:
+    def last_index(self, location: Location, value: V, position: int, count: int) -> V:
         """``end`` as index ``position`` of ``count`` indices."""
         ...
 
-    def cell_element(self, place: Place, value: V, indices: Sequence[V | None]) -> V:
+    def cell_element(self, location: Location, value: V, indices: Sequence[V | None]) -> V:
         """``value{indices}``"""
         ...
 
-    def field(self, place: Place, value: V, name: str) -> V:
+    def field(self, location: Location, value: V, name: str) -> V:
         """``value.name``"""
         ...
 
-    def check_function(self, place: Place, name: str, called: bool) -> None:
+    def check_function(self, location: Location, name: str, called: bool) -> None:
         """Raise an error unless there is a function of this name; ``called`` with arguments or not."""
         ...
 
-    def call(self, place: Place, name: str, arguments: Sequence[V], written: Sequence[Expression]) -> V:
+    def call(self, location: Location, name: str, arguments: Sequence[V], written: Sequence[Expression]) -> V:
         """``name(arguments)`` of a function; ``written`` are the syntax trees of the arguments."""
         ...
 
@@ -114,74 +115,76 @@ class Evaluator(Generic[V]):
 
     def value(self, expression: Expression) -> V:
         """The value of an expression."""
-        values, place = self._values, self._source.place(expression.at)
+        values, location = self._values, self._source.location(expression.at)
         match expression:
             case Number(value=number):
                 return values.number(number)
             case Text(value=text):
-                return values.text(place, text)
+                return values.text(location, text)
             case Name(name=name):
-                return self._name(place, name)
+                return self._name(location, name)
             case Chain():
                 return self._chain(expression)
             case Prefix(operator=operator, operand=operand):
                 apply = values.negative if operator == "-" else values.logical_not
-                return apply(place, self.value(operand))
+                return apply(location, self.value(operand))
             case Postfix():
                 return self._postfix(expression)
             case Matrix(rows=rows):
-                return values.matrix(place, [[self.value(element) for element in row] for row in rows])
+                return values.matrix(location, [[self.value(element) for element in row] for row in rows])
             case Range(parts=parts):
-                return values.range(place, [self.value(part) for part in parts])
+                return values.range(location, [self.value(part) for part in parts])
             case CellLiteral(elements=elements):
-                return values.cell(place, [self.value(element) for element in elements])
+                return values.cell(location, [self.value(element) for element in elements])
             case End() if self._indexed:
-                return values.last_index(place, *self._indexed[-1])
+                return values.last_index(location, *self._indexed[-1])
             case End() | All():
-                raise place.error("'end' and ':' are used outside of an index", allowed="v(end), A(:, 1)")
+                raise location.error("'end' and ':' are used outside of an index", allowed="v(end), A(:, 1)")
 
     def indices(self, value: V, arguments: Sequence[Expression]) -> list[V | None]:
         """The indices of ``value``: ``end`` is its last element, ``None`` stands for ``:``."""
-        found: list[V | None] = []
+        values: list[V | None] = []
         for position, argument in enumerate(arguments):
             self._indexed.append((value, position, len(arguments)))
-            found.append(None if isinstance(argument, All) else self._index(argument))
+            values.append(None if isinstance(argument, All) else self._index(argument))
             self._indexed.pop()
-        return found
+        return values
 
     def _index(self, argument: Expression) -> V:
-        return self._values.index(self._source.place(argument.at), self.value(argument), argument)
+        return self._values.index(self._source.location(argument.at), self.value(argument), argument)
 
-    def _name(self, place: Place, name: str) -> V:
-        found = self._variables.get(name)
-        if found is not None:
-            return found
-        self._values.check_function(place, name, called=False)
-        return self._values.call(place, name, (), ())
+    def _name(self, location: Location, name: str) -> V:
+        value = self._variables.get(name)
+        if value is not None:
+            return value
+        self._values.check_function(location, name, called=False)
+        return self._values.call(location, name, (), ())
 
     def _chain(self, chain: Chain) -> V:
         values = self._values
         if chain.rest[0].operator in LOGIC:
             operands = [chain.first, *(operation.operand for operation in chain.rest)]
-            place = self._source.place(chain.rest[0].at)
-            return values.logic(place, chain.rest[0].operator, [self.value(operand) for operand in operands])
+            location = self._source.location(chain.rest[0].at)
+            return values.logic(
+                location, chain.rest[0].operator, [self.value(operand) for operand in operands]
+            )
         value = self.value(chain.first)
         for operation in chain.rest:
             operand = self.value(operation.operand)
-            value = values.operate(self._source.place(operation.at), operation.operator, value, operand)
+            value = values.operate(self._source.location(operation.at), operation.operator, value, operand)
         return value
 
     def _postfix(self, expression: Postfix) -> V:
         base, steps = expression.base, expression.steps
-        place = self._source.place(base.at)
+        location = self._source.location(base.at)
         shown = base.name if isinstance(base, Name) else ""
         if isinstance(base, Name) and base.name not in self._variables:
             arguments: tuple[Expression, ...] = ()
             if isinstance(steps[0], Parentheses):
                 arguments, steps = steps[0].arguments, steps[1:]
-            self._values.check_function(place, base.name, bool(arguments))
-            given = [self.value(argument) for argument in arguments]
-            value = self._values.call(place, base.name, given, arguments)
+            self._values.check_function(location, base.name, bool(arguments))
+            values = [self.value(argument) for argument in arguments]
+            value = self._values.call(location, base.name, values, arguments)
             shown = ""
         else:
             value = self.value(base)
@@ -190,13 +193,13 @@ class Evaluator(Generic[V]):
         return value
 
     def _step(self, value: V, step: Step, shown: str) -> V:
-        place = self._source.place(step.at)
+        location = self._source.location(step.at)
         match step:
             case Transpose():
-                return self._values.transposed(place, value)
+                return self._values.transposed(location, value)
             case Field(name=name):
-                return self._values.field(place, value, name)
+                return self._values.field(location, value, name)
             case Braces(arguments=arguments):
-                return self._values.cell_element(place, value, self.indices(value, arguments))
+                return self._values.cell_element(location, value, self.indices(value, arguments))
             case Parentheses(arguments=arguments):
-                return self._values.element(place, value, self.indices(value, arguments), shown)
+                return self._values.element(location, value, self.indices(value, arguments), shown)

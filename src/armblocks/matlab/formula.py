@@ -38,7 +38,9 @@ class Formula:
             )
         self._source = formula_source(text, where)
         if not text.strip():
-            raise self._source.place(Position(1, 0)).error("the formula is empty", fix="write an expression")
+            raise self._source.location(Position(1, 0)).error(
+                "the formula is empty", fix="write an expression"
+            )
         self._tree = parse_formula(self._source)
 
     @property
@@ -52,8 +54,10 @@ class Formula:
     @property
     def readable_names(self) -> frozenset[str]:
         """:attr:`names`, and the functions that a parameter of the same name would hide."""
-        found = (name for name, called in _names(self._tree) if _needs_value(name, called) or name in TABLE)
-        return frozenset(name for name in found if name not in TABLE or not TABLE[name].reserved)
+        readable = (
+            name for name, called in _names(self._tree) if _needs_value(name, called) or name in TABLE
+        )
+        return frozenset(name for name in readable if name not in TABLE or not TABLE[name].reserved)
 
     @property
     def unknown_functions(self) -> frozenset[str]:
@@ -73,22 +77,22 @@ class Formula:
         At equality the offset gives the value of the comparison. For a formula without comparisons the result
         is its value.
         """
-        found: list[SX] = []
+        differences: list[SX] = []
         for level in levels(self._tree):
             for part in level:
                 if isinstance(part, Chain) and part.rest[0].operator in COMPARISONS:
                     left, right = (self._value(side, names) for side in parts_of(part))
-                    found.append(left - right + _SIDES.get(part.rest[0].operator, 0.0))
-        return found or [self.trace(names)]
+                    differences.append(left - right + _SIDES.get(part.rest[0].operator, 0.0))
+        return differences or [self.trace(names)]
 
     def _value(self, expression: Expression, names: Mapping[str, SX]) -> SX:
         variables: Mapping[str, Symbol] = dict(names)
-        found = Evaluator(self._source, Symbols(names), variables).value(expression)
-        if isinstance(found, str):
-            raise self._source.place(expression.at).error(
-                f"the text '{found[:40]}' is not a number", allowed="numbers and names without quotes"
+        value = Evaluator(self._source, Symbols(names), variables).value(expression)
+        if isinstance(value, str):
+            raise self._source.location(expression.at).error(
+                f"the text '{value[:40]}' is not a number", allowed="numbers and names without quotes"
             )
-        return found.value if isinstance(found, Oriented) else found
+        return value.value if isinstance(value, Oriented) else value
 
 
 def _names(tree: Expression) -> Iterator[tuple[str, bool]]:

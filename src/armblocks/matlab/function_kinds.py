@@ -15,7 +15,7 @@ ROUNDING, CHOICE, ARRAYS, GEOMETRY = "Rounding and signs", "Comparison and logic
 
 
 class MismatchError(Exception):
-    """Arguments that a function does not accept. The caller adds the place."""
+    """Arguments that a function does not accept. The caller adds the location."""
 
 
 class Arithmetic(Protocol):
@@ -54,11 +54,11 @@ class Arithmetic(Protocol):
         """Absolute value."""
         ...
 
-    def least(self, left: Any, right: Any) -> Any:
+    def minimum(self, left: Any, right: Any) -> Any:
         """The smaller one; the other where one is NaN."""
         ...
 
-    def greatest(self, left: Any, right: Any) -> Any:
+    def maximum(self, left: Any, right: Any) -> Any:
         """The larger one; the other where one is NaN."""
         ...
 
@@ -177,8 +177,8 @@ class Function:
 def constant(value: float, meaning: str, *, reserved: bool = False) -> Function:
     """A number with a name."""
 
-    def compute(by: Arithmetic) -> Any:
-        return by.constant(np.array([[value]]))
+    def compute(ops: Arithmetic) -> Any:
+        return ops.constant(np.array([[value]]))
 
     return Function(
         arguments="",
@@ -199,7 +199,7 @@ def rounded(
         "x",
         meaning,
         group,
-        lambda by, x: by.elementary(name, x),
+        lambda ops, x: ops.elementary(name, x),
         real_from=real_from,
         real_to=real_to,
         reserved=True,
@@ -207,13 +207,13 @@ def rounded(
     )
 
 
-def elementwise(arguments: str, meaning: str, group: str, compute: Compute, **more: Any) -> Function:
+def elementwise(arguments: str, meaning: str, group: str, compute: Compute, **options: Any) -> Function:
     """A function of these arguments, element by element."""
-    return whole(arguments, meaning, group, compute, elementwise=True, **more)
+    return whole(arguments, meaning, group, compute, elementwise=True, **options)
 
 
 def whole(
-    arguments: str, meaning: str, group: str, compute: Compute, *, optional: int = 0, **more: Any
+    arguments: str, meaning: str, group: str, compute: Compute, *, optional: int = 0, **options: Any
 ) -> Function:
     """A function of whole arrays; the last ``optional`` arguments may be missing."""
     count = arguments.count(",") + 1
@@ -224,35 +224,37 @@ def whole(
         fewest=count - optional,
         most=count,
         compute=compute,
-        **more,
+        **options,
     )
 
 
 def along_dimension(
-    meaning: str, group: str, compute: Callable[[Arithmetic, Any], Any], **more: Any
+    meaning: str, group: str, compute: Callable[[Arithmetic, Any], Any], **options: Any
 ) -> Function:
     """A function that reduces a vector to a number, and a matrix by column or along a dimension."""
 
-    def reduced(by: Arithmetic, x: Any, dimension: Any = None) -> Any:
+    def reduced(ops: Arithmetic, x: Any, dimension: Any = None) -> Any:
         if dimension is None:
-            return compute(by, x)
-        along, shape = dimension_of(by, x, dimension), by.shape(x)
+            return compute(ops, x)
+        along, shape = dimension_of(ops, x, dimension), ops.shape(x)
         if shape[along - 1] == 1 and shape != (1, 1):  # arrays of numbers only: each element by itself
-            return np.array([compute(by, np.array([[entry]])) for entry in by.entries(x)]).reshape(shape)
-        return compute(by, x) if along == 1 else by.transposed_matrix(compute(by, by.transposed_matrix(x)))
+            return np.array([compute(ops, np.array([[entry]])) for entry in ops.entries(x)]).reshape(shape)
+        return (
+            compute(ops, x) if along == 1 else ops.transposed_matrix(compute(ops, ops.transposed_matrix(x)))
+        )
 
     whole_meaning = f"{meaning[:-1]}; of a matrix by column, with `(A, 2)` by row."
-    return whole("x, k", whole_meaning, group, reduced, optional=1, **more)
+    return whole("x, k", whole_meaning, group, reduced, optional=1, **options)
 
 
-def dimension_of(by: Arithmetic, x: Any, dimension: Any) -> int:
+def dimension_of(ops: Arithmetic, x: Any, dimension: Any) -> int:
     """1 for the rows, 2 for the columns. Raises :class:`MismatchError` for other values."""
-    found = by.constant_number(dimension)
-    if found not in (1.0, 2.0):
+    number = ops.constant_number(dimension)
+    if number not in (1.0, 2.0):
         raise MismatchError("the dimension is not 1 or 2")
-    if not by.has_orientation and 1 in by.shape(x) and by.shape(x) != (1, 1):
+    if not ops.has_orientation and 1 in ops.shape(x) and ops.shape(x) != (1, 1):
         raise MismatchError("a vector of a formula is neither row nor column: leave out the dimension")
-    return int(found)
+    return int(number)
 
 
 def created(

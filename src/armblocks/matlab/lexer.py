@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 from armblocks.errors import ArmblocksError
 from armblocks.matlab.operators import ALTERNATIVES, INFIX
-from armblocks.matlab.source import Place, Position, Source
+from armblocks.matlab.source import Location, Position, Source
 
 
 class Kind(enum.Enum):
@@ -92,15 +92,15 @@ class _Lexer:
             )
         if self.brackets:
             bracket, at = self.brackets[-1]
-            raise self.source.place(at).error(
+            raise self.source.location(at).error(
                 f"'{bracket}' is never closed", allowed="brackets in pairs", fix=f"add '{_CLOSING[bracket]}'"
             )
         last = Position(len(self.source.lines), len(self.source.lines[-1].rstrip()) + 1)
         self.tokens += [Token(Kind.END, "\n", last), Token(Kind.EOF, "", last)]
         return self.tokens
 
-    def _at(self, line: int, column: int) -> Place:
-        return self.source.place(Position(line, column))
+    def _at(self, line: int, column: int) -> Location:
+        return self.source.location(Position(line, column))
 
     def _block_comment(self, number: int, text: str) -> bool:
         """Whether the line belongs to a block comment ``%{ … %}``; they nest."""
@@ -147,29 +147,29 @@ class _Lexer:
         """Read one token and return where the next one starts."""
         character = text[position]
         at = Position(number, position + 1)
-        if (found := _NUMBER.match(text, position)) is not None:
-            return self._number(at, text, found, spaced)
-        if (found := _NAME.match(text, position)) is not None and found.group().isidentifier():
-            if self.source.is_file and found.group() in COMMANDS and self._starts_statement():
-                after = text[found.end() :].lstrip()
+        if (match := _NUMBER.match(text, position)) is not None:
+            return self._number(at, text, match, spaced)
+        if (match := _NAME.match(text, position)) is not None and match.group().isidentifier():
+            if self.source.is_file and match.group() in COMMANDS and self._starts_statement():
+                after = text[match.end() :].lstrip()
                 if not after.startswith("(") and not re.match(r"=(?!=)", after):
                     return self._command(at, text, position)
-            self.tokens.append(Token(Kind.NAME, found.group(), at, spaced))
-            return found.end()
+            self.tokens.append(Token(Kind.NAME, match.group(), at, spaced))
+            return match.end()
         if character == '"' or (character == "'" and not self._is_transpose(spaced)):
             return self._string(at, text, position, spaced)
-        if (found := _OPERATOR.match(text, position)) is not None:
-            self._operator(at, ALTERNATIVES.get(found.group(), found.group()), spaced)
-            return found.end()
-        raise self.source.place(at).error(
+        if (match := _OPERATOR.match(text, position)) is not None:
+            self._operator(at, ALTERNATIVES.get(match.group(), match.group()), spaced)
+            return match.end()
+        raise self.source.location(at).error(
             f"the character {character!r} is not allowed in MATLAB outside strings"
         )
 
-    def _number(self, at: Position, text: str, found: re.Match[str], spaced: bool) -> int:
-        written = found.group()
-        after = text[found.end() : found.end() + 1]
+    def _number(self, at: Position, text: str, match: re.Match[str], spaced: bool) -> int:
+        written = match.group()
+        after = text[match.end() : match.end() + 1]
         if after.isalnum() or after == "_":
-            raise self._no_number(at, re.match(r"[\w.]+", text[found.start() :]))
+            raise self._no_number(at, re.match(r"[\w.]+", text[match.start() :]))
         digits = written.replace("_", "")
         try:
             base = {"x": 16, "b": 2, "o": 8}.get(digits[1:2].lower())
@@ -177,46 +177,46 @@ class _Lexer:
         except OverflowError:
             value = math.inf
         if math.isinf(value):
-            raise self.source.place(at).error(
+            raise self.source.location(at).error(
                 f"'{_short(written)}' is too large a number", allowed="magnitudes below 1.8e308"
             )
         self.tokens.append(Token(Kind.NUMBER, written, at, spaced, value))
-        return found.end()
+        return match.end()
 
     def _no_number(self, at: Position, word: re.Match[str] | None) -> ArmblocksError:
         shown = _short(word.group()) if word else ""
         if re.fullmatch(r"[0-9.]+(?:[eE][0-9]+)?[ij]", shown):
-            return self.source.place(at).error(
+            return self.source.location(at).error(
                 f"'{shown}' is an imaginary number", allowed="real numbers", fix="use real numbers"
             )
-        return self.source.place(at).error(
+        return self.source.location(at).error(
             f"'{shown}' is not a number", allowed="numbers such as 12, .5, 1.8e-3"
         )
 
     def _string(self, at: Position, text: str, position: int, spaced: bool) -> int:
         quote = text[position]
-        found = re.compile(f"{quote}((?:[^{quote}]|{quote}{quote})*){quote}").match(text, position)
-        if found is None:
-            raise self.source.place(at).error(
+        match = re.compile(f"{quote}((?:[^{quote}]|{quote}{quote})*){quote}").match(text, position)
+        if match is None:
+            raise self.source.location(at).error(
                 f"the string that {quote} starts is not closed on its line", allowed="'text' or \"text\""
             )
-        self.tokens.append(Token(Kind.STRING, found.group(1).replace(quote * 2, quote), at, spaced))
-        return found.end()
+        self.tokens.append(Token(Kind.STRING, match.group(1).replace(quote * 2, quote), at, spaced))
+        return match.end()
 
     def _command(self, at: Position, text: str, position: int) -> int:
-        found = re.compile(r"[^;,%]*").match(text, position)
-        end = found.end() if found is not None else len(text)
+        match = re.compile(r"[^;,%]*").match(text, position)
+        end = match.end() if match is not None else len(text)
         self.tokens.append(Token(Kind.COMMAND, text[position:end].strip(), at))
         return end
 
     def _operator(self, at: Position, operator: str, spaced: bool) -> None:
         if operator == "@":
-            raise self.source.place(at).error("function handles ('@') are not supported")
+            raise self.source.location(at).error("function handles ('@') are not supported")
         if operator in _CLOSING:
             self.brackets.append((operator, at))
         elif operator in (")", "]", "}"):
             if not self.brackets or _CLOSING[self.brackets[-1][0]] != operator:
-                raise self.source.place(at).error(
+                raise self.source.location(at).error(
                     f"'{operator}' closes no bracket", allowed="brackets in pairs", fix="remove or match it"
                 )
             self.brackets.pop()
@@ -236,7 +236,7 @@ class _Lexer:
             return  # a statement cannot end here: the line was broken on a printed page
         elif self.brackets and self.source.is_file:
             bracket, start = self.brackets[-1]
-            raise self.source.place(start).error(
+            raise self.source.location(start).error(
                 f"'{bracket}' is not closed on its line",
                 allowed="a statement over several lines continues with '...'",
                 fix=f"add '{_CLOSING[bracket]}' or '...'",

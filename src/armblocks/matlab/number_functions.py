@@ -22,27 +22,27 @@ from armblocks.matlab.function_kinds import (
 # Rounding and remainders, with the formulas of the blocks Rounding Function and Modulo.
 
 
-def _nearest(by: Arithmetic, x: Any) -> Any:
-    below = by.floor(by.absolute(x))
-    return by.sign(x) * (below + (by.absolute(x) - below >= 0.5))
+def _nearest(ops: Arithmetic, x: Any) -> Any:
+    below = ops.floor(ops.absolute(x))
+    return ops.sign(x) * (below + (ops.absolute(x) - below >= 0.5))
 
 
-def _toward_zero(by: Arithmetic, x: Any) -> Any:
-    return by.sign(x) * by.floor(by.absolute(x))
+def _toward_zero(ops: Arithmetic, x: Any) -> Any:
+    return ops.sign(x) * ops.floor(ops.absolute(x))
 
 
-def _modulo(by: Arithmetic, x: Any, y: Any) -> Any:
-    rest = by.remainder(x, y)
-    other_sign = by.both(rest != 0.0, (rest < 0.0) != (y < 0.0))
-    return by.where(y == 0.0, x, by.where(other_sign, rest + y, rest))
+def _modulo(ops: Arithmetic, x: Any, y: Any) -> Any:
+    rest = ops.remainder(x, y)
+    other_sign = ops.both(rest != 0.0, (rest < 0.0) != (y < 0.0))
+    return ops.where(y == 0.0, x, ops.where(other_sign, rest + y, rest))
 
 
-def _least(by: Arithmetic, x: Any, *other: Any) -> Any:
-    return by.least(x, *other) if other else by.folded(by.least, x)
+def _least(ops: Arithmetic, x: Any, *other: Any) -> Any:
+    return ops.minimum(x, *other) if other else ops.folded(ops.minimum, x)
 
 
-def _greatest(by: Arithmetic, x: Any, *other: Any) -> Any:
-    return by.greatest(x, *other) if other else by.folded(by.greatest, x)
+def _greatest(ops: Arithmetic, x: Any, *other: Any) -> Any:
+    return ops.maximum(x, *other) if other else ops.folded(ops.maximum, x)
 
 
 INFINITY = constant(math.inf, "Infinity.", reserved=True)
@@ -65,7 +65,7 @@ POWER = elementwise(
     "x, y",
     "x to the power of y, as `x.^y`.",
     POWERS,
-    lambda by, x, y: by.elementary("power", x, y),
+    lambda ops, x, y: ops.elementary("power", x, y),
     reserved=True,
     elementary=True,
 )
@@ -80,7 +80,7 @@ FUNCTIONS_OF_NUMBERS: Mapping[str, Function] = {
         "y, x",
         "The angle of the point (x, y), -π to π.",
         TRIGONOMETRY,
-        lambda by, y, x: by.elementary("atan2", y, x),
+        lambda ops, y, x: ops.elementary("atan2", y, x),
         reserved=True,
         elementary=True,
     ),
@@ -91,10 +91,10 @@ FUNCTIONS_OF_NUMBERS: Mapping[str, Function] = {
     "acosh": rounded("acosh", "Inverse hyperbolic cosine, of 1 or more.", TRIGONOMETRY, 1.0),
     "atanh": rounded("atanh", "Inverse hyperbolic tangent, of -1 to 1.", TRIGONOMETRY, -1.0, 1.0),
     "deg2rad": elementwise(
-        "x", "Degrees in rad.", TRIGONOMETRY, lambda by, x: x * (math.pi / 180.0), reserved=True
+        "x", "Degrees in rad.", TRIGONOMETRY, lambda ops, x: x * (math.pi / 180.0), reserved=True
     ),
     "rad2deg": elementwise(
-        "x", "Radians in degrees.", TRIGONOMETRY, lambda by, x: x * (180.0 / math.pi), reserved=True
+        "x", "Radians in degrees.", TRIGONOMETRY, lambda ops, x: x * (180.0 / math.pi), reserved=True
     ),
     "exp": rounded("exp", "e to the power of x.", POWERS),
     "expm1": rounded("expm1", "exp(x) - 1, exact for small x.", POWERS),
@@ -102,29 +102,31 @@ FUNCTIONS_OF_NUMBERS: Mapping[str, Function] = {
     "ln": LOGARITHM,
     "log10": rounded("log10", "Decimal logarithm.", POWERS, 0.0),
     "log1p": rounded("log1p", "log(1 + x), exact for small x.", POWERS, -1.0),
-    "sqrt": elementwise("x", "Square root.", POWERS, lambda by, x: by.sqrt(x), reserved=True, real_from=0.0),
+    "sqrt": elementwise(
+        "x", "Square root.", POWERS, lambda ops, x: ops.sqrt(x), reserved=True, real_from=0.0
+    ),
     "power": POWER,
     "pow": POWER,
     "hypot": elementwise(
         "x, y",
         "The square root of x² + y².",
         POWERS,
-        lambda by, x, y: by.elementary("hypot", x, y),
+        lambda ops, x, y: ops.elementary("hypot", x, y),
         reserved=True,
         elementary=True,
     ),
     "erf": rounded("erf", "Error function.", POWERS),
-    "abs": elementwise("x", "Absolute value.", ROUNDING, lambda by, x: by.absolute(x), reserved=True),
-    "sign": elementwise("x", "-1, 0 or 1.", ROUNDING, lambda by, x: by.sign(x), reserved=True),
-    "floor": elementwise("x", "Down to an integer.", ROUNDING, lambda by, x: by.floor(x), reserved=True),
-    "ceil": elementwise("x", "Up to an integer.", ROUNDING, lambda by, x: by.ceil(x), reserved=True),
+    "abs": elementwise("x", "Absolute value.", ROUNDING, lambda ops, x: ops.absolute(x), reserved=True),
+    "sign": elementwise("x", "-1, 0 or 1.", ROUNDING, lambda ops, x: ops.sign(x), reserved=True),
+    "floor": elementwise("x", "Down to an integer.", ROUNDING, lambda ops, x: ops.floor(x), reserved=True),
+    "ceil": elementwise("x", "Up to an integer.", ROUNDING, lambda ops, x: ops.ceil(x), reserved=True),
     "round": elementwise("x", "The nearest integer; halves away from zero.", ROUNDING, _nearest),
     "fix": elementwise("x", "The integer part, rounded toward zero.", ROUNDING, _toward_zero),
     "rem": elementwise(
         "x, y",
         "The remainder with the sign of x; `rem(x, 0)` is NaN.",
         ROUNDING,
-        lambda by, x, y: by.remainder(x, y),
+        lambda ops, x, y: ops.remainder(x, y),
         reserved=True,
     ),
     "mod": elementwise("x, y", "The remainder with the sign of y; `mod(x, 0)` is x.", ROUNDING, _modulo),
@@ -132,23 +134,27 @@ FUNCTIONS_OF_NUMBERS: Mapping[str, Function] = {
         "condition, yes, no",
         "`yes` where the condition is not 0, else `no`.",
         CHOICE,
-        lambda by, condition, yes, no: by.where(condition != 0.0, yes, no),
+        lambda ops, condition, yes, no: ops.where(condition != 0.0, yes, no),
         reserved=True,
     ),
-    "and": elementwise("x, y", "1 where both are not 0, as `x & y`.", CHOICE, lambda by, x, y: by.both(x, y)),
-    "or": elementwise("x, y", "1 where one is not 0, as `x | y`.", CHOICE, lambda by, x, y: by.either(x, y)),
+    "and": elementwise(
+        "x, y", "1 where both are not 0, as `x & y`.", CHOICE, lambda ops, x, y: ops.both(x, y)
+    ),
+    "or": elementwise(
+        "x, y", "1 where one is not 0, as `x | y`.", CHOICE, lambda ops, x, y: ops.either(x, y)
+    ),
     "xor": elementwise(
         "x, y",
         "1 where exactly one is not 0.",
         CHOICE,
-        lambda by, x, y: (x != 0.0) != (y != 0.0),
+        lambda ops, x, y: (x != 0.0) != (y != 0.0),
     ),
-    "not": elementwise("x", "1 where x is 0, as `~x`.", CHOICE, lambda by, x: x == 0.0),
+    "not": elementwise("x", "1 where x is 0, as `~x`.", CHOICE, lambda ops, x: x == 0.0),
     "any": along_dimension(
-        "1 where one element is not 0.", CHOICE, lambda by, x: by.folded(by.either, x != 0.0)
+        "1 where one element is not 0.", CHOICE, lambda ops, x: ops.folded(ops.either, x != 0.0)
     ),
     "all": along_dimension(
-        "1 where all elements are not 0.", CHOICE, lambda by, x: by.folded(by.both, x != 0.0)
+        "1 where all elements are not 0.", CHOICE, lambda ops, x: ops.folded(ops.both, x != 0.0)
     ),
     "min": elementwise(
         "x, y",

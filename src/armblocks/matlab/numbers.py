@@ -30,7 +30,7 @@ from armblocks.matlab.arrays import (
 from armblocks.matlab.calls import call_function
 from armblocks.matlab.function_kinds import MismatchError
 from armblocks.matlab.functions import TABLE
-from armblocks.matlab.source import Place
+from armblocks.matlab.source import Location
 from armblocks.matlab.syntax import Expression
 from armblocks.spatial.rotation import cos_exact, sin_exact
 
@@ -66,11 +66,11 @@ class NumberArithmetic:
         """Absolute value."""
         return np.abs(value)
 
-    def least(self, left: Array, right: Array) -> Array:
+    def minimum(self, left: Array, right: Array) -> Array:
         """The smaller one; the other where one is NaN."""
         return np.fmin(left, right)
 
-    def greatest(self, left: Array, right: Array) -> Array:
+    def maximum(self, left: Array, right: Array) -> Array:
         """The larger one; the other where one is NaN."""
         return np.fmax(left, right)
 
@@ -175,139 +175,139 @@ class Numbers:
         """A number."""
         return scalar(value)
 
-    def text(self, place: Place, value: str) -> Plain:
+    def text(self, location: Location, value: str) -> Plain:
         """A text in quotes."""
         return value
 
-    def negative(self, place: Place, value: object) -> Array:
+    def negative(self, location: Location, value: object) -> Array:
         """``-value``; 0 stays 0."""
-        array = array_of(place, value, "the operand of '-'")
-        self.budget.spend(place, array.size)
+        array = array_of(location, value, "the operand of '-'")
+        self.budget.spend(location, array.size)
         return 0.0 - array if array.size == 1 and array[0, 0] == 0 else -array
 
-    def logical_not(self, place: Place, value: object) -> Array:
+    def logical_not(self, location: Location, value: object) -> Array:
         """``~value``"""
-        array = array_of(place, value, "the operand of '~'")
-        self.budget.spend(place, array.size)
+        array = array_of(location, value, "the operand of '~'")
+        self.budget.spend(location, array.size)
         return cast("Array", array == 0.0)
 
-    def operate(self, place: Place, operator: str, left: object, right: object) -> Array:
+    def operate(self, location: Location, operator: str, left: object, right: object) -> Array:
         """``left operator right`` of arithmetic or a comparison."""
-        return operate(place, self.budget, operator, left, right)
+        return operate(location, self.budget, operator, left, right)
 
-    def logic(self, place: Place, operator: str, values: Sequence[object]) -> Array:
+    def logic(self, location: Location, operator: str, values: Sequence[object]) -> Array:
         """All values joined by one of ``&& || & |``."""
         joined = np.logical_and if operator in ("&&", "&") else np.logical_or
-        found = array_of(place, values[0], f"the left operand of '{operator}'") != 0.0
+        result = array_of(location, values[0], f"the left operand of '{operator}'") != 0.0
         for value in values[1:]:
-            other = array_of(place, value, f"the right operand of '{operator}'") != 0.0
-            if found.shape != other.shape and 1 not in (found.size, other.size):
-                raise place.error(
-                    f"'{operator}' of {kind_of(found)} and {kind_of(other)}",
+            other = array_of(location, value, f"the right operand of '{operator}'") != 0.0
+            if result.shape != other.shape and 1 not in (result.size, other.size):
+                raise location.error(
+                    f"'{operator}' of {kind_of(result)} and {kind_of(other)}",
                     allowed="equal sizes, or a number on one side",
                 )
-            self.budget.spend(place, max(found.size, other.size))
-            found = joined(found, other)
-        return cast("Array", found)
+            self.budget.spend(location, max(result.size, other.size))
+            result = joined(result, other)
+        return cast("Array", result)
 
-    def matrix(self, place: Place, rows: Sequence[Sequence[object]]) -> Plain:
+    def matrix(self, location: Location, rows: Sequence[Sequence[object]]) -> Plain:
         """``[a b; c d]`` of arrays, or of texts in one row."""
         flat = [value for row in rows for value in row]
         texts = [value for value in flat if isinstance(value, str)]
         if texts and len(texts) == len(flat) and len(rows) == 1:
             return "".join(texts)
-        return stacked(place, self.budget, rows)
+        return stacked(location, self.budget, rows)
 
-    def cell(self, place: Place, elements: Sequence[object]) -> Plain:
+    def cell(self, location: Location, elements: Sequence[object]) -> Plain:
         """Cell arrays exist in scripts only."""
-        raise place.error("a cell array is not a number", allowed="[a b; c d]")
+        raise location.error("a cell array is not a number", allowed="[a b; c d]")
 
-    def range(self, place: Place, parts: Sequence[object]) -> Array:
+    def range(self, location: Location, parts: Sequence[object]) -> Array:
         """``first:last`` or ``first:step:last``"""
-        ends = [number_of(place, part, "an end of a range") for part in parts]
+        ends = [number_of(location, part, "an end of a range") for part in parts]
         first, step, last = (ends[0], 1.0, ends[1]) if len(ends) == 2 else ends
         try:
-            found = range_of(first, step, last)
+            elements = range_of(first, step, last)
         except MismatchError as mismatch:
-            raise place.error(f"a range: {mismatch}", allowed="first:last or first:step:last") from None
-        self.budget.spend(place, found.size)
-        return found
+            raise location.error(f"a range: {mismatch}", allowed="first:last or first:step:last") from None
+        self.budget.spend(location, elements.size)
+        return elements
 
-    def transposed(self, place: Place, value: object) -> Array:
+    def transposed(self, location: Location, value: object) -> Array:
         """``value'``"""
-        array = array_of(place, value, "the operand of the transpose")
-        self.budget.spend(place, array.size)
+        array = array_of(location, value, "the operand of the transpose")
+        self.budget.spend(location, array.size)
         return cast("Array", (array != 0.0).T) if is_logical(value) else array.T.copy()
 
-    def index(self, place: Place, value: Plain, written: Expression) -> Plain:
+    def index(self, location: Location, value: Plain, written: Expression) -> Plain:
         """The value of an index: positions, or a logical array that selects elements."""
         return value
 
-    def element(self, place: Place, value: object, indices: Sequence[object], shown: str) -> Array:
+    def element(self, location: Location, value: object, indices: Sequence[object], shown: str) -> Array:
         """``value(indices)``, where ``None`` is ``:``."""
         if not is_array(value):
-            raise place.error(f"() is used on {kind_of(value)}", allowed="matrices and arrays of links")
-        self.budget.spend(place, value.size)
+            raise location.error(f"() is used on {kind_of(value)}", allowed="matrices and arrays of links")
+        self.budget.spend(location, value.size)
         rows, columns = value.shape
-        return value.ravel(order="F")[positions(place, (rows, columns), indices, shown)]
+        return value.ravel(order="F")[positions(location, (rows, columns), indices, shown)]
 
-    def last_index(self, place: Place, value: object, position: int, count: int) -> Array:
+    def last_index(self, location: Location, value: object, position: int, count: int) -> Array:
         """``end`` as index ``position`` of ``count`` indices."""
-        array = array_of(place, value, "the value with the index 'end'")
+        array = array_of(location, value, "the value with the index 'end'")
         return scalar(float(array.size if count == 1 else array.shape[min(position, 1)]))
 
-    def cell_element(self, place: Place, value: object, indices: Sequence[object]) -> Plain:
+    def cell_element(self, location: Location, value: object, indices: Sequence[object]) -> Plain:
         """Cell arrays exist in scripts only."""
-        raise place.error(f"{{}} is used on {kind_of(value)}", allowed="cell arrays")
+        raise location.error(f"{{}} is used on {kind_of(value)}", allowed="cell arrays")
 
-    def field(self, place: Place, value: object, name: str) -> Plain:
+    def field(self, location: Location, value: object, name: str) -> Plain:
         """``A.T`` is the transpose; numbers have no other fields."""
         if is_array(value) and name == "T":
-            return self.transposed(place, value)
-        raise place.error(f"{kind_of(value)} has no field '{name}'", allowed="fields of links and robots")
+            return self.transposed(location, value)
+        raise location.error(f"{kind_of(value)} has no field '{name}'", allowed="fields of links and robots")
 
-    def check_function(self, place: Place, name: str, called: bool) -> None:
+    def check_function(self, location: Location, name: str, called: bool) -> None:
         """Raise ``UnknownNameError`` unless the table has a function of this name."""
         if name not in TABLE:
-            raise UnknownNameError("function" if called else "name", name, TABLE, where=place.source.name)
+            raise UnknownNameError("function" if called else "name", name, TABLE, where=location.source.name)
 
     def call(
-        self, place: Place, name: str, arguments: Sequence[object], written: Sequence[Expression]
+        self, location: Location, name: str, arguments: Sequence[object], written: Sequence[Expression]
     ) -> Plain:
         """``name(arguments)`` of a function in the table. Complex results are errors."""
         function = TABLE[name]
         if name in ("power", "pow") and len(arguments) == 2:
-            return self.operate(place, ".^", *arguments)
+            return self.operate(location, ".^", *arguments)
         plain: list[Any] = [
-            value if isinstance(value, str) and function.may_be_text(k) else _argument(place, value, name)
+            value if isinstance(value, str) and function.may_be_text(k) else _argument(location, value, name)
             for k, value in enumerate(arguments)
         ]
         arrays = [value for value in plain if is_array(value)]
         if function.elementwise:
-            _check_sizes(place, name, arrays)
+            _check_sizes(location, name, arrays)
         for array in arrays if function.elementwise else ():
             if np.any((array < function.real_from) | (array > function.real_to)):
-                raise place.error(
+                raise location.error(
                     f"{name} has a complex value here",
                     allowed=f"arguments from {function.real_from:g} to {function.real_to:g}",
                 )
         size = max((array.size for array in arrays), default=1)
-        self.budget.spend(place, size * (ROUNDED_WORK if function.elementary else 1))
+        self.budget.spend(location, size * (ROUNDED_WORK if function.elementary else 1))
         with np.errstate(all="ignore"):
-            found = call_function(self._arithmetic, place, name, plain, np.asarray)
-        array = cast("Array", found if is_logical(found) else np.asarray(found, dtype=np.float64))
-        self.budget.spend(place, array.size)
+            result = call_function(self._arithmetic, location, name, plain, np.asarray)
+        array = cast("Array", result if is_logical(result) else np.asarray(result, dtype=np.float64))
+        self.budget.spend(location, array.size)
         return array
 
 
-def _argument(place: Place, value: object, name: str) -> Array:
-    return array_of(place, value, f"the argument of {name}")
+def _argument(location: Location, value: object, name: str) -> Array:
+    return array_of(location, value, f"the argument of {name}")
 
 
-def _check_sizes(place: Place, name: str, arrays: Sequence[Array]) -> None:
+def _check_sizes(location: Location, name: str, arrays: Sequence[Array]) -> None:
     shapes = {array.shape for array in arrays if array.size != 1}
     if len(shapes) > 1:
-        raise place.error(
+        raise location.error(
             f"the arguments of {name} are {' and '.join(kind_of(array) for array in arrays)}",
             allowed="equal sizes, or numbers",
         )

@@ -102,22 +102,22 @@ class Parser:
         if self.token.kind is not Kind.END or (not self.source.is_file and self.token.text != "\n"):
             raise self.unexpected()
 
-    def unexpected(self, wanted: str = "") -> ArmblocksError:
+    def unexpected(self, expected: str = "") -> ArmblocksError:
         """The error at a token that does not fit here."""
         token = self.token
         shown = {Kind.ROW: "the end of the line", Kind.EOF: "the end"}.get(token.kind, f"'{token.text[:40]}'")
-        if not wanted and token.kind in (Kind.NUMBER, Kind.NAME, Kind.STRING):
-            wanted = "an operator"
-        what = f"{shown} is not allowed here" + (f", expected {wanted}" if wanted else "")
+        if not expected and token.kind in (Kind.NUMBER, Kind.NAME, Kind.STRING):
+            expected = "an operator"
+        message = f"{shown} is not allowed here" + (f", expected {expected}" if expected else "")
         if token.kind is Kind.END and token.text == "\n":
             whole = "statement" if self.source.is_file else "formula"
-            what = f"the {whole} ends where {wanted or 'something else'} is expected"
+            message = f"the {whole} ends where {expected or 'something else'} is expected"
         fix = ""
         if token.text == "=" and not self.source.is_file:
             fix = "compare with '=='"
         elif token.text == "if":
             fix = "write if(condition, yes, no)"
-        return self.source.place(token.at).error(what, fix=fix)
+        return self.source.location(token.at).error(message, fix=fix)
 
     def _expect(self, text: str) -> None:
         if not self.at_operator(text):
@@ -130,15 +130,15 @@ class Parser:
         """A whole expression. Raises an error if it is nested too deeply."""
         start = self.token.at
         try:
-            found = self._operators(Level.OR_ELSE)
+            tree = self._operators(Level.OR_ELSE)
         except RecursionError:
             raise self._too_deep(start) from None
-        if self.depth == 0 and next(islice(levels(found), DEEPEST_TREE, None), None):
+        if self.depth == 0 and next(islice(levels(tree), DEEPEST_TREE, None), None):
             raise self._too_deep(start)
-        return found
+        return tree
 
     def _too_deep(self, at: Position) -> ArmblocksError:
-        return self.source.place(at).error(
+        return self.source.location(at).error(
             "the expression is nested too deeply",
             allowed=f"{DEEPEST_TREE} levels of operators",
             fix="split it",
@@ -147,10 +147,10 @@ class Parser:
     def _operators(self, loosest: Level) -> Expression:
         """Operands and the operators between them that bind at least as tightly as ``loosest``."""
         at = self.token.at
-        found = self._not_word(loosest) if self._is_word("not") else self._signed()
+        operand = self._not_word(loosest) if self._is_word("not") else self._signed()
         while (level := self._level()) is not None and level >= loosest:
             if level is Level.RANGE:
-                found = self._range(found, at)
+                operand = self._range(operand, at)
                 continue
             rest: list[Operation] = []
             while self._level() is level:
@@ -158,13 +158,13 @@ class Parser:
                 operator = WORDS.get(token.text, token.text)
                 rest.append(Operation(operator, self._operators(Level(level + 1)), token.at))
             if level is Level.COMPARISON and len(rest) > 1:
-                raise self.source.place(rest[1].at).error(
+                raise self.source.location(rest[1].at).error(
                     "comparisons cannot be chained",
                     allowed="one comparison between && or ||",
                     fix="write a < b && b < c, or set brackets",
                 )
-            found = Chain(found, tuple(rest), at)
-        return found
+            operand = Chain(operand, tuple(rest), at)
+        return operand
 
     def _level(self) -> Level | None:
         """The level of the next token if it is an operator between two operands."""
@@ -188,7 +188,7 @@ class Parser:
     def _not_word(self, loosest: Level) -> Expression:
         token = self.take()
         if loosest > Level.NOT_WORD:
-            raise self.source.place(token.at).error(
+            raise self.source.location(token.at).error(
                 "'not' needs brackets here", allowed="~x, or not(x)", fix="write ~"
             )
         return Prefix("~", self._operators(Level.NOT_WORD), token.at)
@@ -209,18 +209,18 @@ class Parser:
         """
         signs = self._signs()
         at = self.token.at
-        found = self._postfix()
+        operand = self._postfix()
         rest: list[Operation] = []
         while self._level() is Level.POWER:
             token = self.take()
             behind = self._signs()
             rest.append(Operation(token.text, _with_signs(behind, self._postfix(exponent=True)), token.at))
             if self._at_transpose():
-                power, steps = Chain(found, tuple(rest), at), list[Step]()
+                power, steps = Chain(operand, tuple(rest), at), list[Step]()
                 while self._at_transpose():
                     steps.append(Transpose(self.take().at))
-                found, rest = Postfix(power, tuple(steps), at), []
-        return _with_signs(signs, Chain(found, tuple(rest), at) if rest else found)
+                operand, rest = Postfix(power, tuple(steps), at), []
+        return _with_signs(signs, Chain(operand, tuple(rest), at) if rest else operand)
 
     def _signs(self) -> list[Token]:
         signs: list[Token] = []
@@ -293,7 +293,7 @@ class Parser:
         if self.at_operator("{"):
             rows, _ = self._rows("{", "}")
             if len(rows) > 1 and any(len(row) != 1 for row in rows):
-                raise self.source.place(token.at).error("a cell array with several rows is not supported")
+                raise self.source.location(token.at).error("a cell array with several rows is not supported")
             return CellLiteral(tuple(element for row in rows for element in row), token.at)
         raise self.unexpected("a value")
 
@@ -304,14 +304,14 @@ class Parser:
             return End(token.at)
         called = token.text == "if" and self.tokens[self.position + 1].text == "("
         if token.text in KEYWORDS and self.source.is_file and not called:
-            raise self.source.place(token.at).error(f"'{token.text}' is not supported here")
+            raise self.source.location(token.at).error(f"'{token.text}' is not supported here")
         self.position += 1
         return Name(token.text, token.at)
 
     def _enter(self) -> None:
         self.depth += 1
         if self.depth > DEEPEST:
-            raise self.source.place(self.token.at).error(
+            raise self.source.location(self.token.at).error(
                 "brackets are nested too deeply",
                 allowed=f"{DEEPEST} brackets inside each other",
                 fix="split the expression",

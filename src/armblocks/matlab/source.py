@@ -32,15 +32,15 @@ class Position(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Source:
-    """The lines of a text, and its name in messages: a file (``is_file``), or the place of a formula."""
+    """The lines of a text, and its name in messages: a file (``is_file``), or the location of a formula."""
 
     name: str
     lines: tuple[str, ...]
     is_file: bool = False
 
-    def place(self, at: Position) -> Place:
-        """The place of a position."""
-        return Place(self, at)
+    def location(self, at: Position) -> Location:
+        """The location of a position."""
+        return Location(self, at)
 
 
 def formula_source(text: str, where: str) -> Source:
@@ -59,14 +59,14 @@ def _lines(text: str) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
-class Place:
-    """A position in a source."""
+class Location:
+    """A position in a source, for error messages."""
 
     source: Source
     at: Position
 
     def error(self, what: str, *, allowed: str = "", fix: str = "") -> ArmblocksError:
-        """The error for something at this place, to be raised by the caller.
+        """The error at this location, which the caller raises.
 
         ``FormatError`` for a script, with file and line; ``InputError`` for a formula.
         """

@@ -37,15 +37,15 @@ def parse_script(source: Source) -> tuple[Statement, ...]:
 
 def _statement(parser: Parser) -> Statement:
     token = parser.token
-    place = parser.source.place(token.at)
+    location = parser.source.location(token.at)
     if token.kind is Kind.COMMAND:
         parser.take()
         words = tuple(token.text.split())
         if not all(re.fullmatch(r"-?[A-Za-z]\w*", word) for word in words):
-            raise place.error(f"the command '{token.text[:40]}' is not supported", allowed="clear NAME …")
+            raise location.error(f"the command '{token.text[:40]}' is not supported", allowed="clear NAME …")
         return Command(words, token.at)
     if token.kind is Kind.NAME and token.text in KEYWORDS:
-        raise place.error(f"'{token.text}' is not supported")
+        raise location.error(f"'{token.text}' is not supported")
     value = parser.expression()
     if not parser.at_operator("="):
         return Evaluation(value, token.at)
@@ -57,12 +57,12 @@ def _statement(parser: Parser) -> Statement:
         case Postfix(base=Name(name=name), steps=steps):
             targets = [step for step in steps if not isinstance(step, Transpose)]
             if len(targets) < len(steps):
-                raise place.error("a transpose cannot be assigned to", allowed=_TARGETS)
+                raise location.error("a transpose cannot be assigned to", allowed=_TARGETS)
         case Matrix():
-            raise place.error("assignment to several variables at once is not supported")
+            raise location.error("assignment to several variables at once is not supported")
         case _:
-            raise place.error("the left side of '=' is not a variable", allowed=_TARGETS)
+            raise location.error("the left side of '=' is not a variable", allowed=_TARGETS)
     result = Assignment(name, tuple(targets), parser.expression(), token.at)
     if parser.at_operator("="):
-        raise place.error("two '=' in one statement", allowed="one assignment a statement")
+        raise location.error("two '=' in one statement", allowed="one assignment a statement")
     return result

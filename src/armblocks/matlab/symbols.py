@@ -29,7 +29,7 @@ from armblocks.matlab.arrays import EXPONENTS, POWERS_OF_MATRICES, positions
 from armblocks.matlab.calls import call_function
 from armblocks.matlab.function_kinds import MismatchError
 from armblocks.matlab.functions import TABLE
-from armblocks.matlab.source import Place
+from armblocks.matlab.source import Location
 from armblocks.matlab.syntax import Expression, is_logical
 from armblocks.spatial.rotation import cos_exact, sin_exact
 
@@ -49,13 +49,13 @@ Symbol = SX | str | Oriented
 def _exact(operation: Callable[[Any, Any], Any]) -> Callable[[SX, SX], SX]:
     """The operation, of constants in IEEE arithmetic: CasADi gives 0 for inf - inf, and 1 for nan == nan."""
 
-    def found(left: SX, right: SX) -> SX:
+    def apply(left: SX, right: SX) -> SX:
         if not (left.is_constant() and right.is_constant()):
             return operation(left, right)
         with np.errstate(all="ignore"):
             return SX(np.asarray(operation(evalf(left).full(), evalf(right).full()), dtype=np.float64))
 
-    return found
+    return apply
 
 
 _OPERATIONS: Mapping[str, Callable[[SX, SX], SX]] = {
@@ -103,11 +103,11 @@ class SymbolArithmetic:
         """Absolute value."""
         return casadi.fabs(value)
 
-    def least(self, left: SX, right: SX) -> SX:
+    def minimum(self, left: SX, right: SX) -> SX:
         """The smaller one; the other where one is NaN."""
         return casadi.fmin(left, right)
 
-    def greatest(self, left: SX, right: SX) -> SX:
+    def maximum(self, left: SX, right: SX) -> SX:
         """The larger one; the other where one is NaN."""
         return casadi.fmax(left, right)
 
@@ -202,54 +202,56 @@ class Symbols:
         """A number."""
         return SX(value)
 
-    def text(self, place: Place, value: str) -> Symbol:
+    def text(self, location: Location, value: str) -> Symbol:
         """A text in quotes."""
         return value
 
-    def negative(self, place: Place, value: Symbol) -> Symbol:
+    def negative(self, location: Location, value: Symbol) -> Symbol:
         """``-value``"""
-        return _oriented_like(-_symbol(place, value), value)
+        return _oriented_like(-_symbol(location, value), value)
 
-    def logical_not(self, place: Place, value: Symbol) -> Symbol:
+    def logical_not(self, location: Location, value: Symbol) -> Symbol:
         """``~value``"""
-        return logic_not(_symbol(place, value) != 0.0)
+        return logic_not(_symbol(location, value) != 0.0)
 
-    def operate(self, place: Place, operator: str, left: Symbol, right: Symbol) -> Symbol:
+    def operate(self, location: Location, operator: str, left: Symbol, right: Symbol) -> Symbol:
         """``left operator right`` of arithmetic or a comparison."""
-        a, b = _symbol(place, left), _symbol(place, right)
+        a, b = _symbol(location, left), _symbol(location, right)
         if operator == "*" and _is_matrix(a, b):
-            return _product(place, a, b)
+            return _product(location, a, b)
         if operator in ("*", "/", "\\") and 1 not in (a.numel(), b.numel()):
-            _check_products(place, operator, left, right)
+            _check_products(location, operator, left, right)
         if operator == "^" and (a.shape[1] > 1 or b.shape[1] > 1):
-            return _matrix_power(place, a, b)
+            return _matrix_power(location, a, b)
         divisor = b if operator == "/" else a
         if operator in ("/", "\\") and divisor.numel() != 1 and _is_matrix(a, b):
-            raise place.error("the divisor is a matrix", allowed="inv(A) * b, or ./ for elementwise division")
-        return _oriented_like(_together(place, _OPERATIONS[operator.removeprefix(".")], a, b), left, right)
+            raise location.error(
+                "the divisor is a matrix", allowed="inv(A) * b, or ./ for elementwise division"
+            )
+        return _oriented_like(_together(location, _OPERATIONS[operator.removeprefix(".")], a, b), left, right)
 
-    def logic(self, place: Place, operator: str, values: Sequence[Symbol]) -> Symbol:
+    def logic(self, location: Location, operator: str, values: Sequence[Symbol]) -> Symbol:
         """All values joined by one of ``&& || & |``."""
         gate = logic_and if operator in ("&&", "&") else logic_or
-        first, *others = (_symbol(place, value) != 0.0 for value in values)
+        first, *others = (_symbol(location, value) != 0.0 for value in values)
         for other in others:
-            first = _together(place, gate, first, other)
+            first = _together(location, gate, first, other)
         return first
 
-    def matrix(self, place: Place, rows: Sequence[Sequence[Symbol]]) -> Symbol:
+    def matrix(self, location: Location, rows: Sequence[Sequence[Symbol]]) -> Symbol:
         """``[1 2; 3 4]``: every row concatenates its numbers and vectors."""
         values = [] if rows else [SX(0, 1)]
         for row in rows:
-            entries = [_symbol(place, entry) for entry in row]
+            entries = [_symbol(location, entry) for entry in row]
             columns = [entry for entry in row if isinstance(entry, Oriented) and entry.kind == "column"]
             if columns and (len(rows) > 1 or len(row) > 1):
-                raise place.error(
+                raise location.error(
                     "a column of a matrix, or a matrix times a vector, is combined with others in brackets",
                     allowed="numbers, vectors, and rows of matrices inside brackets",
                     fix="write A(:, [2 1]) for columns of one matrix",
                 )
             if any(entry.shape[1] > 1 for entry in entries):
-                raise place.error(
+                raise location.error(
                     "a matrix is inside brackets", allowed="numbers and vectors inside brackets"
                 )
             values.append(vertcat(*entries))
@@ -257,49 +259,51 @@ class Symbols:
             return vertcat(*values)
         if len({value.numel() for value in values}) > 1:
             lengths = ", ".join(str(value.numel()) for value in values)
-            raise place.error(f"the rows of an array have {lengths} numbers", allowed="rows of one length")
+            raise location.error(f"the rows of an array have {lengths} numbers", allowed="rows of one length")
         return _plain(horzcat(*values).T)
 
-    def cell(self, place: Place, elements: Sequence[Symbol]) -> Symbol:
+    def cell(self, location: Location, elements: Sequence[Symbol]) -> Symbol:
         """Cell arrays exist in scripts only."""
-        raise place.error("a cell array is not a number", allowed="[a b; c d]")
+        raise location.error("a cell array is not a number", allowed="[a b; c d]")
 
-    def range(self, place: Place, parts: Sequence[Symbol]) -> Symbol:
+    def range(self, location: Location, parts: Sequence[Symbol]) -> Symbol:
         """``first:last`` or ``first:step:last`` of constant numbers."""
-        ends = [_constant(_symbol(place, part)) for part in parts]
+        ends = [_constant(_symbol(location, part)) for part in parts]
         numbers = [float(end[0, 0]) for end in ends if end is not None and end.size == 1]
         if len(numbers) < len(parts):
-            raise place.error("the size of a range is not constant", allowed="constant numbers")
+            raise location.error("the size of a range is not constant", allowed="constant numbers")
         first, step, last = (numbers[0], 1.0, numbers[1]) if len(numbers) == 2 else numbers
         try:
             return self._arithmetic.constant(range_of(first, step, last))
         except MismatchError as mismatch:
-            raise place.error(f"a range: {mismatch}", allowed="first:last or first:step:last") from None
+            raise location.error(f"a range: {mismatch}", allowed="first:last or first:step:last") from None
 
-    def transposed(self, place: Place, value: Symbol) -> Symbol:
+    def transposed(self, location: Location, value: Symbol) -> Symbol:
         """``value'``"""
-        array = _symbol(place, value)
+        array = _symbol(location, value)
         if array.shape[1] > 1 or array.numel() < 2:
             return _plain(array.T)
         kind = value.kind if isinstance(value, Oriented) else ""
         return Oriented(array, {"row": "column", "column": "row"}.get(kind, "transposed"))
 
-    def index(self, place: Place, value: Symbol, written: Expression) -> Symbol:
+    def index(self, location: Location, value: Symbol, written: Expression) -> Symbol:
         """The value of an index. Raises an error for a logical one."""
         if is_logical(written):
-            raise place.error(
+            raise location.error(
                 "an index is a comparison or a logical value", allowed="positions counted from 1"
             )
         return value
 
-    def element(self, place: Place, value: Symbol, indices: Sequence[Symbol | None], shown: str) -> Symbol:
+    def element(
+        self, location: Location, value: Symbol, indices: Sequence[Symbol | None], shown: str
+    ) -> Symbol:
         """``value(indices)`` with constant indices, where ``None`` is ``:``."""
-        array = _symbol(place, value)
+        array = _symbol(location, value)
         chosen: list[NDArray[np.float64] | None] = []
         for index in indices:
-            numbers = None if index is None else _constant(_symbol(place, index))
+            numbers = None if index is None else _constant(_symbol(location, index))
             if index is not None and numbers is None:
-                raise place.error(
+                raise location.error(
                     f"'{shown or 'the array'}' has no constant index", allowed=f"{shown or 'u'}(1) and so on"
                 )
             chosen.append(numbers)
@@ -307,63 +311,63 @@ class Symbols:
         if isinstance(value, Oriented) and value.kind == "row":
             rows, columns = columns, rows
         elif len(indices) == 2 and columns == 1 and not isinstance(value, Oriented):
-            chosen = _single_index(place, rows, chosen)
-        found = positions(place, (rows, columns), chosen, shown)
-        if found.size == 1:
-            return array[int(found.flat[0])]
-        entries = vertcat(*(array[int(k)] for k in found.ravel(order="F")), SX(0, 1))
-        if not found.size:
+            chosen = _single_index(location, rows, chosen)
+        selected = positions(location, (rows, columns), chosen, shown)
+        if selected.size == 1:
+            return array[int(selected.flat[0])]
+        entries = vertcat(*(array[int(k)] for k in selected.ravel(order="F")), SX(0, 1))
+        if not selected.size:
             return SX(0, 1)
-        shaped = reshape(entries, *found.shape)
+        shaped = reshape(entries, *selected.shape)
         return _of_matrix(shaped) if array.shape[1] > 1 else _plain(shaped)
 
-    def last_index(self, place: Place, value: Symbol, position: int, count: int) -> Symbol:
+    def last_index(self, location: Location, value: Symbol, position: int, count: int) -> Symbol:
         """``end`` as index ``position`` of ``count`` indices."""
-        array = _symbol(place, value)
+        array = _symbol(location, value)
         if count > 1 and array.shape[1] == 1 and array.numel() > 1 and not isinstance(value, Oriented):
-            raise _without_orientation(place)
+            raise _without_orientation(location)
         extents = array.shape[::-1] if isinstance(value, Oriented) and value.kind == "row" else array.shape
         return SX(float(array.numel() if count == 1 else extents[min(position, 1)]))
 
-    def cell_element(self, place: Place, value: Symbol, indices: Sequence[Symbol | None]) -> Symbol:
+    def cell_element(self, location: Location, value: Symbol, indices: Sequence[Symbol | None]) -> Symbol:
         """Cell arrays exist in scripts only."""
-        raise place.error("cell arrays are not supported in formulas", allowed="v(1), A(1, 2)")
+        raise location.error("cell arrays are not supported in formulas", allowed="v(1), A(1, 2)")
 
-    def field(self, place: Place, value: Symbol, name: str) -> Symbol:
+    def field(self, location: Location, value: Symbol, name: str) -> Symbol:
         """``A.T`` is the transpose, as in NumPy; numbers have no other fields."""
         if name == "T":
-            return self.transposed(place, value)
-        raise place.error(f"a number has no field '{name}'", allowed="A' or A.T, the transpose")
+            return self.transposed(location, value)
+        raise location.error(f"a number has no field '{name}'", allowed="A' or A.T, the transpose")
 
-    def check_function(self, place: Place, name: str, called: bool) -> None:
+    def check_function(self, location: Location, name: str, called: bool) -> None:
         """Raise ``UnknownNameError`` unless the table has a function of this name."""
         if name not in TABLE:
             kind, known = ("function", TABLE) if called else ("name", self._known())
-            raise UnknownNameError(kind, name, known, where=place.source.name)
+            raise UnknownNameError(kind, name, known, where=location.source.name)
 
     def call(
-        self, place: Place, name: str, arguments: Sequence[Symbol], written: Sequence[Expression]
+        self, location: Location, name: str, arguments: Sequence[Symbol], written: Sequence[Expression]
     ) -> Symbol:
         """``name(arguments)`` of a function in the table."""
         function = TABLE[name]
-        given = [
-            value if isinstance(value, str) and function.may_be_text(k) else _symbol(place, value)
+        values = [
+            value if isinstance(value, str) and function.may_be_text(k) else _symbol(location, value)
             for k, value in enumerate(arguments)
         ]
-        if function.elementwise and len(given) > 1:
-            _check_shapes(place, [value for value in given if isinstance(value, SX)])
-        found = call_function(self._arithmetic, place, name, given, _constant)
-        if any(isinstance(value, SX) and value.shape[1] > 1 for value in given):
-            return _of_matrix(found)
-        return _oriented_like(_plain(found), *arguments) if function.elementwise else _plain(found)
+        if function.elementwise and len(values) > 1:
+            _check_shapes(location, [value for value in values if isinstance(value, SX)])
+        result = call_function(self._arithmetic, location, name, values, _constant)
+        if any(isinstance(value, SX) and value.shape[1] > 1 for value in values):
+            return _of_matrix(result)
+        return _oriented_like(_plain(result), *arguments) if function.elementwise else _plain(result)
 
     def _known(self) -> set[str]:
         return {*self._names, *(name for name, function in TABLE.items() if function.most == 0)}
 
 
-def _symbol(place: Place, value: Symbol) -> SX:
+def _symbol(location: Location, value: Symbol) -> SX:
     if isinstance(value, str):
-        raise place.error(
+        raise location.error(
             f"the text '{value[:40]}' is not a number", allowed="numbers and names without quotes"
         )
     return value.value if isinstance(value, Oriented) else value
@@ -382,21 +386,21 @@ def _oriented_like(result: SX, *operands: Symbol) -> Symbol:
     return Oriented(result, kinds[0]) if kinds and result.shape[1] == 1 and result.numel() > 1 else result
 
 
-def _without_orientation(place: Place) -> ArmblocksError:
-    return place.error(
+def _without_orientation(location: Location) -> ArmblocksError:
+    return location.error(
         "a vector has two indices, but is neither row nor column in a formula", allowed="v(2), v(2:3), v(end)"
     )
 
 
 def _single_index(
-    place: Place, count: int, chosen: Sequence[NDArray[np.float64] | None]
+    location: Location, count: int, chosen: Sequence[NDArray[np.float64] | None]
 ) -> list[NDArray[np.float64] | None]:
     """The indices (k, 1) of ``v(k, 1)`` or ``v(1, k)``. Raises an error for others, unless v is a number."""
     numbers = [float(index[0, 0]) for index in chosen if index is not None and index.size == 1]
     if count == 1:
         return list(chosen)
     if len(numbers) < 2 or 1.0 not in numbers:
-        raise _without_orientation(place)
+        raise _without_orientation(location)
     return [np.array([[max(numbers)]]), np.ones((1, 1))]
 
 
@@ -415,24 +419,24 @@ def _is_matrix(left: SX, right: SX) -> bool:
     return not (left.numel() == 1 or right.numel() == 1) and (left.shape[1] > 1 or right.shape[1] > 1)
 
 
-def _check_products(place: Place, operator: str, left: Symbol, right: Symbol) -> None:
+def _check_products(location: Location, operator: str, left: Symbol, right: Symbol) -> None:
     """Raise an error for a product of two vectors, one of which is a row, a column or a transpose."""
     kinds = [value.kind for value in (left, right) if isinstance(value, Oriented)]
     if kinds:
-        what = {"transposed": "a transposed vector"}.get(kinds[0], f"a {kinds[0]} of a matrix or product")
-        raise place.error(
-            f"{what} and a vector are combined by '{operator}'",
+        operand = {"transposed": "a transposed vector"}.get(kinds[0], f"a {kinds[0]} of a matrix or product")
+        raise location.error(
+            f"{operand} and a vector are combined by '{operator}'",
             allowed="vectors without orientation, which are combined element by element",
             fix="write dot(v, w) for the scalar product v'*w, dot(v, A*w) for v'*A*w, "
             ".* and ./ for the operation element by element",
         )
 
 
-def _matrix_power(place: Place, base: SX, exponent: SX) -> SX:
+def _matrix_power(location: Location, base: SX, exponent: SX) -> SX:
     number = _constant(exponent)
     rows, columns = base.shape
     if rows != columns or number is None or number.size != 1 or number[0, 0] not in EXPONENTS:
-        raise place.error(
+        raise location.error(
             "the power of a matrix is not supported for this exponent"
             if rows == columns
             else "a power of a matrix that is not square",
@@ -444,12 +448,12 @@ def _matrix_power(place: Place, base: SX, exponent: SX) -> SX:
     return reduce(mtimes, [factor] * abs(count), SX(np.eye(rows)))
 
 
-def _product(place: Place, left: SX, right: SX) -> Symbol:
+def _product(location: Location, left: SX, right: SX) -> Symbol:
     """The matrix product; a vector on the left is a row."""
     if left.shape[1] == 1:
         left = left.T
     if left.shape[1] != right.shape[0]:
-        raise place.error(
+        raise location.error(
             f"a matrix of {_size(left)} is multiplied by one of {_size(right)}",
             allowed="as many columns on the left as rows on the right; .* multiplies elementwise",
         )
@@ -460,23 +464,23 @@ def _size(value: SX) -> str:
     return f"{value.shape[0]} x {value.shape[1]}"
 
 
-def _together(place: Place, function: Callable[..., SX], *values: SX) -> SX:
-    _check_shapes(place, values)
+def _together(location: Location, function: Callable[..., SX], *values: SX) -> SX:
+    _check_shapes(location, values)
     return function(*values)
 
 
-def _check_shapes(place: Place, values: Sequence[SX]) -> None:
+def _check_shapes(location: Location, values: Sequence[SX]) -> None:
     """Raise an error unless all arrays have one shape; scalars are broadcast."""
     shapes = {value.shape for value in values if value.numel() != 1}
     if len(shapes) < 2:
         return
     if any(columns > 1 for _, columns in shapes):
-        raise place.error(
+        raise location.error(
             f"arrays of {' and '.join(sorted(f'{m} x {n}' for m, n in shapes))} numbers are combined",
             allowed="arrays of equal size, and scalars with any array",
         )
     sizes = sorted(value.numel() for value in values if value.numel() != 1)
-    raise place.error(
+    raise location.error(
         f"vectors of {' and '.join(dict.fromkeys(map(str, sizes)))} elements are combined",
         allowed="vectors of equal length, and scalars with any vector",
     )

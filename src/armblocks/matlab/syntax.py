@@ -195,8 +195,8 @@ def parts_of(expression: Expression) -> tuple[Expression, ...]:
         case Range(parts=parts):
             return parts
         case Postfix(base=base, steps=steps):
-            given = (step.arguments for step in steps if isinstance(step, Parentheses | Braces))
-            return (base, *(argument for arguments in given for argument in arguments))
+            step_arguments = (step.arguments for step in steps if isinstance(step, Parentheses | Braces))
+            return (base, *(argument for arguments in step_arguments for argument in arguments))
         case _:
             return ()
 

@@ -58,29 +58,29 @@ def _check_tree(robot: str, links: Sequence[Link]) -> None:
                 f"two links are named '{link.name}'", where=robot, allowed="unique names", fix="rename one"
             )
         parents[link.name] = link.parent
-    settled: set[str | None] = {None}
+    checked: set[str | None] = {None}
     for link in links:
         path: list[str] = []
-        here: str | None = link.name
-        while here not in settled and here is not None:
-            if here not in parents:
+        name: str | None = link.name
+        while name not in checked and name is not None:
+            if name not in parents:
                 raise RobotError(
-                    f"link '{path[-1]}' has the parent '{here}', which does not exist",
+                    f"link '{path[-1]}' has the parent '{name}', which does not exist",
                     where=robot,
                     allowed=", ".join(parents),
                     fix="name an existing link as parent, or None for the base",
                 )
-            if here in path:
-                ring = [*path[path.index(here) :], here]
+            if name in path:
+                ring = [*path[path.index(name) :], name]
                 raise RobotError(
                     "links are each other's parents: " + " -> ".join(ring),
                     where=robot,
                     allowed="every chain of parents ends at the base",
                     fix="set the parent of one of them to None",
                 )
-            path.append(here)
-            here = parents[here]
-        settled.update(path)
+            path.append(name)
+            name = parents[name]
+        checked.update(path)
 
 
 def _check_joint(where: str, joint: Joint) -> None:

@@ -39,15 +39,15 @@ def converted(robot: Robot, convention: DhConvention) -> Robot:
     shifts = [transl(row.a, 0.0, 0.0) @ trotx(row.alpha) for row in rows]
     if convention is DhConvention.MODIFIED:
         numbers = [(0.0, 0.0), *((row.alpha, row.a) for row in rows[:-1])]
-        moved = shifts  # pose of a link's old frame in its new frame, which precedes the shift
+        new_from_old = shifts  # pose of a link's old frame in its new frame, which precedes the shift
         ends = {"tool": shifts[-1] @ robot.tool}
     else:
         numbers = [*((row.alpha, row.a) for row in rows[1:]), (0.0, 0.0)]
-        moved = [*(shift.inverse() for shift in shifts[1:]), Transform()]
+        new_from_old = [*(shift.inverse() for shift in shifts[1:]), Transform()]
         ends = {"base": robot.base @ shifts[0]}
     links = [
         _with_row(link, replace(row, alpha=alpha, a=a, convention=convention), shift)
-        for link, row, (alpha, a), shift in zip(robot.links, rows, numbers, moved)
+        for link, row, (alpha, a), shift in zip(robot.links, rows, numbers, new_from_old)
     ]
     return replace(robot, links=tuple(links), **ends)
 
@@ -105,6 +105,6 @@ def _with_row(link: Link, row: DhRow, T_new_old: Transform) -> Link:
 
 
 def _pose(T_new_old: Transform, pose: Pose) -> Pose:
-    moved = (T_new_old.matrix @ np.array(pose)).tolist()
-    a, b, c, d = ((row[0], row[1], row[2], row[3]) for row in moved)
+    new_pose = (T_new_old.matrix @ np.array(pose)).tolist()
+    a, b, c, d = ((row[0], row[1], row[2], row[3]) for row in new_pose)
     return a, b, c, d

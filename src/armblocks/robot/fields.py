@@ -38,8 +38,8 @@ def pose(value: object, *, where: str) -> Transform:
     try:
         return Transform.from_matrix(cast("ArrayLike", value))
     except InputError as error:
-        what = f"the pose is no Transform and no (4, 4) matrix: {error.what}"
-        raise RobotError(what, where=where, allowed=error.allowed, fix=error.fix) from None
+        problem = f"the pose is no Transform and no (4, 4) matrix: {error.what}"
+        raise RobotError(problem, where=where, allowed=error.allowed, fix=error.fix) from None
     except (TypeError, ValueError):
         raise RobotError(
             f"the pose is a {type(value).__name__}",

@@ -56,14 +56,14 @@ def robot_shapes(robot: Robot) -> tuple[tuple[Shape, ...], ...]:
     plan = _Plan.of(robot)
     rows: list[list[Shape]] = [_base_shapes(robot, plan)]
     for link in robot.links:
-        made = _link_shapes(robot, link, plan)
-        rows.append(list(link.geometry) if link.geometry is not None else made)
+        link_shapes = _link_shapes(robot, link, plan)
+        rows.append(list(link.geometry) if link.geometry is not None else link_shapes)
     rows.append([])
     # The rail of a prismatic joint belongs to the body that carries the joint.
     row_of = {link.name: row for row, link in enumerate(robot.links, start=1)}
     for link in robot.links:
         carrier = row_of[link.parent] if link.parent is not None else 0
-        if link.joint.slide and link.geometry is None:
+        if link.joint.linear and link.geometry is None:
             rows[carrier].append(_rail(link, plan))
     return tuple(tuple(shapes) for shapes in rows)
 
@@ -79,7 +79,7 @@ def reach(robot: Robot) -> float:
     length: dict[str, float] = {}
     for link in _parents_first(robot):
         own = math.hypot(*link.before.translation) + math.hypot(*link.after.translation)
-        if link.joint.slide and link.joint.limits.position:
+        if link.joint.linear and link.joint.limits.position:
             own += max(abs(value + link.joint.offset) for value in link.joint.limits.position)
         length[link.name] = own + (length[link.parent] if link.parent is not None else 0.0)
     return max(0.1, *length.values()) + math.hypot(*robot.tool.translation)
@@ -89,12 +89,12 @@ def _parents_first(robot: Robot) -> tuple[Link, ...]:
     """The links sorted so that each follows its parent; a description may list them in any order."""
     known: set[str | None] = {None}
     ordered: list[Link] = []
-    waiting = list(robot.links)
-    while waiting:  # Robot has checked that there is no cycle, so every iteration places a link
-        ready = [link for link in waiting if link.parent in known]
+    remaining = list(robot.links)
+    while remaining:  # Robot has checked that there is no cycle, so every iteration places a link
+        ready = [link for link in remaining if link.parent in known]
         ordered += ready
         known.update(link.name for link in ready)
-        waiting = [link for link in waiting if link.name not in known]
+        remaining = [link for link in remaining if link.name not in known]
     return tuple(ordered)
 
 
@@ -141,7 +141,7 @@ class _Plan:
         """Whether the link is a column on the base: a vertical joint whose body begins with a long upward
         part."""
         upright = link.before.R @ np.array(link.joint.axis)
-        if link.parent is not None or not link.joint.turn or upright[2] < 0.99:
+        if link.parent is not None or not link.joint.angular or upright[2] < 0.99:
             return False
         T = link.after.inverse().matrix
         axis = T[:3, :3] @ np.array(link.joint.axis)
@@ -157,7 +157,7 @@ class _Plan:
     def shares_centre(self, link: Link) -> bool:
         """Whether the link's joint and its parent's joint have the same centre and different axes."""
         parent = self.links.get(link.parent) if link.parent is not None else None
-        if parent is None or not (parent.joint.turn and link.joint.turn):
+        if parent is None or not (parent.joint.angular and link.joint.angular):
             return False
         T = parent.after.inverse()
         gap = np.array(link.before.translation) - T.p
@@ -205,11 +205,11 @@ def _link_shapes(robot: Robot, link: Link, plan: _Plan) -> list[Shape]:
     if plan.stands_up(link):
         # The column rises from the base plate: the drum is a ring in the column, above the floor.
         shapes += _drum(start + 1.35 * r * axis, axis, r, length=1.5 * r)
-    elif link.joint.turn:
+    elif link.joint.angular:
         # If two joints share their centre (shoulder, wrist), the inner drum passes through the outer collar.
         inside = plan.shares_centre(link)
         shapes += _drum(start, axis, r, length=2.15 * plan.radius[link.parent or ""] if inside else 2.0 * r)
-    elif link.joint.slide:
+    elif link.joint.linear:
         side = 1.7 * r
         shapes.append(Box(size=(side, side, 1.3 * side), pose=_aligned(start, axis)))
     children = plan.children.get(link.name, [])

@@ -36,8 +36,8 @@ class PlausibilityFinding:
     question: str
 
     def __str__(self) -> str:
-        place = f", link '{self.link}'" if self.link else ""
-        return f"robot '{self.robot}'{place}: {self.what}. {self.question}"
+        location = f", link '{self.link}'" if self.link else ""
+        return f"robot '{self.robot}'{location}: {self.what}. {self.question}"
 
 
 def plausibility_findings(robot: Robot) -> tuple[PlausibilityFinding, ...]:
@@ -72,7 +72,7 @@ def warn_of_implausible_values(robot: Robot) -> None:
 def _findings(robot: Robot) -> Iterator[PlausibilityFinding]:
     for link in robot.links:
         low, high = link.joint.limits.position or (0.0, 0.0)
-        if link.joint.turn and not link.joint.slide and max(abs(low), abs(high)) > WHOLE_TURN:
+        if link.joint.angular and not link.joint.linear and max(abs(low), abs(high)) > WHOLE_TURN:
             yield PlausibilityFinding(
                 robot=robot.name,
                 link=link.name,
@@ -107,19 +107,19 @@ def _findings(robot: Robot) -> Iterator[PlausibilityFinding]:
 
 def _reaches(robot: Robot) -> dict[str | None, float]:
     """An upper bound of each link's distance from the base, m: the sum of the lengths up to it."""
-    found: dict[str | None, float] = {None: 0.0}
-    waiting = list(robot.links)
-    while waiting:
+    reaches: dict[str | None, float] = {None: 0.0}
+    remaining = list(robot.links)
+    while remaining:
         later: list[Link] = []
-        for link in waiting:
-            if link.parent in found:
-                found[link.name] = found[link.parent] + _length(link)
+        for link in remaining:
+            if link.parent in reaches:
+                reaches[link.name] = reaches[link.parent] + _length(link)
             else:
                 later.append(link)
-        waiting = later
-    return found
+        remaining = later
+    return reaches
 
 
 def _length(link: Link) -> float:
-    travel = max(map(abs, link.joint.limits.position or (0.0,))) if link.joint.slide else 0.0
+    travel = max(map(abs, link.joint.limits.position or (0.0,))) if link.joint.linear else 0.0
     return math.hypot(*link.before.translation) + math.hypot(*link.after.translation) + travel

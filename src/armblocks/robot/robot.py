@@ -57,8 +57,8 @@ class Robot:
     def __post_init__(self) -> None:
         object.__setattr__(self, "links", tuple(self.links))
         for frame in ("base", "tool"):
-            place = f"{frame} of robot '{self.name}'"
-            object.__setattr__(self, frame, pose(getattr(self, frame), where=place))
+            field_name = f"{frame} of robot '{self.name}'"
+            object.__setattr__(self, frame, pose(getattr(self, frame), where=field_name))
         object.__setattr__(self, "gravity", vector3(self.gravity, where=f"gravity of robot '{self.name}'"))
         check_robot(
             self.name,
@@ -145,7 +145,7 @@ class Robot:
     def nofriction(self, *, coulomb: bool = True, viscous: bool = True) -> Robot:
         """A copy without Coulomb friction, viscous friction, or both; motor inertia is unchanged."""
 
-        def quiet(motor: Motor) -> Motor:
+        def without_friction(motor: Motor) -> Motor:
             return replace(
                 motor,
                 coulomb_friction=(0.0, 0.0) if coulomb else motor.coulomb_friction,
@@ -155,7 +155,8 @@ class Robot:
         return replace(
             self,
             links=tuple(
-                link if link.motor is None else replace(link, motor=quiet(link.motor)) for link in self.links
+                link if link.motor is None else replace(link, motor=without_friction(link.motor))
+                for link in self.links
             ),
         )
 

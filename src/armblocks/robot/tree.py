@@ -21,7 +21,7 @@ BASE = -1
 class Body:
     """A link that moves relative to its parent, with all links that are fixed to it.
 
-    ``T_parent_body(q) = placement Rz(turn (q + offset)) Tz(slide (q + offset))``: the z axis of the body
+    ``T_parent_body(q) = placement Rz(angular (q + offset)) Tz(linear (q + offset))``: the z axis of the body
     frame is the joint axis. ``parent``: index of another body, or BASE. ``joint``: index in q. ``inertia``:
     of all lumped links, in the body frame. ``motor``: the motor of the joint.
     """
@@ -30,8 +30,8 @@ class Body:
     parent: int
     joint: int
     placement: Transform
-    turn: float
-    slide: float
+    angular: float
+    linear: float
     offset: float
     inertia: RigidInertia
     motor: Motor | None
@@ -83,8 +83,8 @@ class KinematicTree:
                     parent=parent.body,
                     joint=joint_of[link.name],
                     placement=at_joint @ align,
-                    turn=sign * link.joint.turn,
-                    slide=sign * link.joint.slide,
+                    angular=sign * link.joint.angular,
+                    linear=sign * link.joint.linear,
                     offset=link.joint.offset,
                     inertia=RigidInertia(),
                     motor=link.motor,
@@ -140,14 +140,14 @@ def _parents_first(links: Sequence[Link]) -> list[Link]:
     """The links sorted so that every parent precedes its children; otherwise the given order is kept."""
     placed: set[str | None] = {None}
     ordered: list[Link] = []
-    waiting = list(links)
-    while waiting:
-        ready = [link for link in waiting if link.parent in placed]
+    remaining = list(links)
+    while remaining:
+        ready = [link for link in remaining if link.parent in placed]
         # One link at a time, so that links already in a valid order keep it.
         link = ready[0]
         ordered.append(link)
         placed.add(link.name)
-        waiting.remove(link)
+        remaining.remove(link)
     return ordered
 
 

@@ -63,8 +63,8 @@ def to_rpy(R: SX, convention: str) -> tuple[SX, SX, SX]:
 
 def from_euler(phi: SX, theta: SX, psi: SX) -> SX:
     """R = Rz(phi) Ry(theta) Rz(psi), the Euler angles ZYZ of every release of the toolbox (rad)."""
-    turn = rotation_about_axis
-    return turn("z", phi) @ turn("y", theta) @ turn("z", psi)
+    about = rotation_about_axis
+    return about("z", phi) @ about("y", theta) @ about("z", psi)
 
 
 def to_euler(R: SX) -> tuple[SX, SX, SX]:
@@ -80,11 +80,11 @@ def to_euler(R: SX) -> tuple[SX, SX, SX]:
 def from_quaternion(quaternion: SX) -> SX:
     """The rotation of a quaternion (4, 1) of any length; NaN for zero."""
     s, x, y, z = (quaternion[k] for k in range(4))
-    twice = 2.0 / dot(quaternion, quaternion)
+    scale = 2.0 / dot(quaternion, quaternion)
     rows = (
-        (1.0 - twice * (y * y + z * z), twice * (x * y - s * z), twice * (x * z + s * y)),
-        (twice * (x * y + s * z), 1.0 - twice * (x * x + z * z), twice * (y * z - s * x)),
-        (twice * (x * z - s * y), twice * (y * z + s * x), 1.0 - twice * (x * x + y * y)),
+        (1.0 - scale * (y * y + z * z), scale * (x * y - s * z), scale * (x * z + s * y)),
+        (scale * (x * y + s * z), 1.0 - scale * (x * x + z * z), scale * (y * z - s * x)),
+        (scale * (x * z - s * y), scale * (y * z + s * x), 1.0 - scale * (x * x + y * y)),
     )
     return matrix(rows)
 
@@ -153,11 +153,11 @@ def quaternion_product(left: SX, right: SX) -> SX:
 
 def matrix(rows: Sequence[Sequence[SX | float]]) -> SX:
     """A matrix from its rows of scalars."""
-    found = SX.zeros(len(rows), len(rows[0]))
+    result = SX.zeros(len(rows), len(rows[0]))
     for i, row in enumerate(rows):
         for j, value in enumerate(row):
-            found[i, j] = value
-    return found
+            result[i, j] = value
+    return result
 
 
 def _three_angles(R: SX, order: str) -> tuple[SX, SX, SX]:

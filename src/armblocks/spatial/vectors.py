@@ -102,7 +102,7 @@ def add_symmetric(A: Symmetric, B: Symmetric) -> Symmetric:
     return Symmetric(*(a + b for a, b in zip(A, B)))
 
 
-class Turn(NamedTuple):
+class RotationZ(NamedTuple):
     """A rotation about z by its cosine and sine: four products for a vector instead of nine."""
 
     c: Scalar
@@ -120,9 +120,9 @@ class Turn(NamedTuple):
         """Rz S Rz', with six products for the 2x2 block, which rotates by twice the angle."""
         c, s = self
         difference = S.yy - S.xx
-        twice = S.xy + S.xy
-        even = s * (s * difference - c * twice)
-        odd = s * (c * difference + s * twice)
+        doubled = S.xy + S.xy
+        even = s * (s * difference - c * doubled)
+        odd = s * (c * difference + s * doubled)
         return Symmetric(
             xx=S.xx + even,
             yy=S.yy - even,

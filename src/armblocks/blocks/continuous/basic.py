@@ -31,7 +31,7 @@ class Integrator(Block):
 
     title: ClassVar[str] = "Integrator"
     sign: ClassVar[FaceSign] = Fraction("1", "s")
-    spreads: ClassVar[tuple[str, ...]] = ("initial",)
+    broadcast_parameters: ClassVar[tuple[str, ...]] = ("initial",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The integral of a sine that starts at 0: 1 - cos t.",
     )

@@ -18,7 +18,7 @@ from armblocks.diagram import (
     Signals,
     State,
     WorkedExample,
-    made,
+    driver,
     parameter,
     shape_of,
 )
@@ -51,7 +51,7 @@ class DescriptorStateSpace(Block):
             "C": ((1.0, 0.0), (0.0, 1.0)),
             "D": ((0.0,), (0.0,)),
         },
-        inputs={"u": made("SineWave")},
+        inputs={"u": driver("SineWave")},
     )
 
     E: ArrayLike = parameter(((1.0,),), dimensions=(2,), doc="the matrix of x' (n, n)", tunable=False)
@@ -125,12 +125,12 @@ class _Explicit:
 
 
 @lru_cache(maxsize=64)
-def _explicit(*given: Any) -> _Explicit:
+def _explicit(*matrices: Any) -> _Explicit:
     """Eliminate the algebraic equations.
 
     Raises ``InputError`` if they do not determine their unknowns.
     """
-    E, A, B, C, D = (np.asarray(value) for value in given)
+    E, A, B, C, D = (np.asarray(value) for value in matrices)
     U, sizes, Vt = np.linalg.svd(E)
     rank = int(np.sum(sizes > ROUNDING * max(1.0, float(sizes[0]))))
     if rank == len(E):
@@ -169,7 +169,7 @@ def _cleaned(matrix: Matrix) -> Matrix:
 def _sparse(matrix: Matrix) -> SX:
     """Structural zeros where the entries are 0."""
     rows, columns = matrix.shape
-    found = SX(rows, columns)
+    sparse = SX(rows, columns)
     for i, j in zip(*np.nonzero(matrix)):
-        found[int(i), int(j)] = float(matrix[i, j])
-    return found
+        sparse[int(i), int(j)] = float(matrix[i, j])
+    return sparse

@@ -8,7 +8,16 @@ from typing import ClassVar
 from casadi import SX, fmax, if_else
 from numpy.typing import ArrayLike
 
-from armblocks.blocks.periodic import AGAIN, COUNT, INSTANT, ODD, WHEN, sample_time, sampled, sampling_guards
+from armblocks.blocks.periodic import (
+    COUNT,
+    INSTANT,
+    ODD,
+    RESAMPLE,
+    WHEN,
+    sample_time,
+    sampled,
+    sampling_guards,
+)
 from armblocks.diagram import (
     Block,
     Guard,
@@ -18,7 +27,7 @@ from armblocks.diagram import (
     Signals,
     State,
     WorkedExample,
-    made,
+    driver,
     parameter,
     shape_of,
 )
@@ -39,11 +48,11 @@ class FirstOrderHold(Block):
 
     title: ClassVar[str] = "First Order Hold"
     sign: ClassVar[FaceSign] = graph((0, 0.1), (0.33, 0.5), (0.33, 0.35), (0.67, 0.95), (0.67, 0.8), (1, 1))
-    spreads: ClassVar[tuple[str, ...]] = ("initial",)
+    broadcast_parameters: ClassVar[tuple[str, ...]] = ("initial",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A sine, sampled every second; straight lines connect the samples, one second late.",
         parameters={"method": "interpolation", "period": 1.0},
-        inputs={"u": made("SineWave")},
+        inputs={"u": driver("SineWave")},
     )
 
     method: str = parameter(
@@ -70,7 +79,7 @@ class FirstOrderHold(Block):
         return (COUNT, WHEN, ODD, *samples)
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
-        return INSTANT, AGAIN
+        return INSTANT, RESAMPLE
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         start = x["last"] if self.method == "extrapolation" else x["before"]
@@ -89,9 +98,9 @@ class FirstOrderHold(Block):
         return sampling_guards(t, x, p, u["u"], x["last"])
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        due, looks, counted = sampled(t, x, p, e)
+        at_sample_time, samples, counted = sampled(t, x, p, e)
         return {
             **counted,
-            "last": if_else(looks, u["u"], x["last"]),
-            "before": if_else(due, x["last"], x["before"]),
+            "last": if_else(samples, u["u"], x["last"]),
+            "before": if_else(at_sample_time, x["last"], x["before"]),
         }

@@ -16,7 +16,7 @@ from armblocks.diagram import (
     Signals,
     State,
     WorkedExample,
-    made,
+    driver,
     parameter,
 )
 from armblocks.diagram.signs import FaceSign, Fraction, value_text
@@ -31,11 +31,11 @@ class FirstOrderLag(Block):
     """A first-order lag (PT1): y = gain / (T s + 1) u, that is T y' = gain u - y."""
 
     title: ClassVar[str] = "First-Order Lag"
-    spreads: ClassVar[tuple[str, ...]] = ("gain", "time_constant", "initial")
+    broadcast_parameters: ClassVar[tuple[str, ...]] = ("gain", "time_constant", "initial")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The step response: 63 % after one time constant of 2 s.",
         parameters={"time_constant": 2.0},
-        inputs={"u": made("Step")},
+        inputs={"u": driver("Step")},
     )
 
     gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="steady-state gain y / u")
@@ -70,11 +70,11 @@ class SecondOrderLag(Block):
 
     title: ClassVar[str] = "Second-Order Lag"
     sign: ClassVar[FaceSign] = Fraction("ω²", "s² + 2ζωs + ω²")
-    spreads: ClassVar[tuple[str, ...]] = ("gain", "natural_frequency", "damping")
+    broadcast_parameters: ClassVar[tuple[str, ...]] = ("gain", "natural_frequency", "damping")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The step response with a damping ratio of 0.3: it overshoots and settles.",
         parameters={"natural_frequency": 2.0, "damping": 0.3},
-        inputs={"u": made("Step")},
+        inputs={"u": driver("Step")},
     )
 
     gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="steady-state gain y / u")
@@ -115,11 +115,11 @@ class LeadLag(Block):
     """
 
     title: ClassVar[str] = "Lead-Lag"
-    spreads: ClassVar[tuple[str, ...]] = ("gain", "lead_time", "lag_time")
+    broadcast_parameters: ClassVar[tuple[str, ...]] = ("gain", "lead_time", "lag_time")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The step response of a lead starts above its final value and decays to it.",
         parameters={"lead_time": 2.0, "lag_time": 1.0},
-        inputs={"u": made("Step")},
+        inputs={"u": driver("Step")},
     )
 
     gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="steady-state gain y / u")

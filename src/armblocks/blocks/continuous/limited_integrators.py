@@ -29,8 +29,8 @@ from armblocks.diagram import (
     State,
     WorkedExample,
     broadcast,
+    driver,
     integral_unit,
-    made,
     parameter,
 )
 from armblocks.diagram.signs import FaceSign, Fraction
@@ -54,7 +54,7 @@ class ResettableIntegrator(Block):
     sign: ClassVar[FaceSign] = Fraction("1", "s")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The integral of 1, reset to 0 by every rising edge.",
-        inputs={"u": made("Constant"), "reset": made("PulseGenerator", period=3.0, delay=1.0)},
+        inputs={"u": driver("Constant"), "reset": driver("PulseGenerator", period=3.0, delay=1.0)},
     )
 
     external_reset: str = external_reset_parameter("rising")
@@ -102,10 +102,10 @@ class ResettableIntegrator(Block):
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         shape = self.output_shapes(inputs)["y"]
         begun = (State("begun", (), "0 until the initial value has been read from the port, then 1"),)
-        kept = (State("kept", shape, "left limit of the initial value"),)
+        left_limit = (State("kept", shape, "left limit of the initial value"),)
         return (
             *(begun if self.initial_condition_source == "external" else ()),
-            *(kept if self.external_reset == "level hold" else ()),
+            *(left_limit if self.external_reset == "level hold" else ()),
         )
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
@@ -141,12 +141,12 @@ class ResettableIntegrator(Block):
         return {"x": start, **begun, **({"kept": start} if self.external_reset == "level hold" else {})}
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        found = _limit_guard_values(x, u, p) if self.limit_output else {}
+        values = _limit_guard_values(x, u, p) if self.limit_output else {}
         if self.external_reset != "none":
-            found["reset"] = (self._level(u) if self._by_level else u["reset"]) - THRESHOLD_OFFSET
+            values["reset"] = (self._level(u) if self._by_level else u["reset"]) - THRESHOLD_OFFSET
         if self.initial_condition_source == "external":
-            found["begins"] = 0.5 - x["begun"]
-        return found
+            values["begins"] = 0.5 - x["begun"]
+        return values
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         held = {"held": self._level(u) > 0.0} if self._by_level else {}
@@ -157,23 +157,23 @@ class ResettableIntegrator(Block):
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         after = _limited(x, p, e) if self.limit_output else {"x": x["x"]}
-        anew, start = SX(0.0), self._start(u, p)
+        is_reset, start = SX(0.0), self._start(u, p)
         if self._by_level:
             # When the trigger returns to 0, the state starts from the value that was held.
-            anew = e["reset"] < 0.0
+            is_reset = e["reset"] < 0.0
             start = x["kept"] if self.external_reset == "level hold" else start
             after["held"] = if_else(e["reset"] == 0.0, x["held"], e["reset"] > 0.0)
         elif self.external_reset != "none":
-            anew = e["reset"] != 0.0
+            is_reset = e["reset"] != 0.0
         if self.initial_condition_source == "external":
             # At t = 0 the signal at the port may still change during the mode iteration.
             begins = logic_or(x["begun"] == 0.0, t <= 0.0)
             start = if_else(begins, self._start(u, p), start)
-            anew = logic_or(anew, begins)
+            is_reset = logic_or(is_reset, begins)
             after["begun"] = SX(1.0)
-        after["x"] = if_else(anew, start, after["x"])
+        after["x"] = if_else(is_reset, start, after["x"])
         if self.limit_output:
-            after["mode"] = if_else(anew, _limit_side(after["x"], SX(0.0), u, p), after["mode"])
+            after["mode"] = if_else(is_reset, _limit_side(after["x"], SX(0.0), u, p), after["mode"])
         return after
 
     @property
@@ -197,7 +197,7 @@ class IntegratorLimited(Block):
 
     title: ClassVar[str] = "Integrator Limited"
     sign: ClassVar[FaceSign] = Fraction("1", "s", limited=True)
-    spreads: ClassVar[tuple[str, ...]] = ("initial", "lower", "upper")
+    broadcast_parameters: ClassVar[tuple[str, ...]] = ("initial", "lower", "upper")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows=("The integral of a sine is limited to 1. It leaves the limit when the sine changes its sign."),
     )
@@ -286,13 +286,13 @@ def _limit_side(x: SX, mode: SX, u: Signals, p: Signals) -> SX:
 
 def _limited(x: Signals, p: Signals, e: Signals) -> dict[str, SX]:
     """State and mode after the events."""
-    stands = logic_and(x["x"] >= p["upper"], e["rises"] > 0.0)
-    stands_low = logic_and(x["x"] <= p["lower"], e["falls"] < 0.0)
-    upper, lower = logic_or(e["upper"] > 0.0, stands), logic_or(e["lower"] < 0.0, stands_low)
-    freed = logic_or(
+    stays_upper = logic_and(x["x"] >= p["upper"], e["rises"] > 0.0)
+    stays_lower = logic_and(x["x"] <= p["lower"], e["falls"] < 0.0)
+    upper, lower = logic_or(e["upper"] > 0.0, stays_upper), logic_or(e["lower"] < 0.0, stays_lower)
+    leaves = logic_or(
         logic_and(x["mode"] > 0.0, e["falls"] < 0.0), logic_and(x["mode"] < 0.0, e["rises"] > 0.0)
     )
-    inner = if_else(freed, 0.0, x["mode"])
+    inner = if_else(leaves, 0.0, x["mode"])
     return {
         "mode": if_else(upper, 1.0, if_else(lower, -1.0, inner)),
         # A state slightly beyond a limit is set to the limit, also where the mode follows from the values

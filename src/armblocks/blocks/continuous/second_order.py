@@ -23,7 +23,7 @@ from armblocks.diagram import (
     State,
     WorkedExample,
     broadcast,
-    made,
+    driver,
     parameter,
     shape_of,
 )
@@ -42,7 +42,7 @@ class SecondOrderIntegrator(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A mass on a spring: the acceleration is -4 x, so it oscillates at 2 rad/s.",
         parameters={"initial": 1.0},
-        inputs={"u": made("Gain", gain=-4.0).by(u="x")},
+        inputs={"u": driver("Gain", gain=-4.0).by(u="x")},
         shown=("x", "dx"),
     )
 
@@ -96,8 +96,8 @@ class SecondOrderIntegratorLimited(Block):
         shows="A ball that keeps 0.7 of its speed at each bounce and finally rests.",
         parameters={"initial": 1.0, "lower": 0.0, "reinitialize": True},
         inputs={
-            "u": made("Constant", value=-9.81).named("gravity"),
-            "dx0": made("Gain", gain=-0.7).by(u="dx"),
+            "u": driver("Constant", value=-9.81).named("gravity"),
+            "dx0": driver("Gain", gain=-0.7).by(u="dx"),
         },
         shown=("x", "dx"),
         stop_time=3.0,
@@ -120,14 +120,14 @@ class SecondOrderIntegratorLimited(Block):
         limits_in_order(self, "lower", "upper")
         limits_in_order(self, "lower_speed", "upper_speed")
         names = ("lower", "upper", "lower_speed", "upper_speed")
-        found = {name: self.parameter_value(name) for name in names}
-        broadcast({name: shape_of(value) for name, value in found.items()})
-        limits = [np.asarray(found[name], dtype=np.float64) for name in names]
+        values = {name: self.parameter_value(name) for name in names}
+        broadcast({name: shape_of(value) for name, value in values.items()})
+        limits = [np.asarray(values[name], dtype=np.float64) for name in names]
         lower, upper, slowest, fastest = np.broadcast_arrays(*limits)
         moving = (slowest > 0.0) & np.isfinite(upper) | (fastest < 0.0) & np.isfinite(lower)
         if moving.any():
             raise InputError(
-                f"x has a limit, and dx is held between {found['lower_speed']} and {found['upper_speed']}",
+                f"x has a limit, and dx is held between {values['lower_speed']} and {values['upper_speed']}",
                 where=self.type_name(),
                 allowed="lower_speed <= 0 <= upper_speed where x has a limit, because the speed is 0 there",
                 fix="widen the limits of dx, or remove the limit of x",
@@ -173,8 +173,8 @@ class SecondOrderIntegratorLimited(Block):
         return {"x": x["x"], "dx": x["dx"]}
 
     def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        still = logic_or(x["rests"] != 0.0, x["fastest"] != 0.0)
-        return {"x": if_else(x["rests"] == 0.0, x["dx"], 0.0), "dx": if_else(still, 0.0, u["u"])}
+        at_limit = logic_or(x["rests"] != 0.0, x["fastest"] != 0.0)
+        return {"x": if_else(x["rests"] == 0.0, x["dx"], 0.0), "dx": if_else(at_limit, 0.0, u["u"])}
 
     def initial_states(self, p: Signals) -> Signals:
         return {
@@ -193,12 +193,12 @@ class SecondOrderIntegratorLimited(Block):
         }
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        still = u["u"] == 0.0
+        unaccelerated = u["u"] == 0.0
 
         def driven(mode: SX) -> tuple[SX, SX]:
             """Whether u points towards the upper and the lower limit; a limit mode ends when u turns back."""
-            upwards = logic_or(u["u"] > 0.0, logic_and(mode > 0.0, still))
-            return upwards, logic_or(u["u"] < 0.0, logic_and(mode < 0.0, still))
+            upwards = logic_or(u["u"] > 0.0, logic_and(mode > 0.0, unaccelerated))
+            return upwards, logic_or(u["u"] < 0.0, logic_and(mode < 0.0, unaccelerated))
 
         up, down = driven(x["rests"])
         at_upper = logic_and(x["x"] >= p["upper"], logic_and(x["dx"] >= 0.0, up))
@@ -212,9 +212,9 @@ class SecondOrderIntegratorLimited(Block):
         }
 
     def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        found = dict(super().contradictions(t, x, u, p))
-        found["rests"] = logic_or(found["rests"], logic_or(*self._impacts(x, p)))
-        return found
+        inconsistent = dict(super().contradictions(t, x, u, p))
+        inconsistent["rests"] = logic_or(inconsistent["rests"], logic_or(*self._impacts(x, p)))
+        return inconsistent
 
     def _impacts(self, x: Signals, p: Signals) -> tuple[SX, SX]:
         """Whether the state is at the upper (lower) limit and its speed points beyond it."""
@@ -229,17 +229,17 @@ class SecondOrderIntegratorLimited(Block):
         away = if_else(at_upper, -bounced, bounced)
         stops = logic_and(hits, away <= p["rest_speed"])
         presses = if_else(at_upper, u["u"] >= 0.0, u["u"] <= 0.0)
-        place = if_else(at_upper, p["upper"], if_else(at_lower, p["lower"], x["x"]))
+        position = if_else(at_upper, p["upper"], if_else(at_lower, p["lower"], x["x"]))
         speed = if_else(hits, if_else(stops, 0.0, bounced), x["dx"])
         # The state is at a limit without speed away from it, and u turns towards the limit.
         pushed_up = logic_and(e["rises"] > 0.0, logic_and(x["x"] >= p["upper"], x["dx"] >= 0.0))
         pushed_down = logic_and(e["falls"] < 0.0, logic_and(x["x"] <= p["lower"], x["dx"] <= 0.0))
-        freed = logic_or(
+        leaves = logic_or(
             logic_and(x["rests"] > 0.0, e["falls"] < 0.0), logic_and(x["rests"] < 0.0, e["rises"] > 0.0)
         )
-        kept = if_else(freed, 0.0, x["rests"])
-        kept = if_else(hits, if_else(logic_and(stops, presses), if_else(at_upper, 1.0, -1.0), 0.0), kept)
-        rests = if_else(pushed_up, 1.0, if_else(pushed_down, -1.0, kept))
+        side = if_else(leaves, 0.0, x["rests"])
+        side = if_else(hits, if_else(logic_and(stops, presses), if_else(at_upper, 1.0, -1.0), 0.0), side)
+        rests = if_else(pushed_up, 1.0, if_else(pushed_down, -1.0, side))
         speed = if_else(logic_or(pushed_up, pushed_down), 0.0, speed)
         fast, fast_back = e["upper_speed"] > 0.0, e["lower_speed"] < 0.0
         pushed = logic_and(e["rises"] > 0.0, x["dx"] >= p["upper_speed"])
@@ -254,7 +254,7 @@ class SecondOrderIntegratorLimited(Block):
         free = logic_not(hits)
         speed = if_else(logic_and(free, fast), p["upper_speed"], speed)
         speed = if_else(logic_and(free, fast_back), p["lower_speed"], speed)
-        return {"x": place, "dx": speed, "rests": rests, "fastest": if_else(hits, 0.0, fastest)}
+        return {"x": position, "dx": speed, "rests": rests, "fastest": if_else(hits, 0.0, fastest)}
 
     def _own(self) -> Shape:
         names = ("initial", "initial_speed", "lower", "upper", "lower_speed", "upper_speed")

@@ -14,7 +14,7 @@ from armblocks.diagram import (
     Signals,
     State,
     WorkedExample,
-    made,
+    driver,
     parameter,
 )
 from armblocks.diagram.signs import FaceSign, Lines
@@ -38,7 +38,7 @@ class StateSpace(LinearBlock):
             "C": ((1.0, 0.0),),
             "D": ((0.0,),),
         },
-        inputs={"u": made("Step")},
+        inputs={"u": driver("Step")},
     )
 
     A: ArrayLike = parameter(((-1.0,),), dimensions=(2,), doc="the system matrix (n, n)", unit="1/s")

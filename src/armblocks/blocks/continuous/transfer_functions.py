@@ -13,7 +13,7 @@ from armblocks.diagram import (
     Signals,
     State,
     WorkedExample,
-    made,
+    driver,
 )
 from armblocks.diagram.signs import FaceSign, Fraction, polynomial
 
@@ -30,7 +30,7 @@ class TransferFunction(RationalBlock):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The step response of 4 / (s^2 + 0.8 s + 4): damping 0.2, natural frequency 2 rad/s.",
         parameters={"numerator": (4.0,), "denominator": (1.0, 0.8, 4.0)},
-        inputs={"u": made("Step")},
+        inputs={"u": driver("Step")},
     )
 
     def face_sign(self) -> FaceSign:

@@ -25,7 +25,7 @@ from armblocks.diagram import (
     State,
     WorkedExample,
     broadcast,
-    made,
+    driver,
     parameter,
     shape_of,
 )
@@ -42,11 +42,11 @@ class TransportDelay(Block):
 
     title: ClassVar[str] = "Transport Delay"
     sign: ClassVar[FaceSign] = Words("u(t − T)")
-    spreads: ClassVar[tuple[str, ...]] = ("initial",)
-    rated_inputs: ClassVar[tuple[str, ...]] = ("u",)
+    broadcast_parameters: ClassVar[tuple[str, ...]] = ("initial",)
+    differentiated_inputs: ClassVar[tuple[str, ...]] = ("u",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A step and a sine, both delayed by one second.",
-        inputs={"u": made("Sum").by(u1=made("Step", time=2.0), u2=made("SineWave"))},
+        inputs={"u": driver("Sum").by(u1=driver("Step", time=2.0), u2=driver("SineWave"))},
     )
 
     delay: float = parameter(1.0, above=0.0, doc="the delay", unit="s")
@@ -76,7 +76,7 @@ class TransportDelay(Block):
     def delay_bounds(self, p: Signals) -> Mapping[str, tuple[SX, SX]]:
         return {"past": (p["delay"], p["delay"])}
 
-    def initial_past(self, p: Signals) -> Signals:
+    def initial_history(self, p: Signals) -> Signals:
         return {"past": p["initial"]}
 
 
@@ -90,10 +90,10 @@ class VariableTimeDelay(Block):
 
     title: ClassVar[str] = "Variable Time Delay"
     sign: ClassVar[FaceSign] = Words("u(t − d)")
-    rated_inputs: ClassVar[tuple[str, ...]] = ("u",)
+    differentiated_inputs: ClassVar[tuple[str, ...]] = ("u",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A sine whose delay grows from 0.1 s to 2 s: the output has a lower frequency.",
-        inputs={"u": made("SineWave", frequency=3.0), "d": made("Ramp", slope=0.3)},
+        inputs={"u": driver("SineWave", frequency=3.0), "d": driver("Ramp", slope=0.3)},
     )
 
     shortest: float = parameter(0.1, above=0.0, doc="the shortest delay", unit="s")
@@ -130,7 +130,7 @@ class VariableTimeDelay(Block):
     def delay_bounds(self, p: Signals) -> Mapping[str, tuple[SX, SX]]:
         return {"past": (p["shortest"], p["longest"])}
 
-    def initial_past(self, p: Signals) -> Signals:
+    def initial_history(self, p: Signals) -> Signals:
         return {"past": p["initial"]}
 
 
@@ -145,11 +145,11 @@ class VariableTransportDelay(Block):
 
     title: ClassVar[str] = "Variable Transport Delay"
     sign: ClassVar[FaceSign] = Words("u(t − τ)")
-    rated_inputs: ClassVar[tuple[str, ...]] = ("u", "T")
+    differentiated_inputs: ClassVar[tuple[str, ...]] = ("u", "T")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The flow in a pipe slows down and its transit time grows from 1 s: the sine is delayed more "
         "and more.",
-        inputs={"u": made("SineWave", frequency=2.0), "T": made("Ramp", slope=0.2, initial=1.0)},
+        inputs={"u": driver("SineWave", frequency=2.0), "T": driver("Ramp", slope=0.2, initial=1.0)},
     )
 
     initial_delay: float = parameter(1.0, above=0.0, doc="the transit time for t <= 0", unit="s")
@@ -206,5 +206,5 @@ class VariableTransportDelay(Block):
     def delay_bounds(self, p: Signals) -> Mapping[str, tuple[SX, SX]]:
         return dict.fromkeys(("past", "transit"), (p["shortest"], p["longest"]))
 
-    def initial_past(self, p: Signals) -> Signals:
+    def initial_history(self, p: Signals) -> Signals:
         return {"past": p["initial"], "transit": p["initial_delay"]}

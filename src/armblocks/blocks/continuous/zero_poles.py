@@ -22,7 +22,7 @@ from armblocks.diagram import (
     Signals,
     State,
     WorkedExample,
-    made,
+    driver,
     parameter,
     shape_of,
 )
@@ -42,7 +42,7 @@ class ZeroPole(SectionsByRoots):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The step response of a zero at -2 and poles at -0.5 and -1 ± 3i.",
         parameters={"zeros": (-2.0,), "poles": ((-0.5, 0.0), (-1.0, 3.0), (-1.0, -3.0)), "gain": 2.5},
-        inputs={"u": made("Step")},
+        inputs={"u": driver("Step")},
     )
 
     def face_sign(self) -> FaceSign:
@@ -68,7 +68,7 @@ class AnalogFilter(FilterByBand):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A square wave of 0.25 Hz after a Butterworth low-pass filter with its edge at 10 rad/s.",
         parameters={"order": 4, "edge": 10.0},
-        inputs={"u": made("SignalGenerator", waveform="square", frequency=0.25)},
+        inputs={"u": driver("SignalGenerator", waveform="square", frequency=0.25)},
     )
 
     edge: float = parameter(

@@ -27,7 +27,7 @@ from armblocks.diagram import (
     State,
     WorkedExample,
     broadcast,
-    made,
+    driver,
     parameter,
     shape_of,
 )
@@ -38,13 +38,13 @@ from armblocks.diagram.signs import DEAD_ZONE, SATURATION, FaceSign, graph, stai
 class Saturation(Block):
     """The input limited to a range: y = min(max(u, lower), upper)."""
 
-    memoryless: ClassVar[bool] = True
+    following_modes: ClassVar[bool] = True
     title: ClassVar[str] = "Saturation"
     sign: ClassVar[FaceSign] = SATURATION
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The crests of the sine are cut off at 1.5, its troughs at -0.5.",
         parameters={"lower": -0.5, "upper": 1.5},
-        inputs={"u": made("SineWave", amplitude=2.0)},
+        inputs={"u": driver("SineWave", amplitude=2.0)},
     )
 
     lower: ArrayLike = parameter(
@@ -96,7 +96,7 @@ class Saturation(Block):
 class DeadZone(Block):
     """A dead zone: y = u - end above the zone, u - start below the zone, 0 within the zone."""
 
-    memoryless: ClassVar[bool] = True
+    following_modes: ClassVar[bool] = True
     title: ClassVar[str] = "Dead Zone"
     sign: ClassVar[FaceSign] = DEAD_ZONE
     example: ClassVar[WorkedExample] = WorkedExample(
@@ -174,7 +174,7 @@ class Relay(Block):
         return {"y": broadcast({**inputs, **own})}
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("mode", inputs["u"], "1 on, 0 off", follows=True, remembers=True),)
+        return (State("mode", inputs["u"], "1 on, 0 off", follows=True, hysteresis=True),)
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         return (
@@ -205,12 +205,12 @@ class Quantizer(Block):
     prevents chattering by rounding errors.
     """
 
-    memoryless: ClassVar[bool] = True
+    following_modes: ClassVar[bool] = True
     title: ClassVar[str] = "Quantizer"
     sign: ClassVar[FaceSign] = stairs((0.0, 0.33, 0.67, 1.0))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The sine rounded to multiples of 0.5.",
-        inputs={"u": made("SineWave", amplitude=2.0)},
+        inputs={"u": driver("SineWave", amplitude=2.0)},
     )
 
     interval: float = parameter(0.5, above=0.0, doc="the height of a step")
@@ -239,8 +239,8 @@ class Quantizer(Block):
         return {"up": within - 0.5 + THRESHOLD_OFFSET, "down": within + 0.5 + 1e-9}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        now = floor(u["u"] / p["interval"] + 0.5)
-        return {"step": cell_of(now, x["step"], self.guard_values(t, x, u, p))}
+        step = floor(u["u"] / p["interval"] + 0.5)
+        return {"step": cell_of(step, x["step"], self.guard_values(t, x, u, p))}
 
     def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"step": beyond(self.guard_values(t, x, u, p))}

@@ -20,7 +20,7 @@ from armblocks.diagram import (
     State,
     WorkedExample,
     broadcast,
-    made,
+    driver,
     parameter,
     shape_of,
 )
@@ -31,13 +31,13 @@ from armblocks.diagram.signs import FaceSign, graph
 class CoulombFriction(Block):
     """Coulomb and viscous friction: y = sign(u) (offset + gain |u|), and 0 at rest."""
 
-    memoryless: ClassVar[bool] = True
+    following_modes: ClassVar[bool] = True
     title: ClassVar[str] = "Coulomb and Viscous Friction"
     sign: ClassVar[FaceSign] = graph((0, 0), (0.5, 0.3), (0.5, 0.7), (1, 1))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Friction for a sinusoidal speed: it jumps when the speed changes its sign.",
         parameters={"gain": 0.5},
-        inputs={"u": made("SineWave")},
+        inputs={"u": driver("SineWave")},
     )
 
     offset: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, minimum=0.0, doc="Coulomb friction")
@@ -89,9 +89,9 @@ class Backlash(Block):
             "A gear with play 1: the output follows at half the play and is constant while "
             "the input crosses the play."
         ),
-        inputs={"u": made("SineWave", amplitude=2.0)},
+        inputs={"u": driver("SineWave", amplitude=2.0)},
     )
-    rated_inputs: ClassVar[tuple[str, ...]] = ("u",)
+    differentiated_inputs: ClassVar[tuple[str, ...]] = ("u",)
 
     width: float = parameter(1.0, minimum=0.0, doc="the width of the play")
     initial: float = parameter(0.0, doc="the output at t = 0, if that is within the play")
@@ -107,11 +107,11 @@ class Backlash(Block):
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         doc = "the output just before the latest instant, or before the latest event at that instant"
-        return (State("rest", inputs["u"], doc, remembers=True),)
+        return (State("rest", inputs["u"], doc, hysteresis=True),)
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
         doc = "1 driven upwards, -1 downwards, 0 at rest"
-        return (State("mode", inputs["u"], doc, follows=True, remembers=True),)
+        return (State("mode", inputs["u"], doc, follows=True, hysteresis=True),)
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         shape = inputs["u"]
@@ -144,13 +144,13 @@ class Backlash(Block):
         # When u reverses at an end of the play, rounding must not drive the output in the old direction
         # again.
         above, below = if_else(u["u'"] < 0.0, band, 0.0), if_else(u["u'"] > 0.0, -band, 0.0)
-        by_place = if_else(ahead - half > above, 1.0, if_else(ahead + half < below, -1.0, 0.0))
+        by_position = if_else(ahead - half > above, 1.0, if_else(ahead + half < below, -1.0, 0.0))
         # A driven output stops when u reverses or jumps back; beyond the other end it is driven back.
         released = logic_or(u["u'"] < 0.0, ahead < half - band)
         released_down = logic_or(u["u'"] > 0.0, ahead > band - half)
-        upwards = if_else(released, fmin(by_place, 0.0), 1.0)
-        downwards = if_else(released_down, fmax(by_place, 0.0), -1.0)
-        return {"mode": if_else(x["mode"] > 0.0, upwards, if_else(x["mode"] < 0.0, downwards, by_place))}
+        upwards = if_else(released, fmin(by_position, 0.0), 1.0)
+        downwards = if_else(released_down, fmax(by_position, 0.0), -1.0)
+        return {"mode": if_else(x["mode"] > 0.0, upwards, if_else(x["mode"] < 0.0, downwards, by_position))}
 
     def initial_states(self, p: Signals) -> Signals:
         return {"rest": p["initial"]}
@@ -171,7 +171,7 @@ class StickSlipFriction(Block):
             "The force grows evenly. The mass rests, and friction holds the force, until it breaks "
             "away at 1.2 N; then 1 N remains."
         ),
-        inputs={"F": made("Ramp", slope=0.2)},
+        inputs={"F": driver("Ramp", slope=0.2)},
     )
 
     mass: float = parameter(1.0, above=0.0, doc="the mass", unit="kg")

@@ -21,7 +21,7 @@ from armblocks.diagram import (
     State,
     WorkedExample,
     broadcast,
-    made,
+    driver,
     parameter,
 )
 from armblocks.diagram.signs import DEAD_ZONE, SATURATION, FaceSign, graph
@@ -57,9 +57,9 @@ class SaturationDynamic(MovingLimits):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A sine between -0.2 and a limit that rises.",
         inputs={
-            "upper": made("Ramp", slope=0.1).named("upper"),
-            "u": made("SineWave"),
-            "lower": made("Constant", value=-0.2).named("lower"),
+            "upper": driver("Ramp", slope=0.1).named("upper"),
+            "u": driver("SineWave"),
+            "lower": driver("Constant", value=-0.2).named("lower"),
         },
     )
 
@@ -79,9 +79,9 @@ class DeadZoneDynamic(MovingLimits):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The part of a sine outside a zone whose upper end rises.",
         inputs={
-            "upper": made("Ramp", slope=0.1).named("upper"),
-            "u": made("SineWave"),
-            "lower": made("Constant", value=-0.2).named("lower"),
+            "upper": driver("Ramp", slope=0.1).named("upper"),
+            "u": driver("SineWave"),
+            "lower": driver("Constant", value=-0.2).named("lower"),
         },
     )
 
@@ -98,11 +98,11 @@ class WrapToZero(Block):
 
     title: ClassVar[str] = "Wrap To Zero"
     sign: ClassVar[FaceSign] = graph((0, 0), (0.6, 1), (0.6, 0), (1, 0))
-    spreads: ClassVar[tuple[str, ...]] = ("threshold",)
+    broadcast_parameters: ClassVar[tuple[str, ...]] = ("threshold",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A ramp that falls to 0 once it exceeds 5.",
         parameters={"threshold": 5.0},
-        inputs={"u": made("Ramp")},
+        inputs={"u": driver("Ramp")},
     )
 
     threshold: ArrayLike = parameter(255.0, kind=ParameterKind.ARRAY, doc="upper limit of the output")
@@ -137,7 +137,7 @@ class HitCrossing(Block):
     """
 
     title: ClassVar[str] = "Hit Crossing"
-    spreads: ClassVar[tuple[str, ...]] = ("offset",)
+    broadcast_parameters: ClassVar[tuple[str, ...]] = ("offset",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A sine crosses 0.5 upwards and downwards: the count increases at each crossing.",
         parameters={"offset": 0.5},
@@ -165,8 +165,8 @@ class HitCrossing(Block):
         )
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
-        way = {"rising": 1, "falling": -1, "either": 0}[self.direction]
-        return (Guard("crosses", self.output_shapes(inputs)["count"], "u - offset", way),)
+        direction = {"rising": 1, "falling": -1, "either": 0}[self.direction]
+        return (Guard("crosses", self.output_shapes(inputs)["count"], "u - offset", direction),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"count": x["count"], "last": x["last"]}

@@ -26,7 +26,7 @@ from armblocks.diagram import (
     Signals,
     State,
     WorkedExample,
-    made,
+    driver,
     parameter,
     sample_time_parameter,
 )
@@ -40,7 +40,7 @@ APART = 1e-3
 class RateLimiting(Block):
     """Base class of the continuous rate limiters; subclasses give the limits."""
 
-    rated_inputs: ClassVar[tuple[str, ...]] = ("u",)
+    differentiated_inputs: ClassVar[tuple[str, ...]] = ("u",)
 
     @abstractmethod
     def limits(self, u: Signals, p: Signals) -> Signals:
@@ -56,12 +56,12 @@ class RateLimiting(Block):
         return (State("y", self.output_shapes(inputs)["y"], "the output while a rate limit is active"),)
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        kept = State(
+        left_limit = State(
             "kept",
             self.output_shapes(inputs)["y"],
             "left limit of the output at the latest tick, event or breakpoint",
         )
-        return (kept, State("kept_at", (), "time of the latest tick, event or breakpoint", "s"))
+        return (left_limit, State("kept_at", (), "time of the latest tick, event or breakpoint", "s"))
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
         doc = "1 at the rising limit, -1 at the falling limit, 0 following u"
@@ -151,11 +151,11 @@ class RateLimiterContinuous(RateLimiting):
 
     title: ClassVar[str] = "Rate Limiter (continuous)"
     sign: ClassVar[FaceSign] = RATE_LIMIT
-    spreads: ClassVar[tuple[str, ...]] = ("rising", "falling", "initial")
+    broadcast_parameters: ClassVar[tuple[str, ...]] = ("rising", "falling", "initial")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A sine whose rate is limited to 0.5 per second upwards and 0.8 per second downwards.",
         parameters={"rising": 0.5, "falling": -0.8},
-        inputs={"u": made("SineWave")},
+        inputs={"u": driver("SineWave")},
     )
 
     rising: ArrayLike = parameter(
@@ -182,13 +182,13 @@ class RateLimiterDynamic(RateLimiting):
     """
 
     title: ClassVar[str] = "Rate Limiter Dynamic"
-    spreads: ClassVar[tuple[str, ...]] = ("initial",)
+    broadcast_parameters: ClassVar[tuple[str, ...]] = ("initial",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A sine whose upper rate limit grows and whose lower rate limit is -0.8 per second.",
         inputs={
-            "rising": made("Ramp", slope=0.1),
-            "u": made("SineWave"),
-            "falling": made("Constant", value=-0.8),
+            "rising": driver("Ramp", slope=0.1),
+            "u": driver("SineWave"),
+            "falling": driver("Constant", value=-0.8),
         },
         shown=("u", "y"),
     )
@@ -212,11 +212,11 @@ class RateLimiter(Block):
 
     title: ClassVar[str] = "Rate Limiter"
     sign: ClassVar[FaceSign] = RATE_LIMIT
-    spreads: ClassVar[tuple[str, ...]] = ("rising", "falling", "initial")
+    broadcast_parameters: ClassVar[tuple[str, ...]] = ("rising", "falling", "initial")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Pulses whose edges are limited to 1 per second upwards and 2 per second downwards.",
         parameters={"falling": -2.0, "sample_time": 0.05},
-        inputs={"u": made("PulseGenerator", period=5.0, delay=0.5)},
+        inputs={"u": driver("PulseGenerator", period=5.0, delay=0.5)},
     )
     sampled: ClassVar[bool] = True
 
@@ -239,8 +239,8 @@ class RateLimiter(Block):
         return (State("x", self.output_shapes(inputs)["y"], "the output at the previous tick"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        least, most = x["x"] + p["falling"] * p["T"], x["x"] + p["rising"] * p["T"]
-        return {"y": fmin(fmax(u["u"], least), most)}
+        lower, upper = x["x"] + p["falling"] * p["T"], x["x"] + p["rising"] * p["T"]
+        return {"y": fmin(fmax(u["u"], lower), upper)}
 
     def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"x": self.outputs(t, x, u, p)["y"]}

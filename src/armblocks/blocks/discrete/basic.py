@@ -56,7 +56,7 @@ class DiscreteIntegrator(Block):
     """
 
     title: ClassVar[str] = "Discrete-Time Integrator"
-    spreads: ClassVar[tuple[str, ...]] = ("gain", "initial")
+    broadcast_parameters: ClassVar[tuple[str, ...]] = ("gain", "initial")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The integral of a sine by the forward Euler method: one rectangle for each tick.",
     )
@@ -109,16 +109,16 @@ class DiscreteIntegrator(Block):
         if share:
             free = free + share * p["gain"] * p["T"] * u["u"]
         y = self._limited(free, p) if share or self._has_resets else free
-        found = {"y": y}
+        values = {"y": y}
         if self.saturation_port:
-            found["saturated"] = if_else(y >= p["upper"], 1.0, if_else(y <= p["lower"], -1.0, 0.0))
-        return found | ({"state": x["x"]} if self.state_port else {})
+            values["saturated"] = if_else(y >= p["upper"], 1.0, if_else(y <= p["lower"], -1.0, 0.0))
+        return values | ({"state": x["x"]} if self.state_port else {})
 
     def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         after = {"x": self._limited(self._begun(x, u, p) + p["gain"] * p["T"] * u["u"], p)}
         if self._has_resets:
-            still = self.external_reset == "none"
-            after["seen"] = SX(0.0) if still else side_of(self.external_reset, u["reset"])
+            untriggered = self.external_reset == "none"
+            after["seen"] = SX(0.0) if untriggered else side_of(self.external_reset, u["reset"])
         return after
 
     def initial_states(self, p: Signals) -> Signals:
@@ -135,12 +135,12 @@ class DiscreteIntegrator(Block):
         """The state at this tick, after a possible reset."""
         if not self._has_resets:
             return x["x"]
-        anew = SX(0.0)
+        resets = SX(0.0)
         if self.external_reset != "none":
-            anew = fires_at_tick(self.external_reset, u["reset"], x["seen"])
+            resets = fires_at_tick(self.external_reset, u["reset"], x["seen"])
         if self.initial_condition_source == "external":
-            anew = logic_or(anew, x["seen"] < 0.0)
-        return if_else(anew, u.get("initial", p["initial"]), x["x"])
+            resets = logic_or(resets, x["seen"] < 0.0)
+        return if_else(resets, u.get("initial", p["initial"]), x["x"])
 
     def _limited(self, value: SX, p: Signals) -> SX:
         return fmin(fmax(value, p["lower"]), p["upper"])
@@ -152,7 +152,7 @@ class Difference(Block):
 
     title: ClassVar[str] = "Difference"
     sign: ClassVar[FaceSign] = Words("1 − z⁻¹")
-    spreads: ClassVar[tuple[str, ...]] = ("initial",)
+    broadcast_parameters: ClassVar[tuple[str, ...]] = ("initial",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The change of the sine since the last tick.",
     )
@@ -185,7 +185,7 @@ class DiscreteDerivative(Block):
     """The difference quotient between two ticks: y(k) = gain (u(k) - u(k-1)) / T."""
 
     title: ClassVar[str] = "Discrete Derivative"
-    spreads: ClassVar[tuple[str, ...]] = ("gain", "initial")
+    broadcast_parameters: ClassVar[tuple[str, ...]] = ("gain", "initial")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The derivative of the sine from two samples: it lags by half a period.",
     )

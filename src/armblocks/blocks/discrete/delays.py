@@ -29,7 +29,7 @@ from armblocks.diagram import (
     State,
     WorkedExample,
     broadcast,
-    made,
+    driver,
     parameter,
     sample_time_parameter,
     shape_of,
@@ -46,7 +46,7 @@ OUTPUT = Port("y", "the held signal")
 class OneTickDelay(Block):
     """Base class of Unit Delay and Memory."""
 
-    spreads: ClassVar[tuple[str, ...]] = ("initial",)
+    broadcast_parameters: ClassVar[tuple[str, ...]] = ("initial",)
     sampled: ClassVar[bool] = True
 
     initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the output at the first tick")
@@ -104,7 +104,7 @@ class Memory(OneTickDelay):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The sampled sine, delayed by one tick; the sample time is inherited from the input.",
         parameters={"sample_time": -1.0},
-        inputs={"u": made("ZeroOrderHold", sample_time=0.5).by(u=made("SineWave"))},
+        inputs={"u": driver("ZeroOrderHold", sample_time=0.5).by(u=driver("SineWave"))},
     )
 
 
@@ -170,9 +170,9 @@ class ResettableDelay(Block):
         shows="A sine delayed by three ticks and reset to -1 at each rising edge of the pulses.",
         parameters={"length": 3, "external_reset": "rising", "sample_time": 0.1},
         inputs={
-            "u": made("SineWave"),
-            "reset": made("PulseGenerator", period=4.0, delay=2.0),
-            "initial": made("Constant", value=-1.0),
+            "u": driver("SineWave"),
+            "reset": driver("PulseGenerator", period=4.0, delay=2.0),
+            "initial": driver("Constant", value=-1.0),
         },
     )
     sampled: ClassVar[bool] = True
@@ -206,21 +206,21 @@ class ResettableDelay(Block):
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         shape = self.output_shapes(inputs)["y"]
-        past = State("x", (self.length, math.prod(shape)), "the last inputs, oldest first")
+        history = State("x", (self.length, math.prod(shape)), "the last inputs, oldest first")
         held = (State("held", shape, "the output at the previous tick"),)
-        return (past, SEEN, *(held if self.enable_port else ()))
+        return (history, SEEN, *(held if self.enable_port else ()))
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         oldest = x["x"][0, :].T
-        fresh = if_else(self._anew(x, u), self._start(u, p) + SX.zeros(*oldest.shape), oldest)
-        return {"y": if_else(u["enable"] != 0.0, fresh, x["held"]) if self.enable_port else fresh}
+        output = if_else(self._resets(x, u), self._start(u, p) + SX.zeros(*oldest.shape), oldest)
+        return {"y": if_else(u["enable"] != 0.0, output, x["held"]) if self.enable_port else output}
 
     def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        past = x["x"]
-        row = SX.zeros(1, past.shape[1])
+        history = x["x"]
+        row = SX.zeros(1, history.shape[1])
         start = repmat(self._start(u, p).T + row, self.length, 1)
-        now = if_else(self._anew(x, u), start, past)
-        after = {"x": vertcat(now[1:, :], u["u"].T + row), "seen": self._side(u)}
+        buffer = if_else(self._resets(x, u), start, history)
+        after = {"x": vertcat(buffer[1:, :], u["u"].T + row), "seen": self._side(u)}
         if not self.enable_port:
             return after
         works = u["enable"] != 0.0
@@ -229,8 +229,8 @@ class ResettableDelay(Block):
 
     def initial_states(self, p: Signals) -> Signals:
         many = p["initial"].numel() > 1
-        past = repmat(p["initial"].T, self.length, 1) if many else p["initial"]
-        return {"x": past, "seen": SX(-1.0), **({"held": p["initial"]} if self.enable_port else {})}
+        history = repmat(p["initial"].T, self.length, 1) if many else p["initial"]
+        return {"x": history, "seen": SX(-1.0), **({"held": p["initial"]} if self.enable_port else {})}
 
     def initial_outputs(self, p: Signals) -> Signals:
         return {"y": p["initial"]}
@@ -241,7 +241,7 @@ class ResettableDelay(Block):
     def _start(self, u: Signals, p: Signals) -> SX:
         return u.get("initial", p["initial"])
 
-    def _anew(self, x: Signals, u: Signals) -> SX:
+    def _resets(self, x: Signals, u: Signals) -> SX:
         """1 at the first tick if a port gives the initial value, and where the trigger fires."""
         first = x["seen"] < 0.0 if self.initial_condition_source == "external" else SX(0.0)
         if self.external_reset == "none":
@@ -332,7 +332,7 @@ class RateTransition(Block):
     title: ClassVar[str] = "Rate Transition"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A signal with a sample time of 0.2 s, transferred to a part with a sample time of 1 s.",
-        inputs={"u": made("ZeroOrderHold", sample_time=0.2).by(u=made("SineWave"))},
+        inputs={"u": driver("ZeroOrderHold", sample_time=0.2).by(u=driver("SineWave"))},
     )
     sampled: ClassVar[bool] = True
 

@@ -17,7 +17,7 @@ from armblocks.diagram import (
     Signals,
     State,
     WorkedExample,
-    made,
+    driver,
     parameter,
     sample_time_parameter,
 )
@@ -29,11 +29,11 @@ class TransferFunctionFirstOrder(Block):
     """A sampled first-order lag with unit steady-state gain: y(k) = pole y(k-1) + (1 - pole) u(k)."""
 
     title: ClassVar[str] = "Transfer Fcn First Order"
-    spreads: ClassVar[tuple[str, ...]] = ("pole", "initial")
+    broadcast_parameters: ClassVar[tuple[str, ...]] = ("pole", "initial")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The step response: each tick covers a fifth of the remaining distance.",
         parameters={"pole": 0.8},
-        inputs={"u": made("Step")},
+        inputs={"u": driver("Step")},
     )
     sampled: ClassVar[bool] = True
 
@@ -76,11 +76,11 @@ class TransferFunctionLeadOrLag(Block):
     """
 
     title: ClassVar[str] = "Transfer Fcn Lead or Lag"
-    spreads: ClassVar[tuple[str, ...]] = ("pole", "zero", "initial", "initial_input")
+    broadcast_parameters: ClassVar[tuple[str, ...]] = ("pole", "zero", "initial", "initial_input")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The step response goes from 1 to (1 - zero) / (1 - pole) = 2.5.",
         parameters={"pole": 0.8, "zero": 0.5},
-        inputs={"u": made("Step")},
+        inputs={"u": driver("Step")},
     )
     sampled: ClassVar[bool] = True
 
@@ -120,10 +120,10 @@ class TransferFunctionRealZero(Block):
     """A sampled zero: y(k) = u(k) - zero u(k-1), which is (z - zero) / z."""
 
     title: ClassVar[str] = "Transfer Fcn Real Zero"
-    spreads: ClassVar[tuple[str, ...]] = ("zero", "initial_input")
+    broadcast_parameters: ClassVar[tuple[str, ...]] = ("zero", "initial_input")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The step response: 1 for one tick, then 1 - zero = 0.25.",
-        inputs={"u": made("Step")},
+        inputs={"u": driver("Step")},
     )
     sampled: ClassVar[bool] = True
 

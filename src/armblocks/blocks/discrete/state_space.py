@@ -14,7 +14,7 @@ from armblocks.diagram import (
     Signals,
     State,
     WorkedExample,
-    made,
+    driver,
     sample_time_parameter,
 )
 from armblocks.diagram.signs import FaceSign, Lines
@@ -32,7 +32,7 @@ class DiscreteStateSpace(LinearBlock):
     sign: ClassVar[FaceSign] = Lines(("x⁺ = A x + B u", "y = C x + D u"))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The step response of x(k+1) = 0.5 x + u: each tick halves the distance to 2.",
-        inputs={"u": made("Step")},
+        inputs={"u": driver("Step")},
     )
     sampled: ClassVar[bool] = True
 

@@ -20,7 +20,7 @@ from armblocks.diagram import (
     Signals,
     State,
     WorkedExample,
-    made,
+    driver,
     parameter,
     sample_time_parameter,
     shape_of,
@@ -40,7 +40,7 @@ class DiscreteTransferFunction(RationalBlock):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The step response of z / (z - 0.5): each tick halves the distance to 2.",
         parameters={"numerator": (1.0, 0.0), "denominator": (1.0, -0.5)},
-        inputs={"u": made("Step")},
+        inputs={"u": driver("Step")},
     )
     sampled: ClassVar[bool] = True
 
@@ -65,7 +65,7 @@ class DiscreteFilter(RationalBlock):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A low-pass filter smooths pulses.",
         parameters={"numerator": (0.2,), "denominator": (1.0, -0.8), "sample_time": 0.1},
-        inputs={"u": made("PulseGenerator", period=4.0)},
+        inputs={"u": driver("PulseGenerator", period=4.0)},
     )
     sampled: ClassVar[bool] = True
 
@@ -119,7 +119,7 @@ class DiscreteFir(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The mean of the last four samples of pulses: edges become ramps.",
         parameters={"coefficients": (0.25, 0.25, 0.25, 0.25), "sample_time": 0.2},
-        inputs={"u": made("PulseGenerator", period=4.0)},
+        inputs={"u": driver("PulseGenerator", period=4.0)},
     )
     sampled: ClassVar[bool] = True
 

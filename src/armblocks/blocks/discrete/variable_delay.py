@@ -15,7 +15,7 @@ from armblocks.diagram import (
     Signals,
     State,
     WorkedExample,
-    made,
+    driver,
     parameter,
     sample_time_parameter,
 )
@@ -36,7 +36,7 @@ class VariableIntegerDelay(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A sine whose delay grows by a tick of 0.1 s each second.",
         parameters={"longest": 10, "sample_time": 0.1},
-        inputs={"u": made("SineWave"), "d": made("Clock")},
+        inputs={"u": driver("SineWave"), "d": driver("Clock")},
     )
 
     longest: int = parameter(10, minimum=1, doc="the longest delay, in ticks")
@@ -64,10 +64,10 @@ class VariableIntegerDelay(Block):
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         ticks = fmin(fmax(floor(u["d"]), 0.0), float(self.longest))
-        found = u["u"]
+        delayed = u["u"]
         for k in range(1, self.longest + 1):
-            found = if_else(ticks == float(k), x["past"][k - 1, :].T, found)
-        return {"y": found}
+            delayed = if_else(ticks == float(k), x["past"][k - 1, :].T, delayed)
+        return {"y": delayed}
 
     def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"past": vertcat(u["u"].T, x["past"][:-1, :])}

@@ -25,7 +25,7 @@ from armblocks.diagram import (
     Signals,
     State,
     WorkedExample,
-    made,
+    driver,
     parameter,
     sample_time_parameter,
     shape_of,
@@ -51,7 +51,7 @@ class DiscreteZeroPole(SectionsByRoots):
             "gain": 0.34,
             "sample_time": 0.2,
         },
-        inputs={"u": made("Step")},
+        inputs={"u": driver("Step")},
     )
 
     poles: ArrayLike = parameter((0.0, 0.5), dimensions=(1, 2), tunable=False, roots=True, doc="p1 … pn")
@@ -81,8 +81,9 @@ class DigitalFilter(FilterByBand):
         shows="A noisy sine, sampled every 0.02 s, after a low-pass filter with its edge at 2 Hz.",
         parameters={"order": 3, "edge": 0.08, "sample_time": 0.02},
         inputs={
-            "u": made("Sum").by(
-                u1=made("SineWave", frequency=2.0), u2=made("RandomNumber", variance=0.1, sample_time=0.02)
+            "u": driver("Sum").by(
+                u1=driver("SineWave", frequency=2.0),
+                u2=driver("RandomNumber", variance=0.1, sample_time=0.02),
             )
         },
     )

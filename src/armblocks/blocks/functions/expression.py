@@ -17,7 +17,7 @@ from armblocks.diagram import (
     Shapes,
     Signals,
     WorkedExample,
-    made,
+    driver,
     parameter,
     shape_of,
 )
@@ -26,7 +26,7 @@ from armblocks.errors import InputError, UnknownNameError
 from armblocks.matlab.formula import Formula
 from armblocks.matlab.functions import RESERVED, TABLE
 
-_TAKEN = frozenset(name for name in RESERVED if TABLE[name].most == 0 or TABLE[name].elementwise)
+_RESERVED = frozenset(name for name in RESERVED if TABLE[name].most == 0 or TABLE[name].elementwise)
 """Names that no constant may have; a constant may hide a function of whole arrays, such as ``sum``."""
 
 
@@ -45,7 +45,7 @@ class Expression(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A decaying oscillation as a formula of the input, plotted over a ramp.",
         parameters={"formula": "sin(3 * u) * exp(-k * u)", "names": "k", "values": (0.3,)},
-        inputs={"u": made("Ramp")},
+        inputs={"u": driver("Ramp")},
         shown=("y",),
     )
 
@@ -62,11 +62,13 @@ class Expression(Block):
     def check(self) -> None:
         Formula(self.formula, "Expression.formula")
         names = self._names()
-        taken = {*_TAKEN, "t", *(port.name for port in self.input_ports())}
-        wrong = [name for name in names if not name.isidentifier() or name in taken or names.count(name) > 1]
-        if wrong:
+        reserved = {*_RESERVED, "t", *(port.name for port in self.input_ports())}
+        invalid = [
+            name for name in names if not name.isidentifier() or name in reserved or names.count(name) > 1
+        ]
+        if invalid:
             raise InputError(
-                f"'{wrong[0]}' cannot be the name of a constant",
+                f"'{invalid[0]}' cannot be the name of a constant",
                 where="Expression.names",
                 allowed="unique names of letters, digits and _ that have no other meaning in formulas",
                 fix="choose another name",

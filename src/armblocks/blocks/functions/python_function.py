@@ -88,9 +88,9 @@ class PythonFunction(Block):
     def _called(self, t: SX, u: Signals, shapes: Shapes) -> Mapping[str, Any]:
         """The results of the function for symbolic arguments."""
         user = cast("UserFunction", self.function)
-        given = {name: _array(value, shapes[name]) for name, value in u.items()}
+        arguments = {name: _array(value, shapes[name]) for name, value in u.items()}
         if "t" in user.arguments:
-            given["t"] = t
+            arguments["t"] = t
         names = _names(self.results)
         where = f"the function {user.name}"
         try:
@@ -98,10 +98,10 @@ class PythonFunction(Block):
                 # CasADi warns that the result type of NumPy functions of its values will change; it is SX
                 # here.
                 warnings.simplefilter("ignore", FutureWarning)
-                returned: Any = user.function(**given)
+                returned: Any = user.function(**arguments)
             values = [returned] if len(names) == 1 else list(returned)
-            found = [value if isinstance(value, SX) else np.array(value, dtype=object) for value in values]
-            for value in found:
+            results = [value if isinstance(value, SX) else np.array(value, dtype=object) for value in values]
+            for value in results:
                 _symbols(value)
         except ArmblocksError:
             raise
@@ -112,13 +112,13 @@ class PythonFunction(Block):
                 fix="replace 'if' by casadi.if_else, max by casadi.fmax, and functions of other libraries; "
                 "or use a CalledPythonFunction, which runs at its ticks",
             ) from error
-        if len(found) != len(names):
+        if len(results) != len(names):
             raise InputError(
-                f"{where} returns {len(found)} values for the results {', '.join(names)}",
+                f"{where} returns {len(results)} values for the results {', '.join(names)}",
                 allowed="one value for each result",
                 fix="correct the function or the names",
             )
-        return dict(zip(names, found))
+        return dict(zip(names, results))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -177,22 +177,22 @@ class CalledPythonFunction(Block):
         )
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        taken = (State(f"{name}?", shape, f"{name} at the tick") for name, shape in inputs.items())
-        given = (
+        arguments = (State(f"{name}?", shape, f"{name} at the tick") for name, shape in inputs.items())
+        results = (
             State(f"{port.name}?", port.shape or (), f"result of the function for {port.name}")
             for port in self.output_ports()
         )
-        return (*taken, *given)
+        return (*arguments, *results)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         # The outputs depend on the inputs without an equation; the order of the tick must include this.
         all_inputs = sum((sum1(sum2(value)) for value in u.values()), SX(0.0))
-        given = {port.name: x[f"{port.name}?"] for port in self.output_ports()}
-        return {name: if_else(all_inputs > 0.0, value, value) for name, value in given.items()}
+        results = {port.name: x[f"{port.name}?"] for port in self.output_ports()}
+        return {name: if_else(all_inputs > 0.0, value, value) for name, value in results.items()}
 
     def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        taken = {f"{name}?": value for name, value in u.items()}
-        return taken | {f"{port.name}?": x[f"{port.name}?"] for port in self.output_ports()}
+        arguments = {f"{name}?": value for name, value in u.items()}
+        return arguments | {f"{port.name}?": x[f"{port.name}?"] for port in self.output_ports()}
 
     def initial_states(self, p: Signals) -> Signals:
         ports = (*self.input_ports(), *self.output_ports())
@@ -200,10 +200,10 @@ class CalledPythonFunction(Block):
 
     def call(self, t: float, inputs: Mapping[str, Any]) -> Mapping[str, Any]:
         user = cast("UserFunction", self.function)
-        given = {**inputs, **({"t": t} if "t" in user.arguments else {})}
+        arguments = {**inputs, **({"t": t} if "t" in user.arguments else {})}
         names = _names(self.results)
         try:
-            returned: Any = user.function(**given)
+            returned: Any = user.function(**arguments)
             values = [returned] if len(names) == 1 else list(returned)
         except ArmblocksError:
             raise
@@ -237,9 +237,11 @@ def _argument_ports(function: UserFunction) -> tuple[Port, ...]:
 
 def _check_results(block: Block, names: list[str]) -> None:
     """Raise ``InputError`` if the results of a function cannot be ports."""
-    taken = {port.name for port in block.input_ports()}
-    wrong = [name for name in names if not name.isidentifier() or names.count(name) > 1 or name in taken]
-    if wrong or not names:
+    argument_names = {port.name for port in block.input_ports()}
+    invalid = [
+        name for name in names if not name.isidentifier() or names.count(name) > 1 or name in argument_names
+    ]
+    if invalid or not names:
         raise InputError(
             f"the results are '{block.parameter_value('results')}'",
             where=f"{block.type_name()}.results",
@@ -252,11 +254,11 @@ def _array(value: SX, shape: Shape) -> Any:
     """The argument of the user's function for a symbolic input: a symbol, or an array of symbols."""
     if not shape:
         return value
-    found = np.empty(shape, dtype=object)
+    array = np.empty(shape, dtype=object)
     flat = flatten(value, shape)
-    for k, place in enumerate(itertools.product(*map(range, shape))):
-        found[place] = flat[k]
-    return found
+    for k, index in enumerate(itertools.product(*map(range, shape))):
+        array[index] = flat[k]
+    return array
 
 
 def _natural_shape(value: SX) -> Shape:

@@ -28,7 +28,7 @@ from armblocks.diagram import (
     Signals,
     WorkedExample,
     broadcast,
-    made,
+    driver,
     parameter,
     shape_of,
 )
@@ -56,7 +56,7 @@ class RelationalOperator(Block):
     title: ClassVar[str] = "Relational Operator"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="1 while the sine is at most 0.5.",
-        inputs={"u1": made("SineWave"), "u2": made("Constant", value=0.5)},
+        inputs={"u1": driver("SineWave"), "u2": driver("Constant", value=0.5)},
     )
 
     relation: str = parameter("<=", choices=tuple(_RELATIONS), doc="the relation")
@@ -93,8 +93,8 @@ class LogicalOperator(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="1 while both pulses are 1.",
         inputs={
-            "u1": made("PulseGenerator", period=4.0).named("slow"),
-            "u2": made("PulseGenerator", period=1.0).named("fast"),
+            "u1": driver("PulseGenerator", period=4.0).named("slow"),
+            "u2": driver("PulseGenerator", period=1.0).named("fast"),
         },
     )
 
@@ -122,8 +122,8 @@ class LogicalOperator(Block):
         if self.operator == "NOT":
             return {"y": logic_not(conditions[0])}
         gate, opposite = _GATES[self.operator]
-        found = reduce(gate, conditions)
-        return {"y": logic_not(found) if opposite else found}
+        result = reduce(gate, conditions)
+        return {"y": logic_not(result) if opposite else result}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,7 +131,7 @@ class CompareToConstant(Block):
     """A comparison with a constant, element by element: y = 1 if u (relation) constant is true, else 0."""
 
     title: ClassVar[str] = "Compare To Constant"
-    spreads: ClassVar[tuple[str, ...]] = ("constant",)
+    broadcast_parameters: ClassVar[tuple[str, ...]] = ("constant",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="1 while the sine is above 0.5.",
         parameters={"relation": ">", "constant": 0.5},
@@ -241,9 +241,9 @@ class IntervalTestDynamic(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="1 while the sine is between two limits, of which the upper one rises.",
         inputs={
-            "upper": made("Ramp", slope=0.1),
-            "u": made("SineWave"),
-            "lower": made("Constant", value=-0.5),
+            "upper": driver("Ramp", slope=0.1),
+            "u": driver("SineWave"),
+            "lower": driver("Constant", value=-0.5),
         },
     )
 
@@ -287,9 +287,9 @@ class CombinatorialLogic(Block):
         shows="The truth table of exclusive or: 1 while exactly one of the two pulses is 1.",
         parameters={"table": ((0.0,), (1.0,), (1.0,), (0.0,))},
         inputs={
-            "u": made("Mux").by(
-                u1=made("PulseGenerator", period=4.0).named("slow"),
-                u2=made("PulseGenerator", period=1.0).named("fast"),
+            "u": driver("Mux").by(
+                u1=driver("PulseGenerator", period=4.0).named("slow"),
+                u2=driver("PulseGenerator", period=1.0).named("fast"),
             )
         },
     )
@@ -347,9 +347,9 @@ class TruthTable(Block):
             "actions": ((2.0,), (1.0,), (0.0,)),
         },
         inputs={
-            "u": made("Mux").by(
-                u1=made("PulseGenerator", period=4.0).named("slow"),
-                u2=made("PulseGenerator", period=1.0).named("fast"),
+            "u": driver("Mux").by(
+                u1=driver("PulseGenerator", period=4.0).named("slow"),
+                u2=driver("PulseGenerator", period=1.0).named("fast"),
             )
         },
     )
@@ -384,11 +384,11 @@ class TruthTable(Block):
                 fix="use several tables",
             )
         table = rows.tolist()
-        for given in product((0, 1), repeat=rows.shape[1]):
-            if any(all(want in (-1.0, one) for want, one in zip(row, given)) for row in table):
+        for combination in product((0, 1), repeat=rows.shape[1]):
+            if any(all(want in (-1.0, one) for want, one in zip(row, combination)) for row in table):
                 continue
             raise InputError(
-                f"the conditions {list(given)} are not decided",
+                f"the conditions {list(combination)} are not decided",
                 where="TruthTable.decisions",
                 allowed="a decision for every combination of conditions",
                 fix="add a last row of -1 for all others",
@@ -411,7 +411,7 @@ class TruthTable(Block):
         rows: list[list[float]] = np.asarray(self.decisions, dtype=np.float64).tolist()
         action, true = p["actions"][len(rows) - 1, :].T, _truth(x, "u")
         for k in reversed(range(len(rows) - 1)):
-            requested = [true[i] == want for i, want in enumerate(rows[k]) if want >= 0.0]
+            requested = [true[i] == required for i, required in enumerate(rows[k]) if required >= 0.0]
             action = if_else(reduce(logic_and, requested, SX(1.0)), p["actions"][k, :].T, action)
         return {"y": action}
 
@@ -454,5 +454,5 @@ def _related(relation: str, x: Signals) -> SX:
     if relation in ("==", "~="):
         different = logic_or(x["above"], x["below"])
         return logic_not(different) if relation == "==" else different
-    found = x["above"] if relation in (">", "<=") else x["below"]
-    return found if relation in (">", "<") else logic_not(found)
+    result = x["above"] if relation in (">", "<=") else x["below"]
+    return result if relation in (">", "<") else logic_not(result)

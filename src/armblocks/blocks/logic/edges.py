@@ -18,7 +18,7 @@ from armblocks.diagram import (
     State,
     WorkedExample,
     broadcast,
-    made,
+    driver,
     parameter,
     sample_time_parameter,
     shape_of,
@@ -43,7 +43,7 @@ _EDGES: Mapping[str, Callable[[SX, SX], SX]] = {
     "fall negative": lambda u, before: logic_and(u < 0.0, before >= 0.0),
     "fall nonpositive": lambda u, before: logic_and(u <= 0.0, before > 0.0),
 }
-_PULSES = made("SineWave", frequency=2.0)
+_PULSES = driver("SineWave", frequency=2.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +55,7 @@ class EdgeDetection(Block):
     """
 
     title: ClassVar[str] = "Edge Detection"
-    spreads: ClassVar[tuple[str, ...]] = ("initial",)
+    broadcast_parameters: ClassVar[tuple[str, ...]] = ("initial",)
     sampled: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="1 at each tick at which the sine has become positive.",
@@ -100,8 +100,8 @@ class SRFlipFlop(Block):
         shows="Set by one pulse, reset by another.",
         parameters={"sample_time": 0.1},
         inputs={
-            "S": made("PulseGenerator", period=4.0, width=10.0, delay=1.0).named("set"),
-            "R": made("PulseGenerator", period=4.0, width=10.0, delay=3.0).named("reset"),
+            "S": driver("PulseGenerator", period=4.0, width=10.0, delay=1.0).named("set"),
+            "R": driver("PulseGenerator", period=4.0, width=10.0, delay=3.0).named("reset"),
         },
     )
 
@@ -149,7 +149,10 @@ class DFlipFlop(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The sine, sampled at each rising edge of the pulses.",
         parameters={"sample_time": 0.1},
-        inputs={"D": made("SineWave"), "CLK": made("PulseGenerator", period=1.0, delay=0.5).named("clock")},
+        inputs={
+            "D": driver("SineWave"),
+            "CLK": driver("PulseGenerator", period=1.0, delay=0.5).named("clock"),
+        },
     )
 
     trigger: str = parameter("rising edge", choices=("rising edge", "level"), doc="when Q is set to D")
@@ -203,9 +206,9 @@ class JKFlipFlop(Block):
         shows="With J = K = 1 it halves the frequency of the pulses.",
         parameters={"sample_time": 0.1},
         inputs={
-            "J": made("Constant", value=1.0).named("one"),
-            "CLK": made("PulseGenerator", period=1.0, delay=0.25).named("clock"),
-            "K": made("Constant", value=1.0).named("one"),
+            "J": driver("Constant", value=1.0).named("one"),
+            "CLK": driver("PulseGenerator", period=1.0, delay=0.25).named("clock"),
+            "K": driver("Constant", value=1.0).named("one"),
         },
     )
 
@@ -255,7 +258,7 @@ class Counter(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The periods of a sine are counted until a step resets the count.",
         parameters={"sample_time": 0.1},
-        inputs={"u": _PULSES, "reset": made("Step", time=8.0).named("reset")},
+        inputs={"u": _PULSES, "reset": driver("Step", time=8.0).named("reset")},
     )
 
     initial: float = parameter(0.0, doc="the count at the start and after a reset")

@@ -21,7 +21,7 @@ from armblocks.diagram import (
     Shapes,
     Signals,
     WorkedExample,
-    made,
+    driver,
     parameter,
     shape_of,
 )
@@ -41,7 +41,7 @@ class Prelookup(BlockWithAxes):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The index of the interval that contains the input, and the fraction of the interval.",
         parameters={"positions": (0.0, 2.0, 5.0, 10.0)},
-        inputs={"u": made("Ramp")},
+        inputs={"u": driver("Ramp")},
         shown=("k", "f"),
     )
 
@@ -71,7 +71,7 @@ class Prelookup(BlockWithAxes):
 
         def fraction(u: SX, cell: SX) -> SX:
             k = interval(cell)
-            begin, end = (self._at(points, place) for place in (k, k + 1.0))
+            begin, end = (self._at(points, index) for index in (k, k + 1.0))
             free = (u - begin) / (end - begin)
             if self.extrapolation == "linear":
                 return free
@@ -82,10 +82,10 @@ class Prelookup(BlockWithAxes):
     def _is_long(self) -> bool:
         return is_long(shape_of(self.positions), "linear")
 
-    def _at(self, points: SX, place: SX) -> SX:
+    def _at(self, points: SX, index: SX) -> SX:
         if self._is_long():
-            return read_entry(points, place)
-        return sum((if_else(place == float(k), points[k], 0.0) for k in range(points.numel())), SX(0.0))
+            return read_entry(points, index)
+        return sum((if_else(index == float(k), points[k], 0.0) for k in range(points.numel())), SX(0.0))
 
     def _positions_by_input(self) -> Mapping[str, list[float]]:
         return {"u": numbers_of(self, "positions")}
@@ -111,11 +111,11 @@ class InterpolationUsingPrelookup(Block):
         shows="The curve, with the interval and the fraction from a Prelookup.",
         parameters={"table": (0.0, 3.0, 1.0, 2.0)},
         inputs={
-            "k1": made("Prelookup", positions=(0.0, 2.0, 5.0, 10.0))
+            "k1": driver("Prelookup", positions=(0.0, 2.0, 5.0, 10.0))
             .named("prelookup")
-            .by(u=made("Ramp"))
+            .by(u=driver("Ramp"))
             .at("k"),
-            "f1": made("Prelookup", positions=(0.0, 2.0, 5.0, 10.0)).named("prelookup").at("f"),
+            "f1": driver("Prelookup", positions=(0.0, 2.0, 5.0, 10.0)).named("prelookup").at("f"),
         },
     )
 
@@ -148,25 +148,25 @@ class InterpolationUsingPrelookup(Block):
         entries = flatten(p["table"], shape)
 
         def value(*pairs: SX) -> SX:
-            places = list(zip(pairs[::2], pairs[1::2], shape))
+            positions = list(zip(pairs[::2], pairs[1::2], shape))
             if is_long(shape):
-                return read(entries, shape, [_corners(*place) for place in places])
-            return contract(p["table"], shape, [_weights(*place) for place in places])
+                return read(entries, shape, [_corners(*position) for position in positions])
+            return contract(p["table"], shape, [_weights(*position) for position in positions])
 
         return {"y": elementwise([*u.values()], value)}
 
 
 def _corners(k: SX, f: SX, n: int) -> list[tuple[SX, SX]]:
     """Index and weight of the two entries for an index and a fraction."""
-    place = fmin(fmax(floor(k), 0.0), float(n - 2))
-    return [(place, 1.0 - f), (place + 1.0, f)]
+    index = fmin(fmax(floor(k), 0.0), float(n - 2))
+    return [(index, 1.0 - f), (index + 1.0, f)]
 
 
 def _weights(k: SX, f: SX, n: int) -> list[SX]:
     """Weights of all n entries."""
-    (place, left), (_, right) = _corners(k, f, n)
+    (index, left), (_, right) = _corners(k, f, n)
     return [
-        if_else(place == float(i), left, 0.0) + if_else(place == float(i - 1), right, 0.0) for i in range(n)
+        if_else(index == float(i), left, 0.0) + if_else(index == float(i - 1), right, 0.0) for i in range(n)
     ]
 
 
@@ -181,7 +181,7 @@ class DirectLookup(BlockWithSteps):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A counter reads the table entry by entry.",
         parameters={"table": (0.5, 2.0, 1.0, -1.0)},
-        inputs={"u": made("CounterLimited", upper=3)},
+        inputs={"u": driver("CounterLimited", upper=3)},
     )
 
     table: ArrayLike = parameter((0.0, 1.0), dimensions=(1, 2, 3, 4), doc="the entries")
@@ -207,8 +207,8 @@ class DirectLookup(BlockWithSteps):
 
         def entry(*indices: SX) -> SX:
             if is_long(shape):
-                held = (fmin(fmax(floor(u), 0.0), n - 1.0) for u, n in zip(indices, shape))
-                return read(entries, shape, [[(place, SX(1.0))] for place in held])
+                limited = (fmin(fmax(floor(u), 0.0), n - 1.0) for u, n in zip(indices, shape))
+                return read(entries, shape, [[(index, SX(1.0))] for index in limited])
             axes = [cells(u, [float(k) for k in range(1, n)]) for u, n in zip(indices, shape)]
             return contract(p["table"], shape, axes)
 

@@ -24,7 +24,7 @@ from armblocks.diagram import (
     Signals,
     State,
     WorkedExample,
-    made,
+    driver,
     parameter,
     shape_of,
 )
@@ -46,7 +46,7 @@ class LookupTable1D(BlockWithAxes):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A curve through five points: linear interpolation, held beyond the ends.",
         parameters={"positions": (1.0, 3.0, 5.0, 6.0, 8.0), "table": (0.0, 2.0, 1.0, 1.5, 0.0)},
-        inputs={"u": made("Ramp")},
+        inputs={"u": driver("Ramp")},
     )
 
     positions: ArrayLike = parameter((0.0, 1.0), dimensions=(1,), tunable=False, doc="positions (n,)")
@@ -90,7 +90,7 @@ class LookupTable2D(BlockWithAxes):
             "positions2": (-1.0, 1.0),
             "table": ((0.0, 1.0), (2.0, 4.0), (1.0, 3.0)),
         },
-        inputs={"u1": made("Ramp"), "u2": made("SineWave", frequency=2.0)},
+        inputs={"u1": driver("Ramp"), "u2": driver("SineWave", frequency=2.0)},
     )
 
     positions1: ArrayLike = parameter(
@@ -144,7 +144,7 @@ class LookupTableND(BlockWithAxes):
             "table": ((0.0, 1.0, 1.0, 0.0), (2.0, 3.0, 3.0, 2.0), (1.0, 2.0, 2.0, 1.0), (0.0, 1.0, 1.0, 0.0)),
             "method": "cubic",
         },
-        inputs={"u1": made("Ramp"), "u2": made("Constant", value=1.5)},
+        inputs={"u1": driver("Ramp"), "u2": driver("Constant", value=1.5)},
     )
 
     positions: ArrayLike = parameter(
@@ -203,15 +203,15 @@ class LookupTableDynamic(Block):
     The positions must be strictly ascending at all times; if two of them are equal the output is not finite.
     """
 
-    memoryless: ClassVar[bool] = True
+    following_modes: ClassVar[bool] = True
     title: ClassVar[str] = "Lookup Table Dynamic"
     sign: ClassVar[FaceSign] = TABLE
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A curve whose values grow during the run.",
         inputs={
-            "u": made("SineWave", bias=1.0),
-            "positions": made("Constant", value=(0.0, 1.0, 2.0)),
-            "values": made("Ramp", slope=(0.0, 0.2, 0.1)),
+            "u": driver("SineWave", bias=1.0),
+            "positions": driver("Constant", value=(0.0, 1.0, 2.0)),
+            "values": driver("Ramp", slope=(0.0, 0.2, 0.1)),
         },
         shown=("u", "y"),
     )

@@ -29,7 +29,7 @@ from armblocks.diagram import (
     State,
     WorkedExample,
     broadcast,
-    made,
+    driver,
 )
 from armblocks.diagram.signs import FaceSign, Words
 
@@ -42,7 +42,7 @@ class DegreesToRadians(Block):
     sign: ClassVar[FaceSign] = Words("° → rad")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="An angle from 0 to 360 degrees, in radians from 0 to 2 pi.",
-        inputs={"u": made("Ramp", slope=36.0)},
+        inputs={"u": driver("Ramp", slope=36.0)},
         shown=("y",),
     )
 
@@ -64,7 +64,7 @@ class RadiansToDegrees(Block):
     sign: ClassVar[FaceSign] = Words("rad → °")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="An angle from 0 to 10 radians, in degrees.",
-        inputs={"u": made("Ramp")},
+        inputs={"u": driver("Ramp")},
         shown=("y",),
     )
 
@@ -89,7 +89,7 @@ class CartesianToPolar(Block):
             "A point on an ellipse with the half axes 2 and 1: its distance, and its angle, which wraps at "
             "pi."
         ),
-        inputs={"x": made("SineWave", amplitude=2.0, phase=pi / 2), "y": made("SineWave")},
+        inputs={"x": driver("SineWave", amplitude=2.0, phase=pi / 2), "y": driver("SineWave")},
     )
 
     def input_ports(self) -> tuple[Port, ...]:
@@ -117,11 +117,11 @@ class PolarToCartesian(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Distance and angle grow linearly: the point moves along an Archimedean spiral.",
         inputs={
-            "r": made("Ramp", slope=0.1).named("distance"),
-            "angle": made("Ramp", slope=2.0).named("angle"),
+            "r": driver("Ramp", slope=0.1).named("distance"),
+            "angle": driver("Ramp", slope=2.0).named("angle"),
         },
-        across="x",
-        up="y",
+        x_axis="x",
+        y_axis="y",
     )
 
     def input_ports(self) -> tuple[Port, ...]:
@@ -144,11 +144,11 @@ class PolarToCartesian(Block):
 class AngleDifference(Block):
     """The wrapped difference of two angles: y = mod(a - b + pi, 2 pi) - pi, with -pi <= y < pi."""
 
-    memoryless: ClassVar[bool] = True
+    following_modes: ClassVar[bool] = True
     title: ClassVar[str] = "angdiff"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The wrapped difference between a linearly growing angle and 1 rad.",
-        inputs={"a": made("Ramp"), "b": made("Constant")},
+        inputs={"a": driver("Ramp"), "b": driver("Constant")},
     )
 
     zero_crossing: bool = zero_crossing_parameter()
@@ -176,8 +176,8 @@ class AngleDifference(Block):
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         if not self.zero_crossing:
             return {}
-        now = turns_of("mod", _raised(u), _TURN)
-        return {"turns": cell_of(now, x["turns"], self.guard_values(t, x, u, p))}
+        turns = turns_of("mod", _raised(u), _TURN)
+        return {"turns": cell_of(turns, x["turns"], self.guard_values(t, x, u, p))}
 
     def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"turns": beyond(self.guard_values(t, x, u, p))} if self.zero_crossing else {}

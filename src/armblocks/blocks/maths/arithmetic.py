@@ -26,7 +26,7 @@ from armblocks.diagram import (
     Shapes,
     Signals,
     WorkedExample,
-    made,
+    driver,
     parameter,
 )
 from armblocks.diagram.signs import FaceSign, Words, function_sign, graph, plus
@@ -74,7 +74,7 @@ class Bias(Block):
     """A constant added to every element: y = u + bias."""
 
     title: ClassVar[str] = "Bias"
-    spreads: ClassVar[tuple[str, ...]] = ("bias",)
+    broadcast_parameters: ClassVar[tuple[str, ...]] = ("bias",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The sine, 1 higher.",
         parameters={"bias": 1.0},
@@ -159,7 +159,7 @@ class Sqrt(Block):
 
     title: ClassVar[str] = "Sqrt"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The square root of a ramp.", inputs={"u": made("Ramp")}
+        shows="The square root of a ramp.", inputs={"u": driver("Ramp")}
     )
 
     function: str = parameter("sqrt", choices=tuple(_ROOTS), doc="root, signed root or reciprocal root")
@@ -185,7 +185,7 @@ class Hypot(Block):
     sign: ClassVar[FaceSign] = Words("√(u²+v²)")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows=("The hypotenuse of a right triangle with one leg of 3 and one that grows: it is 5 at 4 s."),
-        inputs={"u": made("Ramp"), "v": made("Constant", value=3.0)},
+        inputs={"u": driver("Ramp"), "v": driver("Constant", value=3.0)},
     )
 
     def input_ports(self) -> tuple[Port, ...]:
@@ -209,7 +209,7 @@ class Divide(Block):
     sign: ClassVar[FaceSign] = Words("÷")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A sine divided by a divisor that rises from 1 to 3.",
-        inputs={"dividend": made("SineWave"), "divisor": made("Ramp", slope=0.2, initial=1.0)},
+        inputs={"dividend": driver("SineWave"), "divisor": driver("Ramp", slope=0.2, initial=1.0)},
     )
 
     def input_ports(self) -> tuple[Port, ...]:
@@ -234,9 +234,9 @@ class Polynomial(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The parabola u^2 - 1, over u.",
         parameters={"coefficients": (1.0, 0.0, -1.0)},
-        inputs={"u": made("Ramp", slope=0.4, initial=-2.0)},
-        across="u",
-        up="y",
+        inputs={"u": driver("Ramp", slope=0.4, initial=-2.0)},
+        x_axis="u",
+        y_axis="y",
     )
 
     coefficients: ArrayLike = parameter((1.0, 0.0), dimensions=(1,), doc="c1 … c(n+1), highest power first")

@@ -25,7 +25,7 @@ from armblocks.diagram import (
     Signals,
     WorkedExample,
     broadcast,
-    made,
+    driver,
     parameter,
     shape_of,
 )
@@ -40,11 +40,11 @@ class Gain(Block):
 
     title: ClassVar[str] = "Gain"
     outline: ClassVar[Outline] = Outline.TRIANGLE
-    spreads: ClassVar[tuple[str, ...]] = ("gain",)
+    broadcast_parameters: ClassVar[tuple[str, ...]] = ("gain",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Half the sine.",
         parameters={"gain": 0.5},
-        inputs={"u": made("SineWave")},
+        inputs={"u": driver("SineWave")},
     )
 
     gain: ArrayLike = parameter(
@@ -69,7 +69,7 @@ class MatrixGain(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows=("A rotation by 90 degrees: the outputs are minus the second input and the first input."),
         parameters={"gain": ((0.0, -1.0), (1.0, 0.0))},
-        inputs={"u": made("SineWave", amplitude=(1.0, 0.5))},
+        inputs={"u": driver("SineWave", amplitude=(1.0, 0.5))},
     )
 
     gain: ArrayLike = parameter(((1.0,),), kind=ParameterKind.ARRAY, dimensions=(2,), doc="the matrix (m, n)")
@@ -95,7 +95,7 @@ class Sum(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A step minus a sine.",
         parameters={"signs": "+-"},
-        inputs={"u1": made("Step"), "u2": made("SineWave")},
+        inputs={"u1": driver("Step"), "u2": driver("SineWave")},
     )
 
     signs: str = parameter("++", doc="one + or - for each input, such as +-")
@@ -138,8 +138,8 @@ class Product(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A fast sine times a slow one: its amplitude rises and falls.",
         inputs={
-            "u1": made("SineWave", frequency=8.0).named("fast"),
-            "u2": made("SineWave", frequency=0.6).named("slow"),
+            "u1": driver("SineWave", frequency=8.0).named("fast"),
+            "u2": driver("SineWave", frequency=0.6).named("slow"),
         },
     )
 
@@ -177,8 +177,8 @@ class MatrixProduct(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A shear of the vector (1, sin t): the second element is added to the first.",
         inputs={
-            "A": made("Constant", value=((1.0, 1.0), (0.0, 1.0))),
-            "B": made("SineWave", amplitude=(0.0, 1.0), bias=(1.0, 0.0)),
+            "A": driver("Constant", value=((1.0, 1.0), (0.0, 1.0))),
+            "B": driver("SineWave", amplitude=(0.0, 1.0), bias=(1.0, 0.0)),
         },
         shown=("B", "y"),
     )
@@ -296,7 +296,7 @@ class Trigonometry(Block):
     title: ClassVar[str] = "Trigonometric Function"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The sine of an angle that rises at a constant rate.",
-        inputs={"u": made("Ramp")},
+        inputs={"u": driver("Ramp")},
     )
 
     function: str = parameter("sin", choices=tuple(_TRIGONOMETRY), doc="the function f")
@@ -325,7 +325,7 @@ class Atan2(Block):
             "The angle of a point that runs around a circle: it jumps from pi to -pi where it crosses "
             "the negative x axis."
         ),
-        inputs={"y": made("SineWave").named("sine"), "x": made("SineWave", phase=pi / 2).named("cosine")},
+        inputs={"y": driver("SineWave").named("sine"), "x": driver("SineWave", phase=pi / 2).named("cosine")},
     )
 
     def input_ports(self) -> tuple[Port, ...]:
@@ -349,7 +349,7 @@ class Power(Block):
     sign: ClassVar[FaceSign] = Words("uᵛ")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A base between 1 and 3 to a power that rises from -1 to 1: at 5 s, power 0, the output is 1.",
-        inputs={"base": made("SineWave", bias=2.0), "exponent": made("Ramp", slope=0.2, initial=-1.0)},
+        inputs={"base": driver("SineWave", bias=2.0), "exponent": driver("Ramp", slope=0.2, initial=-1.0)},
     )
 
     def input_ports(self) -> tuple[Port, ...]:
@@ -395,9 +395,9 @@ class MinMax(Block):
         )
 
     def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        way = -1.0 if self.function == "min" else 1.0
+        sign = -1.0 if self.function == "min" else 1.0
         values = list(u.values())
-        return {f"beyond{k}": way * (values[k - 1] - self._best(x, values, k - 1)) for k in self._later()}
+        return {f"beyond{k}": sign * (values[k - 1] - self._best(x, values, k - 1)) for k in self._later()}
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": self._best(x, list(u.values()), self.inputs)}

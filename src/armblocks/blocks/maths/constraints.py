@@ -16,7 +16,7 @@ from armblocks.diagram import (
     Signals,
     WorkedExample,
     broadcast,
-    made,
+    driver,
     parameter,
     shape_of,
 )
@@ -39,8 +39,8 @@ class AlgebraicConstraint(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The z for which z + z^3 is the sine.",
         inputs={
-            "u": made("Expression", formula="u2 + u2 ^ 3 - u1", inputs=2).by(
-                u1=made("SineWave").named("sine"), u2="z"
+            "u": driver("Expression", formula="u2 + u2 ^ 3 - u1", inputs=2).by(
+                u1=driver("SineWave").named("sine"), u2="z"
             )
         },
         shown=("sine/y", "z"),

@@ -19,7 +19,7 @@ from armblocks.diagram import (
     Signals,
     WorkedExample,
     broadcast,
-    made,
+    driver,
     parameter,
     sample_time_parameter,
 )
@@ -70,7 +70,7 @@ class WeightedSampleTime(Block):
     """A signal and the sample time T: y(k) = u(k) + weight T, and likewise with -, * or /."""
 
     title: ClassVar[str] = "Weighted Sample Time Math"
-    spreads: ClassVar[tuple[str, ...]] = ("weight",)
+    broadcast_parameters: ClassVar[tuple[str, ...]] = ("weight",)
     sampled: ClassVar[bool] = True
 
     operation: str = parameter("+", choices=tuple(_OPERATIONS), doc="operation")
@@ -97,7 +97,7 @@ class SineWaveFunction(Block):
     title: ClassVar[str] = "Sine Wave Function"
     sign: ClassVar[FaceSign] = swing(1.0)
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The input is a time that runs twice as fast.", inputs={"u": made("Ramp", slope=2.0)}
+        shows="The input is a time that runs twice as fast.", inputs={"u": driver("Ramp", slope=2.0)}
     )
 
     amplitude: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="half the peak-to-peak value")

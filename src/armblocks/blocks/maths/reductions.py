@@ -13,7 +13,7 @@ from casadi import SX, dot, fabs, fmax, if_else, sqrt, vertcat
 
 from armblocks.blocks.example_signals import CIRCLING, THREE_PHASES
 from armblocks.blocks.switching import located, zero_crossing_parameter
-from armblocks.diagram import Block, Condition, Port, Shapes, Signals, WorkedExample, made, parameter
+from armblocks.diagram import Block, Condition, Port, Shapes, Signals, WorkedExample, driver, parameter
 from armblocks.diagram.signs import FaceSign, Words
 from armblocks.errors import InputError
 
@@ -109,9 +109,9 @@ class Extremum(Block):
         )
 
     def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        way, values = -1.0 if self.function == "min" else 1.0, _elements(u["u"])
+        sign, values = -1.0 if self.function == "min" else 1.0, _elements(u["u"])
         return {
-            f"beyond{k}": way * (values[k - 1] - self._best(x, values[: k - 1])[0])
+            f"beyond{k}": sign * (values[k - 1] - self._best(x, values[: k - 1])[0])
             for k in range(2, len(values) + 1)
         }
 
@@ -136,7 +136,7 @@ class CumulativeSum(Block):
     sign: ClassVar[FaceSign] = Words("Σ↓")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Each output adds one more element of the vector: the partial sums of a square wave.",
-        inputs={"u": made("SineWave", amplitude=(1.0, 0.3333, 0.2), frequency=(1.0, 3.0, 5.0))},
+        inputs={"u": driver("SineWave", amplitude=(1.0, 0.3333, 0.2), frequency=(1.0, 3.0, 5.0))},
         shown=("y",),
     )
 
@@ -167,7 +167,7 @@ class DotProduct(Block):
     sign: ClassVar[FaceSign] = Words("u · v")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The component of a rotating vector along a fixed one.",
-        inputs={"u": CIRCLING, "v": made("Constant", value=(1.0, 1.0))},
+        inputs={"u": CIRCLING, "v": driver("Constant", value=(1.0, 1.0))},
     )
 
     def input_ports(self) -> tuple[Port, ...]:
@@ -201,7 +201,7 @@ class Norm(Block):
     sign: ClassVar[FaceSign] = Words("‖u‖")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The length of a vector that moves along an ellipse.",
-        inputs={"u": made("SineWave", amplitude=(2.0, 1.0), phase=(pi / 2, 0.0))},
+        inputs={"u": driver("SineWave", amplitude=(2.0, 1.0), phase=(pi / 2, 0.0))},
     )
 
     norm: str = parameter("2", choices=("2", "1", "inf", "fro"), doc="the norm")

@@ -27,7 +27,7 @@ from armblocks.diagram import (
     State,
     WorkedExample,
     broadcast,
-    made,
+    driver,
     parameter,
 )
 from armblocks.diagram.signs import FaceSign, Words, function_sign
@@ -41,7 +41,7 @@ class Rounding(BlockWithSteps):
     title: ClassVar[str] = "Rounding Function"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The greatest integer that is not above the signal.",
-        inputs={"u": made("SineWave", amplitude=3.0)},
+        inputs={"u": driver("SineWave", amplitude=3.0)},
     )
 
     function: str = parameter("floor", choices=tuple(ROUNDINGS), doc="the rounding rule")
@@ -73,12 +73,12 @@ class Modulo(Block):
     Both are exact. ``rem(u, 0)`` is NaN. In Simulink they are options of the Math Function block.
     """
 
-    memoryless: ClassVar[bool] = True
+    following_modes: ClassVar[bool] = True
     title: ClassVar[str] = "Modulo"
     sign: ClassVar[FaceSign] = Words("mod")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A ramp modulo 3: it restarts from 0 each time it reaches 3.",
-        inputs={"u": made("Ramp"), "v": made("Constant", value=3.0)},
+        inputs={"u": driver("Ramp"), "v": driver("Constant", value=3.0)},
     )
 
     function: str = parameter(
@@ -112,8 +112,8 @@ class Modulo(Block):
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         if not self.zero_crossing:
             return {}
-        now = turns_of(self.function, u["u"], u["v"])
-        return {"turns": cell_of(now, x["turns"], self.guard_values(t, x, u, p))}
+        turns = turns_of(self.function, u["u"], u["v"])
+        return {"turns": cell_of(turns, x["turns"], self.guard_values(t, x, u, p))}
 
     def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"turns": beyond(self.guard_values(t, x, u, p))} if self.zero_crossing else {}
@@ -165,9 +165,9 @@ def turn_guard_values(function: str, u: SX, v: SX, turns: SX) -> Signals:
     rule = _QUOTIENTS[function]
     edge, owned = rounding_edges(rule, turns)
     below, below_owned = rounding_edges(rule, -turns, mirrored=True)
-    found = {
+    values = {
         "up": (u - edge * v) * sign(v) + if_else(owned, THRESHOLD_OFFSET, -THRESHOLD_OFFSET),
         "down": (u + below * v) * sign(v) - if_else(below_owned, THRESHOLD_OFFSET, -THRESHOLD_OFFSET),
     }
     # With a divisor of zero, n is 0 and no event occurs.
-    return {name: if_else(v == 0.0, 0.0, value) for name, value in found.items()}
+    return {name: if_else(v == 0.0, 0.0, value) for name, value in values.items()}

@@ -17,7 +17,7 @@ from armblocks.diagram import (
     State,
     WorkedExample,
     broadcast,
-    made,
+    driver,
     parameter,
     sample_time_parameter,
     shape_of,
@@ -35,8 +35,8 @@ class MinMaxRunningResettable(Block):
         shows="The running maximum of a sine with growing amplitude.",
         parameters={"function": "max", "sample_time": 0.1},
         inputs={
-            "u": made("Product").by(u1=made("SineWave", frequency=2.0), u2=made("Ramp", slope=0.1)),
-            "reset": made("Ground").named("zero"),
+            "u": driver("Product").by(u1=driver("SineWave", frequency=2.0), u2=driver("Ramp", slope=0.1)),
+            "reset": driver("Ground").named("zero"),
         },
     )
 

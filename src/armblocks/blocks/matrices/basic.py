@@ -12,7 +12,7 @@ from casadi import SX, cross, diag, horzcat, mtimes, reshape, trace, vertcat
 
 from armblocks.blocks.elementwise import common_unit, numbered_ports
 from armblocks.blocks.elimination import determinant, solve
-from armblocks.diagram import Block, Port, Shapes, Signals, WorkedExample, made, parameter
+from armblocks.diagram import Block, Port, Shapes, Signals, WorkedExample, driver, parameter
 from armblocks.diagram.signs import FaceSign, Words
 from armblocks.equations import Shape
 from armblocks.errors import InputError
@@ -36,8 +36,8 @@ class CrossProduct(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A vector that rotates in the plane, times z: the product lags by a quarter turn.",
         inputs={
-            "u": made("SineWave", amplitude=(1.0, 1.0, 0.0), phase=(pi / 2, 0.0, 0.0)).named("turning"),
-            "v": made("Constant", value=(0.0, 0.0, 1.0)),
+            "u": driver("SineWave", amplitude=(1.0, 1.0, 0.0), phase=(pi / 2, 0.0, 0.0)).named("turning"),
+            "v": driver("Constant", value=(0.0, 0.0, 1.0)),
         },
         shown=("y",),
     )
@@ -60,7 +60,7 @@ class Transpose(Block):
     sign: ClassVar[FaceSign] = Words("Aᵀ")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The two off-diagonal entries change places.",
-        inputs={"u": made("SineWave", amplitude=((1.0, 2.0), (3.0, 4.0)))},
+        inputs={"u": driver("SineWave", amplitude=((1.0, 2.0), (3.0, 4.0)))},
     )
 
     def input_ports(self) -> tuple[Port, ...]:
@@ -88,7 +88,7 @@ class MatrixInverse(Block):
     sign: ClassVar[FaceSign] = Words("A⁻¹")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The entries of the inverse of [1 a; 0 2] while a rises: only the off-diagonal entry changes.",
-        inputs={"u": made("Ramp", slope=((0.0, 0.2), (0.0, 0.0)), initial=((1.0, 0.0), (0.0, 2.0)))},
+        inputs={"u": driver("Ramp", slope=((0.0, 0.2), (0.0, 0.0)), initial=((1.0, 0.0), (0.0, 2.0)))},
     )
 
     def input_ports(self) -> tuple[Port, ...]:
@@ -114,8 +114,8 @@ class LinearSolve(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The solution of [2 1; 1 3] y = (sin t, cos t).",
         inputs={
-            "A": made("Constant", value=((2.0, 1.0), (1.0, 3.0))),
-            "B": made("SineWave", phase=(0.0, 1.5707963267948966)),
+            "A": driver("Constant", value=((2.0, 1.0), (1.0, 3.0))),
+            "B": driver("SineWave", phase=(0.0, 1.5707963267948966)),
         },
         shown=("B", "y"),
     )
@@ -148,7 +148,7 @@ class Determinant(Block):
     sign: ClassVar[FaceSign] = Words("det")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The determinant of [1 a; a 1] while a oscillates: 1 - a^2.",
-        inputs={"u": made("SineWave", amplitude=((0.0, 1.0), (1.0, 0.0)), bias=((1.0, 0.0), (0.0, 1.0)))},
+        inputs={"u": driver("SineWave", amplitude=((0.0, 1.0), (1.0, 0.0)), bias=((1.0, 0.0), (0.0, 1.0)))},
     )
 
     def input_ports(self) -> tuple[Port, ...]:
@@ -174,7 +174,7 @@ class Trace(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The trace: one diagonal entry oscillates about 1, the other about 2.",
         inputs={
-            "u": made(
+            "u": driver(
                 "SineWave",
                 amplitude=((1.0, 0.0), (0.0, 0.5)),
                 bias=((1.0, 0.0), (0.0, 2.0)),
@@ -208,7 +208,7 @@ class MatrixPower(Block):
     sign: ClassVar[FaceSign] = Words("Aⁿ")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The square of [1 a; 0 1] is [1 2a; 0 1].",
-        inputs={"u": made("SineWave", amplitude=((0.0, 1.0), (0.0, 0.0)), bias=((1.0, 0.0), (0.0, 1.0)))},
+        inputs={"u": driver("SineWave", amplitude=((0.0, 1.0), (0.0, 0.0)), bias=((1.0, 0.0), (0.0, 1.0)))},
     )
 
     exponent: int = parameter(2, minimum=-100, maximum=100, doc="the exponent")
@@ -243,7 +243,7 @@ class Reshape(Block):
     title: ClassVar[str] = "Reshape"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A matrix as a vector, column by column.",
-        inputs={"u": made("SineWave", amplitude=((1.0, 2.0), (3.0, 4.0)))},
+        inputs={"u": driver("SineWave", amplitude=((1.0, 2.0), (3.0, 4.0)))},
     )
 
     output: str = parameter("vector", choices=("vector", "column", "row", "matrix"), doc="the new shape")
@@ -286,7 +286,7 @@ class MatrixConcatenate(Block):
     sign: ClassVar[FaceSign] = Words("[A B]")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Two vectors side by side are the columns of a matrix.",
-        inputs={"u1": made("SineWave", amplitude=(1.0, 2.0)), "u2": made("Constant", value=(-1.0, 1.0))},
+        inputs={"u1": driver("SineWave", amplitude=(1.0, 2.0)), "u2": driver("Constant", value=(-1.0, 1.0))},
     )
 
     inputs: int = parameter(2, minimum=1, doc="number of inputs")
@@ -329,7 +329,7 @@ class DiagonalMatrix(Block):
     sign: ClassVar[FaceSign] = Words("diag")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Two numbers on the diagonal, zeros elsewhere.",
-        inputs={"u": made("SineWave", amplitude=(1.0, 2.0))},
+        inputs={"u": driver("SineWave", amplitude=(1.0, 2.0))},
     )
 
     def input_ports(self) -> tuple[Port, ...]:
@@ -359,7 +359,7 @@ class ExtractDiagonal(Block):
     sign: ClassVar[FaceSign] = Words("diag(A)")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The diagonal of a matrix.",
-        inputs={"u": made("SineWave", amplitude=((1.0, 2.0), (3.0, 4.0)))},
+        inputs={"u": driver("SineWave", amplitude=((1.0, 2.0), (3.0, 4.0)))},
     )
 
     def input_ports(self) -> tuple[Port, ...]:

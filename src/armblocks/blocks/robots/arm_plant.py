@@ -25,14 +25,14 @@ from armblocks.diagram import (
     Signals,
     State,
     WorkedExample,
-    made,
+    driver,
     parameter,
 )
 from armblocks.dynamics.held_joints import (
     DryFriction,
     JointEquations,
     Rest,
-    settled,
+    locked_joints,
     viscous_friction,
 )
 from armblocks.errors import InputError
@@ -64,7 +64,7 @@ class ArmPlant(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The Puma falls onto the end stop of its shoulder and comes to rest by motor friction.",
         parameters={"robot": "puma560", "q0": (0.0, 0.5, 0.0, 0.0, 0.0, 0.0), "stops": "hard"},
-        inputs={"tau": made("Constant", value=(0.0,) * 6)},
+        inputs={"tau": driver("Constant", value=(0.0,) * 6)},
         shown=("q", "qd", "friction"),
     )
 
@@ -159,16 +159,18 @@ class ArmPlant(Block):
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
         shape = (self.robot.n,)
-        found: list[State] = []
+        states: list[State] = []
         if self._holdable():
-            found.append(State("mode", shape, "1 sliding forwards or free, -1 sliding backwards, 0 sticking"))
+            states.append(
+                State("mode", shape, "1 sliding forwards or free, -1 sliding backwards, 0 sticking")
+            )
         if self._lower() or self._upper():
-            found.append(State("contact", shape, "1 at the upper stop, -1 at the lower stop, else 0"))
-        return tuple(found)
+            states.append(State("contact", shape, "1 at the upper stop, -1 at the lower stop, else 0"))
+        return tuple(states)
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         elastic = self.stops == "elastic"
-        found = (
+        declared = (
             ("rest", self._dry(), "a sliding joint comes to rest", -1),
             ("forwards", self._holdable(), "a sticking joint breaks away forwards", 1),
             ("backwards", self._holdable(), "a sticking joint breaks away backwards", -1),
@@ -176,7 +178,7 @@ class ArmPlant(Block):
             ("lower", self._lower(), "a joint reaches its lower stop", 0 if elastic else -1),
         )
         return tuple(
-            Guard(name, (len(joints),), doc, direction) for name, joints, doc, direction in found if joints
+            Guard(name, (len(joints),), doc, direction) for name, joints, doc, direction in declared if joints
         )
 
     # -- equations
@@ -216,14 +218,14 @@ class ArmPlant(Block):
             free_forwards, free_backwards = logic_and(held, rigid <= 0.0), logic_and(held, rigid >= 0.0)
             values["forwards"] = if_else(free_forwards, unbalanced - forward - THRESHOLD_OFFSET, -1.0)
             values["backwards"] = if_else(free_backwards, unbalanced - backward + THRESHOLD_OFFSET, 1.0)
-        over, under = q - self._limits(1), q - self._limits(0)
+        beyond_upper, beyond_lower = q - self._limits(1), q - self._limits(0)
         if self.stops == "elastic":
             drag = p["damping"] * qd
-            values["upper"] = fmin(over, p["stiffness"] * over + drag) - THRESHOLD_OFFSET
-            values["lower"] = fmax(under, p["stiffness"] * under + drag) + THRESHOLD_OFFSET
+            values["upper"] = fmin(beyond_upper, p["stiffness"] * beyond_upper + drag) - THRESHOLD_OFFSET
+            values["lower"] = fmax(beyond_lower, p["stiffness"] * beyond_lower + drag) + THRESHOLD_OFFSET
         else:
-            values["upper"] = if_else(contact > 0.0, -1.0, over - THRESHOLD_OFFSET)
-            values["lower"] = if_else(contact < 0.0, 1.0, under + THRESHOLD_OFFSET)
+            values["upper"] = if_else(contact > 0.0, -1.0, beyond_upper - THRESHOLD_OFFSET)
+            values["lower"] = if_else(contact < 0.0, 1.0, beyond_lower + THRESHOLD_OFFSET)
         names = [guard.name for guard in self.guards({})]
         return {name: values[name][list(self._joints_of(name))] for name in names}
 
@@ -239,22 +241,22 @@ class ArmPlant(Block):
         else:
             contact = self._elastic_contact(q, qd, p)
             guess = Rest(self._mode(x), self._rigid(contact))
-        found = self._settled({**x, "contact": contact}, u, p, guess) if self._holdable() else guess
-        values = {"mode": found.mode, "contact": found.contact if self.stops == "hard" else contact}
+        rest = self._locked({**x, "contact": contact}, u, p, guess) if self._holdable() else guess
+        values = {"mode": rest.mode, "contact": rest.contact if self.stops == "hard" else contact}
         return {state.name: values[state.name] for state in self.modes({})}
 
     def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         # Modes change by the guards; the consistent modes are the solution of a complementarity problem.
-        found = dict[str, SX]()
+        inconsistent = dict[str, SX]()
         guards = self.guard_values(t, x, u, p)
         if self._holdable():
             turned = self._spread("rest", guards) < 0.0 if "rest" in guards else SX.zeros(self.robot.n)
             away = logic_or(self._spread("forwards", guards) > 0.0, self._spread("backwards", guards) < 0.0)
-            found["mode"] = logic_or(turned, away)
+            inconsistent["mode"] = logic_or(turned, away)
         if self._lower() or self._upper():
             contact = self._elastic_contact(x["q"], x["qd"], p) if self.stops == "elastic" else x["contact"]
-            found["contact"] = contact != x["contact"]
-        return found
+            inconsistent["contact"] = contact != x["contact"]
+        return inconsistent
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         if not e:
@@ -271,23 +273,23 @@ class ArmPlant(Block):
         stopping = fired["rest"] < 0.0
         qd = if_else(stopping, 0.0, qd)
         if self.stops == "hard":
-            hit = logic_or(hits_upper, hits_lower)
-            resting = logic_or(hit, contact != 0.0)
+            impact = logic_or(hits_upper, hits_lower)
+            resting = logic_or(impact, contact != 0.0)
             after = JointEquations(self.robot, q, qd, u.get("wrench"), u.get("payload")).stopped(qd, resting)
-            qd = if_else(dot(hit, hit) > 0.0, after, qd)
+            qd = if_else(dot(impact, impact) > 0.0, after, qd)
             q = if_else(hits_upper, self._limits(1), if_else(hits_lower, self._limits(0), q))
-            stopping = logic_or(stopping, hit)
+            stopping = logic_or(stopping, impact)
         away = (fired["forwards"] > 0.0) - (fired["backwards"] < 0.0)
         guess = if_else(stopping, 0.0, if_else(away != 0.0, away, mode))
-        moved = {**x, "q": q, "qd": qd, "contact": contact}
-        found = self._settled(moved, u, p, Rest(guess, if_else(guess == 0.0, self._rigid(contact), 0.0)))
-        values = {"q": q, "qd": qd, "mode": found.mode}
+        after_impact = {**x, "q": q, "qd": qd, "contact": contact}
+        rest = self._locked(after_impact, u, p, Rest(guess, if_else(guess == 0.0, self._rigid(contact), 0.0)))
+        values = {"q": q, "qd": qd, "mode": rest.mode}
         if self._lower() or self._upper():
-            values["contact"] = found.contact if self.stops == "hard" else contact
+            values["contact"] = rest.contact if self.stops == "hard" else contact
         happened = dot(vertcat(*e.values()), vertcat(*e.values())) > 0.0
         after = {name: if_else(happened, value, x[name]) for name, value in values.items()}
         # At rest the speed is 0 for all parameter values, so its derivatives by parameters are 0 too.
-        rests = logic_and(found.mode == 0.0, x["qd"] == 0.0)
+        rests = logic_and(rest.mode == 0.0, x["qd"] == 0.0)
         return {**after, "qd": if_else(logic_and(rests, logic_not(happened)), 0.0, after["qd"])}
 
     # -- parts
@@ -350,9 +352,13 @@ class ArmPlant(Block):
         return if_else(contact != 0.0, push, 0.0)
 
     def _elastic_contact(self, q: SX, qd: SX, p: Signals) -> SX:
-        over, under, drag = q - self._limits(1), q - self._limits(0), p["damping"] * qd
-        above = logic_and(self._marked("upper"), fmin(over, p["stiffness"] * over + drag) > 0.0)
-        below = logic_and(self._marked("lower"), fmax(under, p["stiffness"] * under + drag) < 0.0)
+        beyond_upper, beyond_lower, drag = q - self._limits(1), q - self._limits(0), p["damping"] * qd
+        above = logic_and(
+            self._marked("upper"), fmin(beyond_upper, p["stiffness"] * beyond_upper + drag) > 0.0
+        )
+        below = logic_and(
+            self._marked("lower"), fmax(beyond_lower, p["stiffness"] * beyond_lower + drag) < 0.0
+        )
         return above - below
 
     def _driving(self, x: Signals, u: Signals, p: Signals) -> SX:
@@ -366,8 +372,8 @@ class ArmPlant(Block):
         free = mode != 0.0 if self._holdable() else SX.ones(self.robot.n)
         return equations, torque, equations.accelerations(torque, free)
 
-    def _settled(self, x: Signals, u: Signals, p: Signals, guess: Rest) -> Rest:
+    def _locked(self, x: Signals, u: Signals, p: Signals, guess: Rest) -> Rest:
         equations = JointEquations(self.robot, x["q"], x["qd"], u.get("wrench"), u.get("payload"))
         breakaway = p["breakaway"] * SX.ones(self.robot.n)
         driving = self._driving(x, u, p)
-        return settled(equations, x["qd"], driving, guess, DryFriction.of(self.robot), breakaway)
+        return locked_joints(equations, x["qd"], driving, guess, DryFriction.of(self.robot), breakaway)

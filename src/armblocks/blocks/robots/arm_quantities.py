@@ -21,7 +21,7 @@ from armblocks.diagram import (
     Shapes,
     Signals,
     WorkedExample,
-    made,
+    driver,
     parameter,
 )
 from armblocks.diagram.signs import FaceSign, Words
@@ -44,9 +44,13 @@ class JacobianInverse(Block):
         shows=("The pseudo-inverse of the Jacobian while an arm stretches: the required joint speeds grow."),
         parameters={"method": "pseudo"},
         inputs={
-            "J": made("SubMatrix", last_row=3)
+            "J": driver("SubMatrix", last_row=3)
             .named("linear rows")
-            .by(u=made("Jacob0").by(q=made("JTraj", q0=(0.0, 1.5), qf=(0.5, 0.4), tmax=8.0).named("motion")))
+            .by(
+                u=driver("Jacob0").by(
+                    q=driver("JTraj", q0=(0.0, 1.5), qf=(0.5, 0.4), tmax=8.0).named("motion")
+                )
+            )
         },
         shown=("Ji",),
     )
@@ -93,7 +97,7 @@ class Manipulability(Block):
     sign: ClassVar[FaceSign] = Words("√|J Jᵀ|")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="An arm with two links stretches: the measure falls towards 0 near the stretched singularity.",
-        inputs={"q": made("JTraj", q0=(0.0, 1.5), qf=(0.5, 0.0), tmax=8.0).named("motion")},
+        inputs={"q": driver("JTraj", q0=(0.0, 1.5), qf=(0.5, 0.0), tmax=8.0).named("motion")},
     )
 
     robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
@@ -117,16 +121,16 @@ class RobotEnergy(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows=("A double pendulum without friction: the sum of kinetic and potential energy is constant."),
         inputs={
-            "q": made("ForwardDynamics")
+            "q": driver("ForwardDynamics")
             .named("arm")
-            .by(tau=made("Constant", value=(0.0, 0.0)).named("no torque"))
+            .by(tau=driver("Constant", value=(0.0, 0.0)).named("no torque"))
             .at("q"),
-            "qd": made("ForwardDynamics")
+            "qd": driver("ForwardDynamics")
             .named("arm")
-            .by(tau=made("Constant", value=(0.0, 0.0)).named("no torque"))
+            .by(tau=driver("Constant", value=(0.0, 0.0)).named("no torque"))
             .at("qd"),
         },
-        shown=("kinetic", "potential", made("Sum").named("sum").by(u1="kinetic", u2="potential")),
+        shown=("kinetic", "potential", driver("Sum").named("sum").by(u1="kinetic", u2="potential")),
         stop_time=5.0,
     )
 
@@ -160,8 +164,8 @@ class LoadedRne(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The torques of a motion with 2 kg at the tool.",
         inputs={
-            "wrench": made("Constant", value=(0.0,) * 6).named("no force"),
-            "payload": made("Constant", value=(2.0,) + (0.0,) * 9).named("2 kg"),
+            "wrench": driver("Constant", value=(0.0,) * 6).named("no force"),
+            "payload": driver("Constant", value=(2.0,) + (0.0,) * 9).named("2 kg"),
         },
         shown=("q", "tau"),
     )

@@ -33,7 +33,7 @@ from armblocks.diagram import (
     View,
     ViewKind,
     WorkedExample,
-    made,
+    driver,
     parameter,
     shape_of,
 )
@@ -105,8 +105,8 @@ class Fkine(Block):
     card_size: ClassVar[tuple[float, float]] = (84.0, 64.0)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The path of the tool of an arm with two links, in its vertical plane.",
-        across=position_of("T")[0],
-        up=position_of("T")[2],
+        x_axis=position_of("T")[0],
+        y_axis=position_of("T")[2],
     )
 
     robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
@@ -129,7 +129,7 @@ class Jacob0(Block):
     sign: ClassVar[FaceSign] = Words("J(q)")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The linear rows of the Jacobian: velocity of the tool along x, y, z per unit joint speed.",
-        shown=(made("SubMatrix", last_row=3).named("linear rows").by(u="J"),),
+        shown=(driver("SubMatrix", last_row=3).named("linear rows").by(u="J"),),
     )
 
     robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
@@ -152,7 +152,7 @@ class Jacobe(Block):
     sign: ClassVar[FaceSign] = Words("Jₑ(q)")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The linear rows of the Jacobian in the axes of the tool.",
-        shown=(made("SubMatrix", last_row=3).named("linear rows").by(u="J"),),
+        shown=(driver("SubMatrix", last_row=3).named("linear rows").by(u="J"),),
     )
 
     robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
@@ -225,7 +225,7 @@ class Inertia(Block):
         shows=(
             "The entries of the inertia matrix: the inertia at the first joint falls as the arm is folded."
         ),
-        inputs={"q": made("JTraj", q0=(0.0, 0.0), qf=(0.0, 2.5), tmax=8.0).named("motion")},
+        inputs={"q": driver("JTraj", q0=(0.0, 0.0), qf=(0.0, 2.5), tmax=8.0).named("motion")},
     )
 
     robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
@@ -279,7 +279,7 @@ class ForwardDynamics(Block):
     card_size: ClassVar[tuple[float, float]] = (84.0, 64.0)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A double pendulum, released from the horizontal without torque.",
-        inputs={"tau": made("Constant", value=(0.0, 0.0)).named("no torque")},
+        inputs={"tau": driver("Constant", value=(0.0, 0.0)).named("no torque")},
         shown=("q",),
         stop_time=5.0,
     )

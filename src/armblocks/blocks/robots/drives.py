@@ -21,7 +21,7 @@ from armblocks.diagram import (
     State,
     WorkedExample,
     broadcast,
-    made,
+    driver,
     parameter,
     shape_of,
 )
@@ -39,7 +39,7 @@ class DcMotor(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The motor accelerates under 12 V. A load from 3 s on slows it down and increases the current.",
         parameters={"R": 2.0, "L": 0.1, "k": 0.3, "J": 0.02, "b": 0.01},
-        inputs={"v": made("Constant", value=12.0), "load": made("Step", time=3.0, final=0.5)},
+        inputs={"v": driver("Constant", value=12.0), "load": driver("Step", time=3.0, final=0.5)},
         shown=("w", "i"),
     )
 
@@ -97,7 +97,7 @@ class MotorWinding(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The current of a motor at rest after a step of 24 V, with the time constant L / R = 0.5 s.",
         parameters={"R": 2.0, "L": 1.0, "gear_ratio": 50.0},
-        inputs={"v": made("Step", time=1.0, final=24.0), "w": made("Constant", value=0.0)},
+        inputs={"v": driver("Step", time=1.0, final=24.0), "w": driver("Constant", value=0.0)},
         shown=("v", "i", "tau"),
     )
 

@@ -23,7 +23,7 @@ from armblocks.diagram import (
     Signals,
     WorkedExample,
     broadcast,
-    made,
+    driver,
     parameter,
     shape_of,
 )
@@ -52,12 +52,12 @@ class JointPD(Block):
         shows="A PD controller alone: the arm follows with a constant error due to gravity.",
         parameters={"Kp": 200.0, "Kd": 40.0},
         inputs={
-            "qr": made("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("q"),
-            "qdr": made("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("qd"),
-            "q": made("ForwardDynamics").named("arm").by(tau="tau").at("q"),
-            "qd": made("ForwardDynamics").named("arm").by(tau="tau").at("qd"),
+            "qr": driver("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("q"),
+            "qdr": driver("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("qd"),
+            "q": driver("ForwardDynamics").named("arm").by(tau="tau").at("q"),
+            "qd": driver("ForwardDynamics").named("arm").by(tau="tau").at("qd"),
         },
-        shown=("q", made("Sum", signs="+-").named("error").by(u1="qr", u2="q")),
+        shown=("q", driver("Sum", signs="+-").named("error").by(u1="qr", u2="q")),
         stop_time=5.0,
     )
 
@@ -93,11 +93,11 @@ class GravityCompensation(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="From rest to a desired posture: gravity is compensated, so that no error remains.",
         inputs={
-            "qr": made("Constant", value=(1.0, -0.5)).named("desired"),
-            "q": made("ForwardDynamics").named("arm").by(tau="tau").at("q"),
-            "qd": made("ForwardDynamics").named("arm").by(tau="tau").at("qd"),
+            "qr": driver("Constant", value=(1.0, -0.5)).named("desired"),
+            "q": driver("ForwardDynamics").named("arm").by(tau="tau").at("q"),
+            "qd": driver("ForwardDynamics").named("arm").by(tau="tau").at("qd"),
         },
-        shown=("q", made("Sum", signs="+-").named("error").by(u1="qr", u2="q")),
+        shown=("q", driver("Sum", signs="+-").named("error").by(u1="qr", u2="q")),
         stop_time=5.0,
     )
 
@@ -131,13 +131,13 @@ class ComputedTorque(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows=("The arm starts with errors of 0.2 rad, which decay like a critically damped oscillation."),
         inputs={
-            "qr": made("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("q"),
-            "qdr": made("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("qd"),
-            "qddr": made("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("qdd"),
-            "q": made("ForwardDynamics", q0=(0.2, -0.2)).named("arm").by(tau="tau").at("q"),
-            "qd": made("ForwardDynamics", q0=(0.2, -0.2)).named("arm").by(tau="tau").at("qd"),
+            "qr": driver("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("q"),
+            "qdr": driver("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("qd"),
+            "qddr": driver("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("qdd"),
+            "q": driver("ForwardDynamics", q0=(0.2, -0.2)).named("arm").by(tau="tau").at("q"),
+            "qd": driver("ForwardDynamics", q0=(0.2, -0.2)).named("arm").by(tau="tau").at("qd"),
         },
-        shown=("q", made("Sum", signs="+-").named("error").by(u1="qr", u2="q")),
+        shown=("q", driver("Sum", signs="+-").named("error").by(u1="qr", u2="q")),
         stop_time=5.0,
     )
 
@@ -175,13 +175,13 @@ class FeedForward(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows=("The torques of the desired motion are fed forward; PD corrects the initial error."),
         inputs={
-            "qr": made("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("q"),
-            "qdr": made("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("qd"),
-            "qddr": made("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("qdd"),
-            "q": made("ForwardDynamics", q0=(0.2, -0.2)).named("arm").by(tau="tau").at("q"),
-            "qd": made("ForwardDynamics", q0=(0.2, -0.2)).named("arm").by(tau="tau").at("qd"),
+            "qr": driver("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("q"),
+            "qdr": driver("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("qd"),
+            "qddr": driver("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("qdd"),
+            "q": driver("ForwardDynamics", q0=(0.2, -0.2)).named("arm").by(tau="tau").at("q"),
+            "qd": driver("ForwardDynamics", q0=(0.2, -0.2)).named("arm").by(tau="tau").at("qd"),
         },
-        shown=("q", made("Sum", signs="+-").named("error").by(u1="qr", u2="q")),
+        shown=("q", driver("Sum", signs="+-").named("error").by(u1="qr", u2="q")),
         stop_time=5.0,
     )
 

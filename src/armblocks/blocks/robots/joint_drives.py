@@ -21,7 +21,7 @@ from armblocks.diagram import (
     Signals,
     WorkedExample,
     broadcast,
-    made,
+    driver,
     parameter,
     shape_of,
 )
@@ -42,8 +42,8 @@ class MotorDrive(Block):
             "voltage limit reduces the torque to 0."
         ),
         inputs={
-            "u": made("Constant", value=15.0).named("torque command"),
-            "w": made("Ramp", slope=12.0).named("speed"),
+            "u": driver("Constant", value=15.0).named("torque command"),
+            "w": driver("Ramp", slope=12.0).named("speed"),
         },
         shown=("u", "y"),
     )
@@ -116,8 +116,8 @@ class JointStops(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A joint moves 0.05 rad into its stops at -1 and 1 rad, which push back.",
         inputs={
-            "q": made("SineWave", amplitude=1.05).named("q"),
-            "qd": made("Derivative").by(u=made("SineWave", amplitude=1.05).named("q")),
+            "q": driver("SineWave", amplitude=1.05).named("q"),
+            "qd": driver("Derivative").by(u=driver("SineWave", amplitude=1.05).named("q")),
         },
         shown=("q", "tau"),
     )

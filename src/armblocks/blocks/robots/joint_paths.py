@@ -24,7 +24,7 @@ from armblocks.diagram import (
     Shapes,
     Signals,
     WorkedExample,
-    made,
+    driver,
     parameter,
     shape_of,
 )
@@ -71,19 +71,19 @@ class Trapezoidal(Block):
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         ramp, end, T = self.breakpoints(p)
-        now = fmin(fmax(t, 0.0), T)
-        left = T - now
+        time = fmin(fmax(t, 0.0), T)
+        left = T - time
         speed = p["cruise"] / T
-        rise, way = speed / ramp, p["qf"] - p["q0"]
-        first, last = now < ramp, now >= end
-        share = if_else(first, rise * now * now / 2.0, speed * (now - ramp / 2.0))
+        rise, distance = speed / ramp, p["qf"] - p["q0"]
+        first, last = time < ramp, time >= end
+        share = if_else(first, rise * time * time / 2.0, speed * (time - ramp / 2.0))
         share = if_else(last, 1.0 - rise * left * left / 2.0, share)
         moving = logic_and(t >= 0.0, t < T)
         rate = if_else(moving, if_else(first, rise, 0.0) - if_else(last, rise, 0.0), 0.0)
         return {
-            "q": p["q0"] + way * share,
-            "qd": way * fmin(speed, rise * fmin(now, left)),
-            "qdd": way * rate,
+            "q": p["q0"] + distance * share,
+            "qd": distance * fmin(speed, rise * fmin(time, left)),
+            "qdd": distance * rate,
         }
 
     def breakpoints(self, p: Signals) -> tuple[SX, ...]:
@@ -121,10 +121,10 @@ class MultiSegment(Block):
     blend: float = parameter(0.2, above=0.0, doc="duration of a blend", unit="s")
 
     def check(self) -> None:
-        segments, given = shape_of(self.points)[0] - 1, shape_of(self.durations)[0]
-        if segments != given:
+        segments, durations = shape_of(self.points)[0] - 1, shape_of(self.durations)[0]
+        if segments != durations:
             raise InputError(
-                f"{segments + 1} points make {segments} segments but {given} durations are given",
+                f"{segments + 1} points make {segments} segments but {durations} durations are given",
                 where="MultiSegment",
                 allowed="one duration fewer than points",
                 fix="correct the points or the durations",
@@ -148,15 +148,15 @@ class MultiSegment(Block):
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         points, blend, instants = p["points"], p["blend"], self.breakpoints(p)
-        now = fmin(t, instants[-1])
-        ramps = [_rounded_ramp(now, begin, end, blend) for begin, end in zip(instants[::2], instants[1::2])]
+        time = fmin(t, instants[-1])
+        ramps = [_rounded_ramp(time, begin, end, blend) for begin, end in zip(instants[::2], instants[1::2])]
         n = points.shape[1]
         q, qd, qdd = points[0, :].T, SX.zeros(n), SX.zeros(n)
         for k in range(points.shape[0] - 1):
-            way = (points[k + 1, :] - points[k, :]).T / p["durations"][k]
+            velocity = (points[k + 1, :] - points[k, :]).T / p["durations"][k]
             ends = zip(ramps[k], ramps[k + 1])
-            place, speed, change = (begin - end for begin, end in ends)
-            q, qd, qdd = q + way * place, qd + way * speed, qdd + way * change
+            position, speed, change = (begin - end for begin, end in ends)
+            q, qd, qdd = q + velocity * position, qd + velocity * speed, qdd + velocity * change
         return {"q": q, "qd": qd, "qdd": qdd}
 
     def breakpoints(self, p: Signals) -> tuple[SX, ...]:
@@ -180,13 +180,13 @@ class CTraj(Block):
         parameters={"tmax": 8.0},
         inputs={
             "T0": pose_along_x(ZERO).named("start"),
-            "T1": made("Rp2T")
+            "T1": driver("Rp2T")
             .named("end")
             .by(
-                R=made("Constant", value=((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))).named(
+                R=driver("Constant", value=((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))).named(
                     "turned"
                 ),
-                p=made("Constant", value=(1.0, 0.5, 0.0)).named("p"),
+                p=driver("Constant", value=(1.0, 0.5, 0.0)).named("p"),
             ),
         },
         shown=position_of("T"),

@@ -23,7 +23,7 @@ from armblocks.diagram import (
     State,
     WorkedExample,
     broadcast,
-    made,
+    driver,
     parameter,
     sample_time_parameter,
     shape_of,
@@ -37,9 +37,9 @@ _PORTS = (
     Port("qd", "speeds"),
 )
 _LOOP = {
-    "qr": made("Constant", value=1.0),
-    "qdr": made("Constant", value=0.0),
-    "q": made("Integrator").named("angle").by(u=made("Integrator").named("speed").by(u="tau")),
+    "qr": driver("Constant", value=1.0),
+    "qdr": driver("Constant", value=0.0),
+    "q": driver("Integrator").named("angle").by(u=driver("Integrator").named("speed").by(u="tau")),
     "qd": "speed/y",
 }
 
@@ -81,7 +81,7 @@ class JointPID(JointPidBlock):
     torque limits; Kb = 0 disables it. Speeds are measured, not differentiated.
     """
 
-    memoryless: ClassVar[bool] = True
+    following_modes: ClassVar[bool] = True
     title: ClassVar[str] = "PID Joint Controller"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="An inertia of 1 moves to 1 rad with a torque of at most 0.5.",

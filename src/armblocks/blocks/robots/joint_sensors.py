@@ -25,7 +25,7 @@ from armblocks.diagram import (
     State,
     WorkedExample,
     broadcast,
-    made,
+    driver,
     parameter,
     sample_time_parameter,
     shape_of,
@@ -49,7 +49,7 @@ class JointSensor(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A motion of the Puma's joints, measured every 0.1 s with a noise of 0.05 rad.",
         parameters={"robot": "puma560", "q_deviation": 0.05, "sample_time": 0.1},
-        inputs={"q": made("JTraj"), "qd": made("JTraj").at("qd")},
+        inputs={"q": driver("JTraj"), "qd": driver("JTraj").at("qd")},
         shown=("q",),
     )
 
@@ -118,7 +118,7 @@ class Encoder(Block):
         shows="A slow oscillation at twenty counts per turn; one count in 0.2 s is the resolution of the "
         "speed.",
         parameters={"counts": 20.0, "sample_time": 0.2},
-        inputs={"u": made("SineWave")},
+        inputs={"u": driver("SineWave")},
         shown=("u", "y", "speed"),
     )
 
@@ -176,7 +176,7 @@ class Tachometer(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The output of a tachometer with a slow filter after a jump of the speed.",
         parameters={"gain": 0.5, "time_constant": 0.5},
-        inputs={"w": made("Step", time=1.0)},
+        inputs={"w": driver("Step", time=1.0)},
         shown=("w", "y"),
     )
 

@@ -20,7 +20,7 @@ from armblocks.diagram import (
     Shapes,
     Signals,
     WorkedExample,
-    made,
+    driver,
     parameter,
 )
 from armblocks.errors import InputError
@@ -28,7 +28,7 @@ from armblocks.errors import InputError
 COUNTING = ("one-based", "zero-based")
 
 
-def _places(indices: ArrayLike, counting: str) -> list[int]:
+def _positions(indices: ArrayLike, counting: str) -> list[int]:
     """Indices, converted to zero-based ones."""
     first = 1 if counting == "one-based" else 0
     return [int(index) - first for index in np.atleast_1d(cast("Any", indices))]
@@ -36,21 +36,21 @@ def _places(indices: ArrayLike, counting: str) -> list[int]:
 
 def _check_indices(where: str, indices: ArrayLike, counting: str) -> None:
     numbers = np.atleast_1d(np.asarray(indices))
-    least = 1 if counting == "one-based" else 0
-    if np.any(numbers != np.floor(numbers)) or np.any(numbers < least):
+    first = 1 if counting == "one-based" else 0
+    if np.any(numbers != np.floor(numbers)) or np.any(numbers < first):
         raise InputError(
             f"the indices are {numbers.tolist()}",
             where=where,
-            allowed=f"integers, at least {least}",
+            allowed=f"integers, at least {first}",
             fix="correct the indices or the index base",
         )
 
 
-def _check_inside(places: list[int], size: int, counting: str) -> None:
-    if max(places) >= size:
+def _check_inside(positions: list[int], size: int, counting: str) -> None:
+    if max(positions) >= size:
         first = 1 if counting == "one-based" else 0
         raise InputError(
-            f"the index {max(places) + first} exceeds the size of the signal",
+            f"the index {max(positions) + first} exceeds the size of the signal",
             allowed=f"{first} to {size - 1 + first}, as the signal has {size} elements",
             fix="correct the indices or the width of the signal",
         )
@@ -94,15 +94,15 @@ class Selector(Block):
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
         _check_vector("u", inputs)
-        places = _places(self.indices, self.counting)
-        _check_inside(places, math.prod(inputs["u"]), self.counting)
-        return {"y": (len(places),) if len(places) > 1 else ()}
+        positions = _positions(self.indices, self.counting)
+        _check_inside(positions, math.prod(inputs["u"]), self.counting)
+        return {"y": (len(positions),) if len(positions) > 1 else ()}
 
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": inputs["u"]}
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": vertcat(*[u["u"][k] for k in _places(self.indices, self.counting)])}
+        return {"y": vertcat(*[u["u"][k] for k in _positions(self.indices, self.counting)])}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,7 +116,7 @@ class SubMatrix(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The second row of a matrix.",
         parameters={"first_row": 2},
-        inputs={"u": made("SineWave", amplitude=((1.0, 2.0), (3.0, 4.0)))},
+        inputs={"u": driver("SineWave", amplitude=((1.0, 2.0), (3.0, 4.0)))},
     )
 
     first_row: int = parameter(1, minimum=1, doc="the first row")
@@ -159,7 +159,7 @@ class Assignment(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The second element of a vector of zeros is replaced by a sine.",
         parameters={"indices": (2.0,)},
-        inputs={"y0": made("Constant", value=(1.0, 0.0, -1.0)), "u": made("SineWave")},
+        inputs={"y0": driver("Constant", value=(1.0, 0.0, -1.0)), "u": driver("SineWave")},
     )
 
     indices: ArrayLike = parameter(
@@ -183,11 +183,11 @@ class Assignment(Block):
     def output_shapes(self, inputs: Shapes) -> Shapes:
         for name in inputs:
             _check_vector(name, inputs)
-        places = _places(self.indices, self.counting)
-        _check_inside(places, math.prod(inputs["y0"]), self.counting)
-        if math.prod(inputs["u"]) not in (1, len(places)):
+        positions = _positions(self.indices, self.counting)
+        _check_inside(positions, math.prod(inputs["y0"]), self.counting)
+        if math.prod(inputs["u"]) not in (1, len(positions)):
             raise InputError(
-                f"{math.prod(inputs['u'])} new elements for {len(places)} indices",
+                f"{math.prod(inputs['u'])} new elements for {len(positions)} indices",
                 allowed="one for each index, or one for all",
                 fix="correct the indices or the width of 'u'",
             )
@@ -198,8 +198,8 @@ class Assignment(Block):
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         elements = [u["y0"][k] for k in range(u["y0"].numel())]
-        for k, place in enumerate(_places(self.indices, self.counting)):
-            elements[place] = u["u"][k if u["u"].numel() > 1 else 0]
+        for k, position in enumerate(_positions(self.indices, self.counting)):
+            elements[position] = u["u"][k if u["u"].numel() > 1 else 0]
         return {"y": vertcat(*elements)}
 
 
@@ -213,7 +213,7 @@ class IndexVector(Block):
     title: ClassVar[str] = "Index Vector"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A counter selects three numbers in turn.",
-        inputs={"index": made("CounterLimited", upper=2), "u": made("Constant", value=(0.5, 2.0, 1.0))},
+        inputs={"index": driver("CounterLimited", upper=2), "u": driver("Constant", value=(0.5, 2.0, 1.0))},
         shown=("index", "y"),
     )
 
@@ -240,8 +240,8 @@ class IndexVector(Block):
 def choose(index: SX, candidates: list[SX], counting: str = "zero-based") -> SX:
     """The candidate at a symbolic index, which is truncated to an integer and limited to the list."""
     first = 1.0 if counting == "one-based" else 0.0
-    place = fmin(fmax(floor(index) - first, 0.0), float(len(candidates) - 1))
+    position = fmin(fmax(floor(index) - first, 0.0), float(len(candidates) - 1))
     chosen = candidates[-1]
     for k, candidate in reversed(list(enumerate(candidates[:-1]))):
-        chosen = if_else(place == float(k), candidate, chosen)
+        chosen = if_else(position == float(k), candidate, chosen)
     return chosen

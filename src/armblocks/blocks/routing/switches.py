@@ -26,7 +26,7 @@ from armblocks.diagram import (
     State,
     WorkedExample,
     broadcast,
-    made,
+    driver,
     parameter,
 )
 
@@ -35,15 +35,15 @@ from armblocks.diagram import (
 class Switch(Block):
     """One of two signals: y = u1 where the control input meets the criterion, else u3."""
 
-    memoryless: ClassVar[bool] = True
+    following_modes: ClassVar[bool] = True
     title: ClassVar[str] = "Switch"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A fast sine while the control input is at least 0.5, else a constant.",
         parameters={"threshold": 0.5},
         inputs={
-            "u1": made("SineWave", frequency=5.0),
-            "u2": made("PulseGenerator", period=5.0),
-            "u3": made("Constant", value=-0.5),
+            "u1": driver("SineWave", frequency=5.0),
+            "u2": driver("PulseGenerator", period=5.0),
+            "u3": driver("Constant", value=-0.5),
         },
     )
 
@@ -104,10 +104,10 @@ class MultiportSwitch(Block):
         shows="A counter selects the inputs in turn.",
         parameters={"counting": "zero-based"},
         inputs={
-            "index": made("CounterLimited", upper=2),
-            "u1": made("SineWave"),
-            "u2": made("Constant", value=2.0),
-            "u3": made("Ramp", slope=-0.2),
+            "index": driver("CounterLimited", upper=2),
+            "u1": driver("SineWave"),
+            "u2": driver("Constant", value=2.0),
+            "u3": driver("Ramp", slope=-0.2),
         },
     )
 

@@ -15,7 +15,7 @@ from armblocks.diagram import (
     View,
     ViewKind,
     WorkedExample,
-    made,
+    driver,
     parameter,
 )
 from armblocks.diagram.signs import FaceSign, Words, graph
@@ -35,7 +35,7 @@ class Scope(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Two signals of one unit, in one panel.",
         parameters={"inputs": 2},
-        inputs={"u1": made("SineWave"), "u2": made("PulseGenerator")},
+        inputs={"u1": driver("SineWave"), "u2": driver("PulseGenerator")},
     )
 
     inputs: int = parameter(1, minimum=1, doc="number of inputs")
@@ -55,7 +55,7 @@ class XYGraph(Block):
     card_size: ClassVar[tuple[float, float]] = (72.0, 60.0)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A Lissajous figure: two sines of different frequencies.",
-        inputs={"x": made("SineWave", frequency=2.0), "y": made("SineWave", frequency=3.0)},
+        inputs={"x": driver("SineWave", frequency=2.0), "y": driver("SineWave", frequency=3.0)},
     )
 
     def input_ports(self) -> tuple[Port, ...]:
@@ -72,7 +72,7 @@ class Display(Block):
     title: ClassVar[str] = "Display"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The value at the end of the run.",
-        inputs={"u": made("Ramp", slope=0.5)},
+        inputs={"u": driver("Ramp", slope=0.5)},
     )
 
     inputs: int = parameter(1, minimum=1, doc="number of inputs")
@@ -91,7 +91,7 @@ class ToWorkspace(Block):
     title: ClassVar[str] = "To Workspace"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The signal is stored under the given name; a scope shows it here.",
-        inputs={"u": made("SineWave")},
+        inputs={"u": driver("SineWave")},
         shown=("u",),
     )
 
@@ -120,7 +120,7 @@ class ToFile(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The signal is written to a file beside the report; a scope shows it here.",
         parameters={"file": "wave.csv", "variable": "wave"},
-        inputs={"u": made("SineWave")},
+        inputs={"u": driver("SineWave")},
         shown=("u",),
     )
 
@@ -174,9 +174,9 @@ class Spectrum(Block):
         shows="Two sines of 0.5 and 2 Hz, the second a tenth as large.",
         parameters={"decibels": False},
         inputs={
-            "u": made("Sum").by(
-                u1=made("SineWave", frequency=math.pi),
-                u2=made("SineWave", amplitude=0.1, frequency=4 * math.pi),
+            "u": driver("Sum").by(
+                u1=driver("SineWave", frequency=math.pi),
+                u2=driver("SineWave", amplitude=0.1, frequency=4 * math.pi),
             )
         },
         shown=("u",),
@@ -221,7 +221,7 @@ class Terminator(Block):
     sign: ClassVar[FaceSign] = Words("⊣")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The signal is not used; a scope shows it here.",
-        inputs={"u": made("SineWave")},
+        inputs={"u": driver("SineWave")},
         shown=("u",),
     )
 

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from casadi import SX, if_else
 
-from armblocks.diagram import Block, Guard, Port, Shapes, Signals, WorkedExample, made, parameter
+from armblocks.diagram import Block, Guard, Port, Shapes, Signals, WorkedExample, driver, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,7 +17,7 @@ class StopSimulation(Block):
     title: ClassVar[str] = "Stop Simulation"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The run ends when the ramp exceeds 5.",
-        inputs={"u": made("CompareToConstant", relation=">", constant=5.0).by(u=made("Ramp"))},
+        inputs={"u": driver("CompareToConstant", relation=">", constant=5.0).by(u=driver("Ramp"))},
         shown=("u",),
     )
 
@@ -40,7 +40,7 @@ class Assertion(Block):
         shows="The assertion that the sine stays below 0.9 fails: the run continues, and its message "
         "reports it.",
         parameters={"action": "warn"},
-        inputs={"u": made("CompareToConstant", relation="<", constant=0.9).by(u=made("SineWave"))},
+        inputs={"u": driver("CompareToConstant", relation="<", constant=0.9).by(u=driver("SineWave"))},
         shown=("u",),
     )
 

@@ -15,7 +15,7 @@ from armblocks.diagram import (
     Signals,
     State,
     WorkedExample,
-    made,
+    driver,
     parameter,
     sample_time_parameter,
 )
@@ -62,7 +62,7 @@ class DigitalClock(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The time of the last tick, and the simulation time.",
         inputs={},
-        shown=("y", made("Clock")),
+        shown=("y", driver("Clock")),
     )
     sampled: ClassVar[bool] = True
 

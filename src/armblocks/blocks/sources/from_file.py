@@ -38,7 +38,7 @@ class FromFile(Block):
     in a header such as ``q1 [deg]`` is that of the signal.
     """
 
-    memoryless: ClassVar[bool] = True
+    following_modes: ClassVar[bool] = True
     title: ClassVar[str] = "From File"
     sign: ClassVar[FaceSign] = graph((0, 0.2), (0.3, 0.9), (0.6, 0.4), (1, 0.7))
     example: ClassVar[WorkedExample] = WorkedExample(
@@ -78,18 +78,18 @@ class FromFile(Block):
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         count, width = self._size
-        here = fmin(fmax(x["row"], 0.0), count - 1.0)
+        row = fmin(fmax(x["row"], 0.0), count - 1.0)
         between = logic_and(x["row"] >= 0.0, x["row"] < count - 1.0)
-        now = vertcat(*(self._entry(p, here, k) for k in range(1, width)))
+        values = vertcat(*(self._entry(p, row, k) for k in range(1, width)))
         if self.method == "linear":
-            there = fmin(here + 1.0, count - 1.0)
-            begin, end = self._entry(p, here, 0), self._entry(p, there, 0)
+            next_row = fmin(row + 1.0, count - 1.0)
+            begin, end = self._entry(p, row, 0), self._entry(p, next_row, 0)
             share = if_else(between, (t - begin) / if_else(between, end - begin, 1.0), 0.0)
-            then = vertcat(*(self._entry(p, there, k) for k in range(1, width)))
-            now = (1.0 - share) * now + share * then
+            next_values = vertcat(*(self._entry(p, next_row, k) for k in range(1, width)))
+            values = (1.0 - share) * values + share * next_values
         if self.outside == "zero":
-            now = if_else(between, now, 0.0)
-        return {"y": now}
+            values = if_else(between, values, 0.0)
+        return {"y": values}
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         last = self._size[0] - 1.0
@@ -98,13 +98,13 @@ class FromFile(Block):
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         count, width = self._size
-        now = last_at_or_below(p["data"].T, t, count=count, stride=width)
-        due = self.guard_values(t, x, u, p)["next"] > 0.0
-        return {"row": counted(now, if_else(self._early(t, x, p), -1.0, x["row"]), due)}
+        row = last_at_or_below(p["data"].T, t, count=count, stride=width)
+        passed = self.guard_values(t, x, u, p)["next"] > 0.0
+        return {"row": counted(row, if_else(self._early(t, x, p), -1.0, x["row"]), passed)}
 
     def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        due = self.guard_values(t, x, u, p)["next"] > 0.0
-        return {"row": logic_or(due, self._early(t, x, p))}
+        passed = self.guard_values(t, x, u, p)["next"] > 0.0
+        return {"row": logic_or(passed, self._early(t, x, p))}
 
     def _early(self, t: SX, x: Signals, p: Signals) -> SX:
         """Whether t is before row 0, while the first row is held."""

@@ -28,7 +28,7 @@ from armblocks.diagram import (
     Signals,
     State,
     WorkedExample,
-    made,
+    driver,
     parameter,
     sample_time_parameter,
     shape_of,
@@ -132,7 +132,7 @@ class BandLimitedWhiteNoise(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Noise, before and after a lag of 1 s.",
         parameters={"noise_power": 0.05},
-        shown=("y", made("FirstOrderLag").named("lag").by(u="y")),
+        shown=("y", driver("FirstOrderLag").named("lag").by(u="y")),
     )
     sampled: ClassVar[bool] = True
 

@@ -7,7 +7,16 @@ from typing import ClassVar
 
 from casadi import SX, fmax, fmin, if_else, logic_and
 
-from armblocks.blocks.periodic import AGAIN, COUNT, INSTANT, ODD, WHEN, sample_time, sampled, sampling_guards
+from armblocks.blocks.periodic import (
+    COUNT,
+    INSTANT,
+    ODD,
+    RESAMPLE,
+    WHEN,
+    sample_time,
+    sampled,
+    sampling_guards,
+)
 from armblocks.blocks.switching import since
 from armblocks.diagram import (
     Block,
@@ -17,7 +26,7 @@ from armblocks.diagram import (
     Signals,
     State,
     WorkedExample,
-    made,
+    driver,
     parameter,
 )
 from armblocks.diagram.signs import FaceSign, pulses
@@ -37,7 +46,7 @@ class PWM(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Pulses that become wider as the duty cycle rises from 0 to 1.",
         parameters={"period": 1.0},
-        inputs={"D": made("Ramp", slope=0.1)},
+        inputs={"D": driver("Ramp", slope=0.1)},
     )
 
     period: float = parameter(0.1, above=0.0, doc="period T of the pulses", unit="s")
@@ -55,7 +64,7 @@ class PWM(Block):
         return (COUNT, WHEN, ODD, State("duty", (), "the duty cycle of this period"), high)
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
-        return INSTANT, AGAIN, Guard("edge", (), "t - the end of the pulse", 1)
+        return INSTANT, RESAMPLE, Guard("edge", (), "t - the end of the pulse", 1)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": p["amplitude"] * x["high"]}
@@ -68,10 +77,10 @@ class PWM(Block):
         return {**sampling_guards(t, x, p, _limited(u["D"]), x["duty"]), "edge": edge}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        _, looks, counted = sampled(t, x, p, e)
-        duty = if_else(looks, _limited(u["D"]), x["duty"])
+        _, samples, counted = sampled(t, x, p, e)
+        duty = if_else(samples, _limited(u["D"]), x["duty"])
         ends = logic_and(e["edge"] > 0.0, x["duty"] < 1.0)
-        high = if_else(looks, duty > 0.0, if_else(ends, 0.0, x["high"]))
+        high = if_else(samples, duty > 0.0, if_else(ends, 0.0, x["high"]))
         return {**counted, "duty": duty, "high": high}
 
 

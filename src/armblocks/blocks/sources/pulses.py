@@ -31,7 +31,7 @@ from armblocks.diagram.signs import FaceSign, pulses
 class PulseGenerator(Block):
     """Square pulses: y = amplitude during the first width % of each period after the delay, else 0."""
 
-    memoryless: ClassVar[bool] = True
+    following_modes: ClassVar[bool] = True
     title: ClassVar[str] = "Pulse Generator"
     sign: ClassVar[FaceSign] = pulses((0.5, 0.5))
     example: ClassVar[WorkedExample] = WorkedExample(
@@ -68,8 +68,8 @@ class PulseGenerator(Block):
         # k * period / period may be rounded to slightly less than k.
         periods = (t - p["delay"]) / p["period"] * (1.0 + 1e-14)
         pulses = floor(periods)
-        over = (periods - pulses) * 100.0 >= p["width"] * (1.0 - 1e-12)
-        passed = if_else(t < p["delay"], 0.0, 2.0 * pulses + 1.0 + over)
+        ended = (periods - pulses) * 100.0 >= p["width"] * (1.0 - 1e-12)
+        passed = if_else(t < p["delay"], 0.0, 2.0 * pulses + 1.0 + ended)
         return {"edges": counted(passed, x["edges"], self.contradictions(t, x, u, p)["edges"])}
 
     def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:

@@ -53,7 +53,7 @@ class SignalGenerator(Block):
     which has a sample time.
     """
 
-    memoryless: ClassVar[bool] = True
+    following_modes: ClassVar[bool] = True
     title: ClassVar[str] = "Signal Generator"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A square wave of 0.5 Hz: 1 in the first half of every period, -1 in the second.",
@@ -118,7 +118,7 @@ class RepeatingSequence(Block):
     If the last value differs from the first one, the signal jumps at the end of each period.
     """
 
-    memoryless: ClassVar[bool] = True
+    following_modes: ClassVar[bool] = True
     title: ClassVar[str] = "Repeating Sequence"
     sign: ClassVar[FaceSign] = graph((0, 0), (0.5, 1), (0.5, 0), (1, 1), (1, 0))
     example: ClassVar[WorkedExample] = WorkedExample(
@@ -145,16 +145,16 @@ class RepeatingSequence(Block):
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         times = _numbers(self.times)
-        periods, here = self._piece(x["pieces"])
+        periods, piece = self._piece(x["pieces"])
         gaps = SX([right - left for left, right in pairwise(times)])
-        since = t - (periods * times[-1] + dot(here, SX(times[:-1])))
-        left, right = dot(here, p["values"][:-1]), dot(here, p["values"][1:])
-        return {"y": left + (right - left) * (since / dot(here, gaps))}
+        since = t - (periods * times[-1] + dot(piece, SX(times[:-1])))
+        left, right = dot(piece, p["values"][:-1]), dot(piece, p["values"][1:])
+        return {"y": left + (right - left) * (since / dot(piece, gaps))}
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         times = _numbers(self.times)
-        periods, here = self._piece(x["pieces"])
-        return {"corner": since(t, periods * times[-1] + dot(here, SX(times[1:])))}
+        periods, piece = self._piece(x["pieces"])
+        return {"corner": since(t, periods * times[-1] + dot(piece, SX(times[1:])))}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         times = _numbers(self.times)
@@ -235,8 +235,8 @@ class RepeatingSequenceStair(Block):
         return (State("k", (), "index of the next value, from 0"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        here = cells(x["k"], [k - 0.5 for k in range(1, p["values"].numel())])
-        return {"y": dot(vertcat(*here), p["values"])}
+        cell = cells(x["k"], [k - 0.5 for k in range(1, p["values"].numel())])
+        return {"y": dot(vertcat(*cell), p["values"])}
 
     def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"k": if_else(x["k"] >= p["values"].numel() - 1.0, 0.0, x["k"] + 1.0)}

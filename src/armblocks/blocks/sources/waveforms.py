@@ -54,18 +54,18 @@ class Ground(Block):
     )
 
     def check(self) -> None:
-        given = np.atleast_1d(np.asarray(self.dimensions, dtype=np.float64))
-        if given.size > 2 or bool(np.any(given != np.floor(given))):
+        dimensions = np.atleast_1d(np.asarray(self.dimensions, dtype=np.float64))
+        if dimensions.size > 2 or bool(np.any(dimensions != np.floor(dimensions))):
             raise InputError(
-                f"the dimensions are {given.tolist()}",
+                f"the dimensions are {dimensions.tolist()}",
                 where="Ground.dimensions",
                 allowed="1 (a scalar), n (a vector), or (m, n) (a matrix)",
                 fix="give one or two integers",
             )
 
     def _shape(self) -> tuple[int, ...]:
-        given = np.atleast_1d(np.asarray(self.dimensions, dtype=np.float64)).tolist()
-        return () if given == [1.0] else tuple(int(size) for size in given)
+        dimensions = np.atleast_1d(np.asarray(self.dimensions, dtype=np.float64)).tolist()
+        return () if dimensions == [1.0] else tuple(int(size) for size in dimensions)
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "zero", shape=self._shape()),)

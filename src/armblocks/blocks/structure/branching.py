@@ -9,7 +9,7 @@ from typing import ClassVar
 from casadi import SX, fabs, floor, if_else, logic_or, vertcat
 
 from armblocks.blocks.elementwise import numbered_ports
-from armblocks.diagram import Block, Guard, Port, Shapes, Signals, State, WorkedExample, made, parameter
+from armblocks.diagram import Block, Guard, Port, Shapes, Signals, State, WorkedExample, driver, parameter
 from armblocks.errors import InputError
 from armblocks.matlab.formula import Formula
 
@@ -26,7 +26,7 @@ class If(Block):
     branch is 1, and the others are 0.
     """
 
-    memoryless: ClassVar[bool] = True
+    following_modes: ClassVar[bool] = True
     title: ClassVar[str] = "If"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The first output is 1 while the sine is above 0.5, the second while it is between 0 and 0.5.",
@@ -108,22 +108,26 @@ class SwitchCase(Block):
     case with that number is 1. If no case has it, the output ``default`` is 1.
     """
 
-    memoryless: ClassVar[bool] = True
+    following_modes: ClassVar[bool] = True
     title: ClassVar[str] = "Switch Case"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The ramp passes 1, 2 and 3, and activates the cases in turn.",
         parameters={"cases": "1; 2 3"},
-        inputs={"u": made("Ramp", slope=0.5)},
+        inputs={"u": driver("Ramp", slope=0.5)},
     )
 
     cases: str = parameter("1; 2", doc="integers of each case; cases separated by semicolons")
 
     def check(self) -> None:
-        found = [number for case in self._texts() for number in case]
-        wrong = [text for text in found if not text.removeprefix("-").isdecimal() or not text.isascii()]
-        twice = [text for text in found if found.count(text) > 1]
-        if wrong or twice or not all(self._texts()):
-            message = f"'{(wrong or twice)[0]}' is not allowed" if wrong or twice else "a case has no number"
+        cases = [number for case in self._texts() for number in case]
+        invalid = [text for text in cases if not text.removeprefix("-").isdecimal() or not text.isascii()]
+        duplicates = [text for text in cases if cases.count(text) > 1]
+        if invalid or duplicates or not all(self._texts()):
+            message = (
+                f"'{(invalid or duplicates)[0]}' is not allowed"
+                if invalid or duplicates
+                else "a case has no number"
+            )
             raise InputError(
                 f"the cases are '{self.cases}': {message}",
                 where="SwitchCase.cases",

@@ -9,7 +9,7 @@ from typing import ClassVar
 from casadi import SX, horzcat, vertcat
 
 from armblocks.blocks.example_signals import HELIX_POSE, last_column_of
-from armblocks.diagram import Block, Port, Signals, WorkedExample, made
+from armblocks.diagram import Block, Port, Signals, WorkedExample, driver
 from armblocks.diagram.signs import FaceSign, Words
 
 
@@ -43,7 +43,11 @@ class Xyz2T(Block):
     sign: ClassVar[FaceSign] = Words("xyz→T")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The last column of the pose is the position.",
-        inputs={"x": made("SineWave", phase=pi / 2), "y": made("SineWave"), "z": made("Ramp", slope=0.1)},
+        inputs={
+            "x": driver("SineWave", phase=pi / 2),
+            "y": driver("SineWave"),
+            "z": driver("Ramp", slope=0.1),
+        },
         shown=(last_column_of("T"),),
     )
 

@@ -12,7 +12,7 @@ from typing import ClassVar
 from casadi import SX, dot, horzcat, sqrt, vertcat
 
 from armblocks.blocks.example_signals import HALF_ANGLE, SPINNING_POSE, ZERO, corner_of
-from armblocks.diagram import Block, Port, Signals, WorkedExample, made, parameter
+from armblocks.diagram import Block, Port, Signals, WorkedExample, driver, parameter
 from armblocks.diagram.signs import FaceSign, Words
 from armblocks.spatial import orientation
 
@@ -43,7 +43,7 @@ class Rpy2T(Block):
     sign: ClassVar[FaceSign] = Words("rpy→T")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A pose with yaw only: the upper left entries are cosines and sines of the angle.",
-        inputs={"roll": ZERO, "pitch": ZERO, "yaw": made("Ramp").named("yaw")},
+        inputs={"roll": ZERO, "pitch": ZERO, "yaw": driver("Ramp").named("yaw")},
         shown=(corner_of("T"),),
     )
 
@@ -72,10 +72,10 @@ class T2rpy(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The three angles of a pose that was computed from them; yaw wraps at pi.",
         inputs={
-            "T": made("Rpy2T").by(
-                roll=made("SineWave", amplitude=0.5).named("roll"),
-                pitch=made("SineWave", amplitude=0.8, frequency=2.0).named("pitch"),
-                yaw=made("Ramp").named("yaw"),
+            "T": driver("Rpy2T").by(
+                roll=driver("SineWave", amplitude=0.5).named("roll"),
+                pitch=driver("SineWave", amplitude=0.8, frequency=2.0).named("pitch"),
+                yaw=driver("Ramp").named("yaw"),
             )
         },
         shown=("roll", "pitch", "yaw"),
@@ -102,7 +102,7 @@ class Eul2T(Block):
     sign: ClassVar[FaceSign] = Words("eul→T")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows=("A pose that rotates about z: the upper left entries are cosines and sines of the angle."),
-        inputs={"phi": made("Ramp").named("phi"), "theta": ZERO, "psi": ZERO},
+        inputs={"phi": driver("Ramp").named("phi"), "theta": ZERO, "psi": ZERO},
         shown=(corner_of("T"),),
     )
 
@@ -129,10 +129,10 @@ class T2eul(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The three angles of a pose that was computed from them; phi wraps at pi.",
         inputs={
-            "T": made("Eul2T").by(
-                phi=made("Ramp").named("phi"),
-                theta=made("SineWave", amplitude=0.5, bias=1.0).named("theta"),
-                psi=made("SineWave", frequency=2.0).named("psi"),
+            "T": driver("Eul2T").by(
+                phi=driver("Ramp").named("phi"),
+                theta=driver("SineWave", amplitude=0.5, bias=1.0).named("theta"),
+                psi=driver("SineWave", frequency=2.0).named("psi"),
             )
         },
         shown=("phi", "theta", "psi"),
@@ -204,8 +204,8 @@ class AngleAxis2T(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A rotation about z: the upper left entries are cosines and sines of the angle.",
         inputs={
-            "angle": made("Ramp").named("angle"),
-            "axis": made("Constant", value=(0.0, 0.0, 1.0)).named("axis"),
+            "angle": driver("Ramp").named("angle"),
+            "axis": driver("Constant", value=(0.0, 0.0, 1.0)).named("axis"),
         },
         shown=(corner_of("T"),),
     )
@@ -253,7 +253,7 @@ class QuaternionProduct(Block):
         shows="A rotation about z after a quarter turn about x.",
         inputs={
             "u": HALF_ANGLE,
-            "v": made("Constant", value=(0.7071067811865476, 0.7071067811865476, 0.0, 0.0)).named(
+            "v": driver("Constant", value=(0.7071067811865476, 0.7071067811865476, 0.0, 0.0)).named(
                 "quarter turn"
             ),
         },
@@ -301,7 +301,7 @@ class QuaternionNormalize(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A quaternion of growing length, normalized to length 1.",
         inputs={
-            "u": made("Ramp", slope=(0.1, 0.0, 0.0, 0.3), initial=(1.0, 0.0, 0.0, 0.0)).named("quaternion")
+            "u": driver("Ramp", slope=(0.1, 0.0, 0.0, 0.3), initial=(1.0, 0.0, 0.0, 0.0)).named("quaternion")
         },
     )
 
@@ -326,8 +326,8 @@ class QuaternionRate(Block):
             "The integral at a constant angular velocity about z: the quaternion rotates by half the angle."
         ),
         inputs={
-            "u": made("Integrator", initial=(1.0, 0.0, 0.0, 0.0)).named("quaternion").by(u="y"),
-            "w": made("Constant", value=(0.0, 0.0, 1.0)).named("angular velocity"),
+            "u": driver("Integrator", initial=(1.0, 0.0, 0.0, 0.0)).named("quaternion").by(u="y"),
+            "w": driver("Constant", value=(0.0, 0.0, 1.0)).named("angular velocity"),
         },
         shown=("u",),
     )

@@ -20,7 +20,7 @@ from armblocks.blocks.example_signals import (
     position_of,
 )
 from armblocks.blocks.transforms.orientations import pose
-from armblocks.diagram import Block, Port, Shapes, Signals, State, WorkedExample, made, parameter, shape_of
+from armblocks.diagram import Block, Port, Shapes, Signals, State, WorkedExample, driver, parameter, shape_of
 from armblocks.diagram.signs import FaceSign, Words
 from armblocks.errors import InputError
 from armblocks.spatial.orientation import from_quaternion, quaternion_product
@@ -42,9 +42,9 @@ class PoseProduct(Block):
     sign: ClassVar[FaceSign] = Words("T₁ T₂")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A rotating frame, and a second frame 1 m along its x axis, whose origin moves on a circle.",
-        inputs={"T1": SPINNING_POSE, "T2": pose_along_x(made("Constant").named("one"))},
-        across=position_of("T")[0],
-        up=position_of("T")[1],
+        inputs={"T1": SPINNING_POSE, "T2": pose_along_x(driver("Constant").named("one"))},
+        x_axis=position_of("T")[0],
+        y_axis=position_of("T")[1],
     )
 
     inputs: int = parameter(2, minimum=1, doc="number of poses")
@@ -68,8 +68,8 @@ class PoseInverse(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A pose that moves along x; its inverse moves along -x.",
         inputs={
-            "T": made("Xyz2T").by(
-                x=made("Ramp").named("x"), y=made("Constant").named("y"), z=made("Ground").named("z")
+            "T": driver("Xyz2T").by(
+                x=driver("Ramp").named("x"), y=driver("Constant").named("y"), z=driver("Ground").named("z")
             )
         },
         shown=position_of("Ti"),
@@ -94,8 +94,8 @@ class Rp2T(Block):
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A pose from a constant rotation and an oscillating position; its upper rows are [R p].",
         inputs={
-            "R": made("Constant", value=((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))),
-            "p": made("SineWave", amplitude=(0.5, 1.0, 1.5)),
+            "R": driver("Constant", value=((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))),
+            "p": driver("SineWave", amplitude=(0.5, 1.0, 1.5)),
         },
         shown=(last_column_of("T"),),
     )
@@ -140,7 +140,7 @@ class TransformPoint(Block):
     sign: ClassVar[FaceSign] = Words("T p")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The point (1, 0, 0) of a frame that rotates about z, in world coordinates.",
-        inputs={"T": SPINNING_POSE, "p": made("Constant", value=(1.0, 0.0, 0.0)).named("point")},
+        inputs={"T": SPINNING_POSE, "p": driver("Constant", value=(1.0, 0.0, 0.0)).named("point")},
         shown=("y",),
     )
 
@@ -166,7 +166,7 @@ class TransformTwist(Block):
         shows="A velocity of 1 m/s along x of a frame that rotates about z, in world axes.",
         inputs={
             "T": SPINNING_POSE,
-            "V": made("Constant", value=(1.0, 0.0, 0.0, 0.0, 0.0, 0.0)).named("twist"),
+            "V": driver("Constant", value=(1.0, 0.0, 0.0, 0.0, 0.0, 0.0)).named("twist"),
         },
         shown=("y",),
     )
@@ -192,7 +192,7 @@ class Skew(Block):
         shows=(
             "The nine entries of the matrix: each element of the vector appears twice, with opposite signs."
         ),
-        inputs={"u": made("SineWave", amplitude=(1.0, 2.0, 3.0))},
+        inputs={"u": driver("SineWave", amplitude=(1.0, 2.0, 3.0))},
         shown=("S",),
     )
 
@@ -221,9 +221,9 @@ class Tr2Delta(Block):
         "by t / 10.",
         inputs={
             "T1": pose_along_x(ZERO).named("start"),
-            "T2": made("AngleAxis2T").by(
-                angle=made("Ramp", slope=0.1).named("angle"),
-                axis=made("Constant", value=(0.0, 0.0, 1.0)).named("axis"),
+            "T2": driver("AngleAxis2T").by(
+                angle=driver("Ramp", slope=0.1).named("angle"),
+                axis=driver("Constant", value=(0.0, 0.0, 1.0)).named("axis"),
             ),
         },
         shown=("dx",),
@@ -261,7 +261,7 @@ class Delta2Tr(Block):
     title: ClassVar[str] = "delta2tr"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A linearly growing differential motion as a pose: the upper left entries are [1 -rz; rz 1].",
-        inputs={"dx": made("Ramp", slope=(0.1, 0.0, 0.0, 0.0, 0.0, 0.02))},
+        inputs={"dx": driver("Ramp", slope=(0.1, 0.0, 0.0, 0.0, 0.0, 0.02))},
         shown=(corner_of("T"),),
     )
 
@@ -287,8 +287,8 @@ class PoseIntegration(Block):
     title: ClassVar[str] = "Pose Integration"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A frame with constant twist in body axes moves on a screw.",
-        inputs={"V": made("Constant", value=(1.0, 0.0, 0.2, 0.0, 0.0, 1.0))},
-        shown=(made("T2xyz").by(T="T").at("x"), made("T2xyz").by(T="T").at("z")),
+        inputs={"V": driver("Constant", value=(1.0, 0.0, 0.2, 0.0, 0.0, 1.0))},
+        shown=(driver("T2xyz").by(T="T").at("x"), driver("T2xyz").by(T="T").at("z")),
     )
 
     axes: str = parameter("body", choices=_FRAMES, doc="the axes of the velocity")

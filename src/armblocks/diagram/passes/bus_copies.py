@@ -4,9 +4,9 @@ A Switch between two buses selects each pair of their signals; a Unit Delay dela
 of a bus are propagated along the connections from Bus Creators and commented blocks; in a loop through a
 delay they come from the bus that enters the loop.
 
-Takes: blocks with ``bus_inputs`` that may receive buses; replacements for all virtual blocks.
+Input: blocks with ``bus_inputs`` that may receive buses; replacements for all virtual blocks.
 
-Gives: in place of each such block with a bus a copy for every signal, such as ``switch.motor.speed``. All
+Result: in place of each such block with a bus a copy for every signal, such as ``switch.motor.speed``. All
 copies share the parameters of the original (``Diagram.shares``). The original becomes virtual: each of its
 bus inputs selects the signals for the copies, each output is the bus of the copies' outputs.
 """
@@ -38,17 +38,17 @@ def copy_for_buses(net: Netlist) -> Netlist:
     blocks = {path: block for path, block in net.blocks.items() if path not in copied}
     drivers, gates = dict(net.drivers), dict(net.gates)
     shares, origins = dict(net.shares), dict(net.origins)
-    for path, found in copied.items():
-        for element in found.elements:
-            copy = found.copy(element)
-            blocks[copy], shares[copy], origins[copy] = found.block, path, net.origins.get(path, path)
+    for path, original in copied.items():
+        for element in original.elements:
+            copy = original.copy(element)
+            blocks[copy], shares[copy], origins[copy] = original.block, path, net.origins.get(path, path)
             if path in net.gates:
                 gates[copy] = net.gates[path]
-            for port, source in found.sources.items():
-                alone = port in found.block.bus_inputs()
+            for port, source in original.sources.items():
+                alone = port in original.block.bus_inputs()
                 drivers[PortRef(copy, port)] = PortRef(path, f"{port}.{element}") if alone else source
-    blocks |= {path: found.block for path, found in copied.items()}
-    resolved = net.with_replaced({path: found.replacements() for path, found in copied.items()})
+    blocks |= {path: original.block for path, original in copied.items()}
+    resolved = net.with_replaced({path: original.replacements() for path, original in copied.items()})
     return dataclasses.replace(
         resolved, blocks=blocks, drivers=drivers, gates=gates, shares=shares, origins=origins
     )
@@ -56,34 +56,34 @@ def copy_for_buses(net: Netlist) -> Netlist:
 
 def _copied(net: Netlist) -> dict[str, _CopiedBlock]:
     """All blocks with a bus input that are copied for each signal."""
-    found: dict[str, _CopiedBlock] = {}
+    copied: dict[str, _CopiedBlock] = {}
     replaced = dict(net.replaced)
     contents = Contents(replaced, net.where)
-    waiting = {path: block for path, block in net.blocks.items() if block.bus_inputs()}
-    sources: dict[str, dict[str, PortRef]] = {path: {} for path in waiting}
+    pending = {path: block for path, block in net.blocks.items() if block.bus_inputs()}
+    sources: dict[str, dict[str, PortRef]] = {path: {} for path in pending}
     for target, source in net.drivers.items():
         if target.block in sources:
             sources[target.block][target.port] = source
     progress = True
-    while progress and waiting:
+    while progress and pending:
         progress = False
-        for path, block in list(waiting.items()):
+        for path, block in list(pending.items()):
             for port in block.bus_inputs():
                 try:
                     carried = contents.of(sources[path][port])
                 except DiagramError:
-                    continue  # raised later, if still true when all buses are known
+                    continue  # raised again once all buses are known, if the error persists
                 if isinstance(carried, Bus):
-                    found[path] = _CopiedBlock(
-                        path=path, block=block, given=port, structure=carried, sources=sources[path]
+                    copied[path] = _CopiedBlock(
+                        path=path, block=block, structure_input=port, structure=carried, sources=sources[path]
                     )
-                    replaced[path] = found[path].replacements()
+                    replaced[path] = copied[path].replacements()
                     # Earlier results may refer to the original block.
                     contents = Contents(replaced, net.where)
-                    del waiting[path]
+                    del pending[path]
                     progress = True
                     break
-    return found
+    return copied
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,7 +92,7 @@ class _CopiedBlock:
 
     path: str
     block: Block
-    given: str
+    structure_input: str
     """The input that determines the elements."""
     structure: Bus
     """The bus at this input."""
@@ -111,12 +111,12 @@ class _CopiedBlock:
     def replacements(self) -> Replacements:
         """The buses of the copies' outputs, and the signals of the bus inputs, ``input.element``."""
         outputs = self.block.output_ports()
-        found = {port.name: Replacement((), self._joined(port.name)) for port in outputs}
+        contents = {port.name: Replacement((), self._joined(port.name)) for port in outputs}
         for port in self.block.bus_inputs():
             for element in self.elements:
                 selected = self._selected(port, element)
-                found[f"{port}.{element}"] = Replacement((self.sources[port],), selected)
-        return found
+                contents[f"{port}.{element}"] = Replacement((self.sources[port],), selected)
+        return contents
 
     def _joined(self, port: str) -> Callable[[Sequence[Carried]], Carried]:
         """The bus at an output: the outputs of the copies, in the structure of the input bus."""
@@ -124,23 +124,24 @@ class _CopiedBlock:
         return lambda _: bus
 
     def _selected(self, port: str, element: str) -> Callable[[Sequence[Carried]], Carried]:
-        return lambda given: self._element(port, given[0], element)
+        return lambda contents: self._element(port, contents[0], element)
 
     def _element(self, port: str, carried: Carried, element: str) -> Carried:
         """The signal at an input of a copy. Raises ``DiagramError`` where the input buses differ."""
         if isinstance(carried, Bus):
-            there = {path for path, _ in carried.leaves()}
-            found = carried.element(element)
-            if there == set(self.elements) and found is not None:
-                return found
+            paths = {path for path, _ in carried.leaves()}
+            signal = carried.element(element)
+            if paths == set(self.elements) and signal is not None:
+                return signal
             text = f"a bus with {_listed(path for path, _ in carried.leaves())}"
         else:
             text = f"the single signal '{carried}'"
         raise DiagramError(
-            f"input '{self.given}' is a bus with {_listed(self.elements)}, but input '{port}' is {text}",
+            f"input '{self.structure_input}' is a bus with {_listed(self.elements)}, "
+            f"but input '{port}' is {text}",
             where=f"block '{self.path}' ({self.block.title})",
             allowed="buses with the same names of elements at all of these inputs",
-            fix="make them alike with Bus Creators, or take single signals with Bus Selectors",
+            fix="build equal buses with Bus Creators, or select single signals with Bus Selectors",
         )
 
 

@@ -1,8 +1,8 @@
 """Pass: Bus Creators, Bus Selectors and Bus Assignments are replaced by their contents.
 
-Takes: bus blocks.
+Input: bus blocks.
 
-Gives: replacements of their outputs: buses, elements of buses, and buses with other elements.
+Result: replacements of their outputs: buses, elements of buses, and buses with other elements.
 """
 
 from __future__ import annotations
@@ -47,17 +47,17 @@ _Content = Callable[[Sequence[Carried]], Carried]
 
 def _creation(block: BusCreator) -> _Content:
     names = listed(block.names)
-    return lambda given: Bus(dict(zip(names, given)))
+    return lambda contents: Bus(dict(zip(names, contents)))
 
 
-def _selection(where: str, wanted: str) -> _Content:
-    return lambda given: _element(_bus(given[0], where), wanted, where)
+def _selection(where: str, path: str) -> _Content:
+    return lambda contents: _element(_bus(contents[0], where), path, where)
 
 
 def _assignment(where: str, paths: Sequence[str]) -> _Content:
-    def content(given: Sequence[Carried]) -> Bus:
-        bus = _bus(given[0], where)
-        for path, carried in zip(paths, given[1:]):
+    def content(contents: Sequence[Carried]) -> Bus:
+        bus = _bus(contents[0], where)
+        for path, carried in zip(paths, contents[1:]):
             _element(bus, path, where)
             bus = bus.replaced(path, carried)
         return bus
@@ -77,7 +77,7 @@ def _bus(carried: Carried, where: str) -> Bus:
 
 
 def _element(bus: Bus, element: str, where: str) -> Carried:
-    found = bus.element(element)
-    if found is None:
+    carried = bus.element(element)
+    if carried is None:
         raise UnknownNameError("bus element", element, bus.paths(), where=where)
-    return found
+    return carried

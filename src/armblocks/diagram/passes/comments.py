@@ -1,11 +1,10 @@
 """Pass: commented blocks are replaced by zeros or by wires.
 
-Takes: the outermost commented blocks (``Netlist.commented``), and the signals of the model without comments.
+Input: the outermost commented blocks (``Netlist.commented``), and the signals of the model without comments.
 
-Gives: for a block that is commented out zeros with the shapes that its outputs have without comments; for one
-that is commented through replacements of its outputs by the signals at its inputs. The blocks inside a
-commented subsystem are removed.
-"""
+Result: for a block that is commented out zeros with the shapes that its outputs have without comments; for
+one that is commented through replacements of its outputs by the signals at its inputs. The blocks inside a
+commented subsystem are removed."""
 
 from __future__ import annotations
 
@@ -94,8 +93,8 @@ class _Comments:
             zeros = zeros.replaced(element, self._zero(path, f"{port.name}.{element}", shape))
         return zeros
 
-    def _zero(self, path: str, place: str, shape: Shape) -> PortRef:
-        zero = f"{path}.{place}"
+    def _zero(self, path: str, signal: str, shape: Shape) -> PortRef:
+        zero = f"{path}.{signal}"
         self.blocks[zero], self.origins[zero] = Grounded.of({"y": shape}), path
         return PortRef(zero, "y")
 
@@ -108,14 +107,14 @@ class _Comments:
         stated = port.shape if port.shape is not None else self.known.shape(ref)
         if stated is not None:
             return stated
-        taken = (
+        input_shapes = (
             entry.shape
             for target, source in self.net.drivers.items()
             if source == ref and target.block in self.blocks
             for entry in self.blocks[target.block].input_ports()
             if entry.name == target.port and entry.shape is not None
         )
-        return next(taken, ())
+        return next(input_shapes, ())
 
     def pass_through(self, path: str) -> None:
         """Replace a block by wires from its inputs to its outputs."""
@@ -127,8 +126,8 @@ class _Comments:
         self.replaced[path] = {out: Replacement((net.drivers[PortRef(path, into)],)) for into, out in wires}
 
     def _check_equal(self, path: str, into: str, out: str) -> None:
-        given = self.net.drivers[PortRef(path, into)]
-        before = _described(self.known, self.known.at(given))
+        driver = self.net.drivers[PortRef(path, into)]
+        before = _described(self.known, self.known.at(driver))
         after = _described(self.known, self.known.at(PortRef(path, out)))
         if before is not None and after is not None and not _agree(before, after):
             raise DiagramError(
@@ -153,14 +152,16 @@ def _described(known: KnownSignals, carried: Carried) -> _Description | None:
 def _agree(one: _Description, other: _Description) -> bool:
     if isinstance(one, dict) and isinstance(other, dict):
         return one.keys() == other.keys() and all(
-            mine is None or yours is None or shapes_agree(mine, yours)
-            for mine, yours in zip(one.values(), (other[element] for element in one))
+            first is None or second is None or shapes_agree(first, second)
+            for first, second in zip(one.values(), (other[element] for element in one))
         )
     return not isinstance(one, dict) and not isinstance(other, dict) and shapes_agree(one, other)
 
 
-def _words(found: _Description) -> str:
-    return f"a bus with {', '.join(found)}" if isinstance(found, dict) else f"of shape {found}"
+def _words(description: _Description) -> str:
+    return (
+        f"a bus with {', '.join(description)}" if isinstance(description, dict) else f"of shape {description}"
+    )
 
 
 def _always(carried: Carried) -> Callable[[Sequence[Carried]], Carried]:

@@ -1,9 +1,9 @@
 """Pass: conditional subsystems become plain ones with gated blocks.
 
-Takes: subsystems that are enabled, triggered, resettable, or activated by an If or Switch Case block.
+Input: subsystems that are enabled, triggered, resettable, or activated by an If or Switch Case block.
 
-Gives: the control blocks that compute when such a subsystem is active (``diagram.controls``), named after its
-control ports; the gates of the blocks inside; blocks that hold the outputs in place of its Out blocks.
+Result: the control blocks that compute when such a subsystem is active (``diagram.controls``), named after
+its control ports; the gates of the blocks inside; blocks that hold the outputs in place of its Out blocks.
 """
 
 from __future__ import annotations
@@ -86,8 +86,8 @@ class _Controls:
                 gate = self._triggered(level, outer, block.edge, outer)
             case EnabledTriggeredSubsystem():
                 enable = self._enable(level, "enable", outer, restarts=False)
-                around = {ON: PortRef(enable, "on"), RESTART: PortRef(enable, "restart")}
-                gate = self._triggered(level, outer, block.edge, around)
+                trigger_gate = {ON: PortRef(enable, "on"), RESTART: PortRef(enable, "restart")}
+                gate = self._triggered(level, outer, block.edge, trigger_gate)
             case ResettableSubsystem():
                 control = self._trigger(level, "reset", outer, block.edge)
                 gate = {**outer, RESTART: PortRef(control, "restart")}
@@ -101,8 +101,8 @@ class _Controls:
             gate[RESTART] = PortRef(control, "restart")
         return gate
 
-    def _triggered(self, level: str, outer: Gate, edge: str, around: Gate) -> Gate:
-        control = self._trigger(level, "trigger", around, edge)
+    def _triggered(self, level: str, outer: Gate, edge: str, trigger_gate: Gate) -> Gate:
+        control = self._trigger(level, "trigger", trigger_gate, edge)
         fires = PortRef(control, "fire")
         self._hold(level, fires, outer, fires=True)
         gate = {FIRE: fires, ELAPSED: PortRef(control, "elapsed")}

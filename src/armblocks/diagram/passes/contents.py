@@ -23,11 +23,11 @@ class Contents:
 
         Raises ``DiagramError`` where replacements form a cycle, and the errors of their contents.
         """
-        way = {ref: None}
-        while way:
-            last = next(reversed(way))
+        route = {ref: None}
+        while route:
+            last = next(reversed(route))
             if last in self.carried:
-                del way[last]
+                del route[last]
                 continue
             if last.block not in self._replaced:
                 self.carried[last] = last
@@ -36,8 +36,8 @@ class Contents:
             missing = next((source for source in entry.sources if source not in self.carried), None)
             if missing is None:
                 self.carried[last] = entry.content([self.carried[source] for source in entry.sources])
-            elif missing in way:
-                loop = [str(port) for port in way][list(way).index(missing) :][::-1]
+            elif missing in route:
+                loop = [str(port) for port in route][list(route).index(missing) :][::-1]
                 raise DiagramError(
                     f"connections form a cycle without a block that computes a signal: {' -> '.join(loop)}",
                     where=self._where,
@@ -45,5 +45,5 @@ class Contents:
                     fix="remove one of these connections",
                 )
             else:
-                way[missing] = None
+                route[missing] = None
         return self.carried[ref]

@@ -1,8 +1,8 @@
 """Pass: the views of all blocks; displays of buses show all signals of the bus.
 
-Takes: the contents of all ports.
+Input: the contents of all ports.
 
-Gives: the views (``Netlist.views``), by path. Displays with a bus at an input become virtual, because their
+Result: the views (``Netlist.views``), by path. Displays with a bus at an input become virtual, because their
 views read the signals themselves.
 """
 
@@ -21,7 +21,7 @@ def resolve_displays(net: Netlist) -> Netlist:
     shown = {path: block for path, block in net.remaining().items() if block.views()}
     with_bus = {path for path, block in shown.items() if _shows_bus(net, path, block)}
     views = tuple(
-        (path, _spread(net, path, view) if path in with_bus else view)
+        (path, _expanded(net, path, view) if path in with_bus else view)
         for path, block in sorted(shown.items())
         for view in block.views()
     )
@@ -36,12 +36,12 @@ def _shows_bus(net: Netlist, path: str, block: Block) -> bool:
     return any(isinstance(net.at(path, port.name), Bus) for port in block.input_ports())
 
 
-def _spread(net: Netlist, path: str, view: View) -> View:
+def _expanded(net: Netlist, path: str, view: View) -> View:
     """A view with a bus replaced by its signals."""
     signals: list[str] = []
     labels: list[str] = []
-    given = view.labels or ("",) * len(view.signals)
-    for signal, label in zip(view.signals, given):
+    view_labels = view.labels or ("",) * len(view.signals)
+    for signal, label in zip(view.signals, view_labels):
         carried = net.at(path, signal)
         if isinstance(carried, Bus):
             signals += [f"{signal}.{element}" for element, _ in carried.leaves()]

@@ -1,8 +1,8 @@
 """Pass: Merge blocks become blocks that follow the outputs of conditional subsystems.
 
-Takes: Merge blocks whose inputs are held outputs of conditional subsystems.
+Input: Merge blocks whose inputs are held outputs of conditional subsystems.
 
-Gives: ``MergedOutput`` blocks without a gate; their inputs ``works1``, ``works2`` and so on are 1 for active
+Result: ``MergedOutput`` blocks without a gate; their inputs ``works1``, ``works2`` and so on are 1 for active
 subsystems.
 """
 
@@ -38,9 +38,9 @@ def resolve_merges(net: Netlist) -> Netlist:
         for number in range(1, block.inputs + 1):
             works = _works(net, path, f"u{number}")
             if works is None:  # a subsystem that is commented out
-                never = f"{path}.works{number}"
-                blocks[never], origins[never] = Grounded.of({"y": ()}), path
-                works = carried[PortRef(never, "y")] = PortRef(never, "y")
+                inactive = f"{path}.works{number}"
+                blocks[inactive], origins[inactive] = Grounded.of({"y": ()}), path
+                works = carried[PortRef(inactive, "y")] = PortRef(inactive, "y")
             drivers[PortRef(path, f"works{number}")] = works
     return dataclasses.replace(
         net, blocks=blocks, drivers=drivers, gates=gates, origins=origins, carried=carried

@@ -1,8 +1,8 @@
 """Pass: the names that signals have in the hierarchy, and the shapes that it declares for them.
 
-Takes: the contents of all ports.
+Input: the contents of all ports.
 
-Gives: other names of signals (``Netlist.aliases``): input ports, ports of virtual blocks, elements of buses;
+Result: other names of signals (``Netlist.aliases``): input ports, ports of virtual blocks, elements of buses;
 and the signals at In and Out blocks with a declared shape (``Netlist.stated``).
 """
 

@@ -20,8 +20,8 @@ from armblocks.equations import Shape
 from armblocks.errors import DiagramError
 
 
-def _first(given: Sequence[Carried]) -> Carried:
-    return given[0]
+def _first(contents: Sequence[Carried]) -> Carried:
+    return contents[0]
 
 
 @dataclass(frozen=True)
@@ -115,9 +115,9 @@ class Netlist:
         """A block, for messages."""
         return f"block '{path}' ({self.blocks[path].title})"
 
-    def with_replaced(self, more: Mapping[str, Replacements]) -> Netlist:
+    def with_replaced(self, replaced: Mapping[str, Replacements]) -> Netlist:
         """A netlist in which these blocks are replaced, too."""
-        return dataclasses.replace(self, replaced={**self.replaced, **more})
+        return dataclasses.replace(self, replaced={**self.replaced, **replaced})
 
     def at(self, path: str, port: str) -> Carried:
         """The signal or bus at an input port, after the pass ``signals``."""

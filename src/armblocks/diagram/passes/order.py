@@ -1,9 +1,9 @@
 """The passes that make a hierarchy flat, in their order.
 
 A pass is a function from a :class:`~armblocks.diagram.passes.netlist.Netlist` to a netlist, in a separate
-file, whose docstring names the input (takes) and the result (gives) of the pass. A new pass is such a file
-and a line here. Each kind of virtual block is resolved by one pass, which gives replacements for its output
-ports. A pass that reads signals comes after ``resolve_signals``.
+file, whose docstring names the input and the result of the pass. A new pass is such a file and an entry of
+``PASSES``. Each kind of virtual block is resolved by one pass, which gives replacements for its output ports.
+A pass that reads signals comes after ``resolve_signals``.
 """
 
 from __future__ import annotations

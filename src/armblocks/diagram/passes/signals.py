@@ -1,10 +1,10 @@
 """Pass: the contents of all ports.
 
-Takes: replacements for the output ports of all virtual blocks.
+Input: replacements for the output ports of all virtual blocks.
 
-Gives: the signal or bus at every output port (``Netlist.carried``); and every input port with a single signal
-driven by the block that computes it. A port with a bus is driven by the virtual block that makes the bus.
-"""
+Result: the signal or bus at every output port (``Netlist.carried``); and every input port with a single
+signal driven by the block that computes it. A port with a bus is driven by the virtual block that makes the
+bus."""
 
 from __future__ import annotations
 
@@ -25,6 +25,6 @@ def resolve_signals(net: Netlist) -> Netlist:
     carried = {ref: contents.of(ref) for ref in net.outputs()}
     drivers: dict[PortRef, PortRef] = {}
     for target, source in net.drivers.items():
-        found = contents.of(source)
-        drivers[target] = found if isinstance(found, PortRef) else source
+        content = contents.of(source)
+        drivers[target] = content if isinstance(content, PortRef) else source
     return dataclasses.replace(net, carried=carried, drivers=drivers)

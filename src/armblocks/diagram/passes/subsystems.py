@@ -1,8 +1,8 @@
 """Pass: subsystems and their In and Out blocks are replaced by connections.
 
-Takes: subsystems, In and Out blocks; conditional subsystems have held outputs in place of their Out blocks.
+Input: subsystems, In and Out blocks; conditional subsystems have held outputs in place of their Out blocks.
 
-Gives: replacements: an In block has the contents of the driver of the subsystem's input; an output of a
+Result: replacements: an In block has the contents of the driver of the subsystem's input; an output of a
 subsystem has those of the input of its Out block, or the held output.
 """
 

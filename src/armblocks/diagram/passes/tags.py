@@ -1,8 +1,8 @@
 """Pass: Goto and From blocks are replaced by connections.
 
-Takes: Goto and From blocks.
+Input: Goto and From blocks.
 
-Gives: replacements: a From has the contents of the input of the nearest visible Goto with its tag.
+Result: replacements: a From has the contents of the input of the nearest visible Goto with its tag.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ class _Tags:
                 continue
             level = "" if block.visibility == "global" else level_of(path)
             # Local and scoped tags of one diagram look the same to a reader.
-            places = [(level, block.tag, block.visibility)]
+            scopes = [(level, block.tag, block.visibility)]
             if block.visibility != "global":
-                places.append((level, block.tag, "scoped" if block.visibility == "local" else "local"))
-            for place in places:
-                other = self._known.get(place)
+                scopes.append((level, block.tag, "scoped" if block.visibility == "local" else "local"))
+            for scope in scopes:
+                other = self._known.get(scope)
                 if other is not None:
                     raise DiagramError(
                         f"the Goto blocks '{other}' and '{path}' both send '{block.tag}'",
@@ -51,21 +51,23 @@ class _Tags:
                         allowed="one Goto for each tag in its scope",
                         fix="rename the tag of one of them, or make its visibility local",
                     )
-            self._known[places[0]] = path
+            self._known[scopes[0]] = path
 
     def goto(self, path: str, block: From) -> str:
         """The path of the Goto of a From: the nearest visible one."""
         level = level_of(path)
-        found = self._known.get((level, block.tag, "local"))
+        nearest = self._known.get((level, block.tag, "local"))
         outer = level
-        while found is None:
-            found = self._known.get((outer, block.tag, "scoped"))
+        while nearest is None:
+            nearest = self._known.get((outer, block.tag, "scoped"))
             if not outer:
                 break
             outer = level_of(outer)
-        found = found or self._known.get(("", block.tag, "global"))
-        if found is None:
-            visible = sorted({tag for place, tag, sight in self._known if self._sees(level, place, sight)})
+        nearest = nearest or self._known.get(("", block.tag, "global"))
+        if nearest is None:
+            visible = sorted(
+                {tag for goto_level, tag, sight in self._known if self._sees(level, goto_level, sight)}
+            )
             hidden = [goto for (_, tag, _), goto in self._known.items() if tag == block.tag]
             raise DiagramError(
                 f"no visible Goto sends '{block.tag}'",
@@ -73,9 +75,14 @@ class _Tags:
                 allowed="one of " + ", ".join(visible) if visible else "a tag that a Goto sends",
                 fix=f"make the visibility of '{hidden[0]}' scoped or global" if hidden else "add a Goto",
             )
-        return found
+        return nearest
 
-    def _sees(self, level: str, place: str, visibility: str) -> bool:
+    def _sees(self, level: str, goto_level: str, visibility: str) -> bool:
         if visibility == "local":
-            return level == place
-        return visibility == "global" or not place or level == place or level.startswith(place + "/")
+            return level == goto_level
+        return (
+            visibility == "global"
+            or not goto_level
+            or level == goto_level
+            or level.startswith(goto_level + "/")
+        )

@@ -1,9 +1,9 @@
 """Pass: replaced blocks are removed.
 
-Takes: replacements for all virtual blocks, and input ports that are driven by the blocks that compute their
+Input: replacements for all virtual blocks, and input ports that are driven by the blocks that compute their
 signals.
 
-Gives: a netlist of blocks with equations and direct connections, which is a flat diagram.
+Result: a netlist of blocks with equations and direct connections, which is a flat diagram.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from armblocks.formats.matlab.values import MOST_LINKS, Cell, LinkArray, Value, 
 from armblocks.matlab.arrays import Budget, empty, kind_of, number_of, with_element
 from armblocks.matlab.evaluation import Evaluator
 from armblocks.matlab.lexer import COMMANDS
-from armblocks.matlab.source import Place, Source
+from armblocks.matlab.source import Location, Source
 from armblocks.matlab.syntax import (
     Assignment,
     Braces,
@@ -52,7 +52,7 @@ class Interpreter:
     def run(self, statements: tuple[Statement, ...]) -> None:
         """Execute all statements in order. Raises ``FormatError`` at the first invalid one."""
         for statement in statements:
-            self.budget.spend(self.source.place(statement.at), 10)
+            self.budget.spend(self.source.location(statement.at), 10)
             match statement:
                 case Assignment():
                     self._assign(statement)
@@ -60,7 +60,7 @@ class Interpreter:
                     if (shown := self._evaluation(value)) is not None:
                         self.variables["ans"] = shown
                 case Command(words=words):
-                    self._command(self.source.place(statement.at), words)
+                    self._command(self.source.location(statement.at), words)
 
     # -- statements ----------------------------------------------------------------------------------------
 
@@ -70,18 +70,18 @@ class Interpreter:
             case Postfix(base=Name(name=name), steps=(Parentheses(arguments=arguments),), at=at) if (
                 name not in self.variables and name in (*COMMANDS, *QUIET)
             ):
-                place = self.source.place(at)
-                given = [self._evaluator.value(argument) for argument in arguments]
+                location = self.source.location(at)
+                values = [self._evaluator.value(argument) for argument in arguments]
                 if name in COMMANDS:
-                    words = [word if isinstance(word, str) else kind_of(word) for word in given]
-                    self._command(place, (name, *words))
+                    words = [word if isinstance(word, str) else kind_of(word) for word in values]
+                    self._command(location, (name, *words))
                 return None
             case Name(name=name) if name in self.variables:
                 return None  # showing a variable does not set ans
             case _:
                 return copied(self._evaluator.value(value))
 
-    def _command(self, place: Place, words: tuple[str, ...]) -> None:
+    def _command(self, location: Location, words: tuple[str, ...]) -> None:
         if words[0] not in ("clear", "clearvars"):
             return  # clc, close, format, more: without effect here
         names = words[1:]
@@ -90,11 +90,11 @@ class Interpreter:
             return
         for name in names:
             if not name.isidentifier():
-                raise place.error(f"'{name}' cannot be cleared", allowed="clear, clear all, clear NAME …")
+                raise location.error(f"'{name}' cannot be cleared", allowed="clear, clear all, clear NAME …")
             self.variables.pop(name, None)
 
     def _assign(self, statement: Assignment) -> None:
-        place = self.source.place(statement.at)
+        location = self.source.location(statement.at)
         last = statement.steps[-1] if statement.steps else None
         if isinstance(last, Field) and last.name in VECTORS and isinstance(statement.value, Matrix):
             value = self._evaluator.value(self._joined(statement.value))
@@ -106,12 +106,12 @@ class Interpreter:
             self.variables[statement.name] = copy
             return
         if old is None and isinstance(statement.steps[0], Field):
-            raise place.error(
+            raise location.error(
                 f"'{statement.name}' is not defined, so it has no fields",
                 allowed="fields of links and robots",
                 fix=f"define {statement.name} first, with link, Link, robot or SerialLink",
             )
-        self.variables[statement.name] = self._stored(place, old, statement.steps, copy)
+        self.variables[statement.name] = self._stored(location, old, statement.steps, copy)
 
     def _joined(self, matrix: Matrix) -> Matrix:
         """The matrix; a vector that a printed page had broken into two lines becomes one row.
@@ -125,56 +125,61 @@ class Interpreter:
         self.joined_lines.append(matrix.at.line)
         return replace(matrix, rows=((*matrix.rows[0], *matrix.rows[1]),))
 
-    def _stored(self, place: Place, old: Value | None, steps: tuple[Target, ...], new: Value) -> Value:
+    def _stored(self, location: Location, old: Value | None, steps: tuple[Target, ...], new: Value) -> Value:
         """``old`` with ``new`` at the element or field that ``steps`` select: ``L{2}.r(1) = …``."""
         if not steps:
             return new
         step, rest = steps[0], steps[1:]
-        place = self.source.place(step.at)
+        location = self.source.location(step.at)
         match step:
             case Field(name=name):
-                return self._stored_field(place, old, name, rest, new)
+                return self._stored_field(location, old, name, rest, new)
             case Braces(arguments=arguments):
-                return self._stored_cell(place, old, self._indices(old, arguments), rest, new)
+                return self._stored_cell(location, old, self._indices(old, arguments), rest, new)
             case Parentheses(arguments=arguments):
-                return self._stored_element(place, old, self._indices(old, arguments), rest, new)
+                return self._stored_element(location, old, self._indices(old, arguments), rest, new)
 
     def _stored_field(
-        self, place: Place, old: Value | None, name: str, rest: tuple[Target, ...], new: Value
+        self, location: Location, old: Value | None, name: str, rest: tuple[Target, ...], new: Value
     ) -> Value:
         match old:
             case LinkRecord():
                 set_link_field(
-                    place,
+                    location,
                     old,
                     name,
-                    self._stored(place, link_field(place, old, name), rest, new) if rest else new,
+                    self._stored(location, link_field(location, old, name), rest, new) if rest else new,
                 )
             case RobotRecord():
                 set_robot_field(
-                    place,
+                    location,
                     old,
                     name,
-                    self._stored(place, robot_field(place, old, name), rest, new) if rest else new,
+                    self._stored(location, robot_field(location, old, name), rest, new) if rest else new,
                 )
             case _:
-                raise place.error(
+                raise location.error(
                     f"{kind_of(old)} has no field '{name}'", allowed="fields of links and robots"
                 )
         return old
 
     def _stored_cell(
-        self, place: Place, old: Value | None, indices: list[Value], rest: tuple[Target, ...], new: Value
+        self,
+        location: Location,
+        old: Value | None,
+        indices: list[Value],
+        rest: tuple[Target, ...],
+        new: Value,
     ) -> Value:
         if old is None or (isinstance(old, np.ndarray) and old.size == 0):
             old = Cell()
         if not isinstance(old, Cell):
-            raise place.error(f"{{}} is used on {kind_of(old)}", allowed="cell arrays")
-        index = single_index(place, indices, MOST_LINKS)
+            raise location.error(f"{{}} is used on {kind_of(old)}", allowed="cell arrays")
+        index = single_index(location, indices, MOST_LINKS)
         inner = old.elements[index] if index < len(old.elements) else None
-        stored = self._stored(place, inner, rest, new)
+        stored = self._stored(location, inner, rest, new)
         if isinstance(stored, Cell):
-            raise place.error(
+            raise location.error(
                 "a cell array inside a cell array is not supported", allowed="links, numbers, text"
             )
         old.elements += [None] * (index + 1 - len(old.elements))
@@ -182,38 +187,43 @@ class Interpreter:
         return old
 
     def _stored_element(
-        self, place: Place, old: Value | None, indices: list[Value], rest: tuple[Target, ...], new: Value
+        self,
+        location: Location,
+        old: Value | None,
+        indices: list[Value],
+        rest: tuple[Target, ...],
+        new: Value,
     ) -> Value:
         if isinstance(old, LinkRecord):
             old = LinkArray([old])
         if old is None or (isinstance(old, np.ndarray) and old.size == 0 and isinstance(new, LinkRecord)):
             old = LinkArray() if isinstance(new, LinkRecord) or rest else empty()
         if isinstance(old, LinkArray):
-            index = single_index(place, indices, MOST_LINKS)
+            index = single_index(location, indices, MOST_LINKS)
             inner = old.links[index] if index < len(old.links) else None
-            stored = self._stored(place, inner, rest, new)
+            stored = self._stored(location, inner, rest, new)
             if not isinstance(stored, LinkRecord):
-                raise place.error(
+                raise location.error(
                     f"{kind_of(stored)} is assigned to an element of an array of links", allowed="links"
                 )
             old.links += [None] * (index + 1 - len(old.links))
             old.links[index] = stored
             return old
         if isinstance(old, np.ndarray) and not rest:
-            self.budget.spend(place, old.size)
+            self.budget.spend(location, old.size)
             return with_element(
-                place, old, indices, number_of(place, new, "the value assigned to an element")
+                location, old, indices, number_of(location, new, "the value assigned to an element")
             )
-        raise place.error(f"() is used on {kind_of(old)}", allowed="matrices and arrays of links")
+        raise location.error(f"() is used on {kind_of(old)}", allowed="matrices and arrays of links")
 
     def _indices(self, value: Value | None, arguments: tuple[Expression, ...]) -> list[Value]:
         """The indices on the left of ``=``; ``end`` is the last element of the present value."""
-        found: list[Value] = []
+        checked: list[Value] = []
         indices = self._evaluator.indices(empty() if value is None else value, arguments)
         for index, argument in zip(indices, arguments):
             if index is None:
-                raise self.source.place(argument.at).error(
+                raise self.source.location(argument.at).error(
                     "assignment to several elements at once is not supported", allowed="A(i, j) = number"
                 )
-            found.append(index)
-        return found
+            checked.append(index)
+        return checked

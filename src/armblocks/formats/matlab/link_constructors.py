@@ -19,7 +19,7 @@ from armblocks.formats.matlab.link_fields import inertia_from, set_link_field
 from armblocks.formats.matlab.records import LinkRecord, Release
 from armblocks.formats.matlab.values import Value
 from armblocks.matlab.arrays import Array, kind_of, text_of
-from armblocks.matlab.source import Place
+from armblocks.matlab.source import Location
 
 _COLUMNS = {
     Release.UP_TO_8: ("alpha", "a", "theta", "d", "sigma", "offset"),
@@ -29,31 +29,31 @@ _SHORTEST_DYN, _LONGEST_DYN = 15, 20
 
 
 def link_from_row(
-    place: Place, release: Release, row: Sequence[float], *, modified: bool = False
+    location: Location, release: Release, row: Sequence[float], *, modified: bool = False
 ) -> LinkRecord:
     """A link from 4 to 6 D-H numbers, or from a DYN row of 15 to 20. Raises ``FormatError``."""
     columns = _COLUMNS[release]
     count = len(row)
     if not (4 <= count <= 6 or _SHORTEST_DYN <= count <= _LONGEST_DYN) or count == _LONGEST_DYN - 1:
         order = " ".join(columns)
-        raise place.error(
+        raise location.error(
             f"a row of {count} numbers is not a link",
             allowed=f"4 to 6 numbers {order}, or a legacy row with m r I Jm G B Tc behind the first 5: "
             f"{_SHORTEST_DYN} to 18 or {_LONGEST_DYN} numbers",
         )
-    link = LinkRecord(place=place, release=release, modified=modified)
+    link = LinkRecord(location=location, release=release, modified=modified)
     kinematic = count if count <= 6 else 5
     for name, number in zip(columns, row[:kinematic]):
-        set_link_field(place, link, name, np.array([[number]]))
+        set_link_field(location, link, name, np.array([[number]]))
     if count <= 6:
         return link
     link.mass = 0.0
     for name, part in (("m", row[5:6]), ("r", row[6:9])):
-        set_link_field(place, link, name, np.array([part]))
-    link.inertia = inertia_from(place, np.array([row[9:15]]))
+        set_link_field(location, link, name, np.array([part]))
+    link.inertia = inertia_from(location, np.array([row[9:15]]))
     for name, part in (("Jm", row[15:16]), ("G", row[16:17]), ("B", row[17:18]), ("Tc", row[18:20])):
         if part:
-            set_link_field(place, link, name, np.array([part]))
+            set_link_field(location, link, name, np.array([part]))
     return link
 
 
@@ -62,30 +62,32 @@ def rows_of(array: Array) -> list[list[float]]:
     return [[float(number) for number in row] for row in array]
 
 
-def is_modified(place: Place, word: str) -> bool:
+def is_modified(location: Location, word: str) -> bool:
     """Whether the modified convention is named; as in the toolbox, three letters are compared."""
     if word[:3] not in ("sta", "mod"):
-        raise place.error(f"'{word}' is not a D-H convention", allowed="'standard' or 'modified'")
+        raise location.error(f"'{word}' is not a D-H convention", allowed="'standard' or 'modified'")
     return word.startswith("mod")
 
 
-def make_link(place: Place, arguments: list[Value]) -> LinkRecord:
+def make_link(location: Location, arguments: list[Value]) -> LinkRecord:
     """``link([alpha A theta D sigma offset], convention)`` of releases up to 8."""
     if len(arguments) == 1 and isinstance(arguments[0], LinkRecord):
         return arguments[0].assigned()
     if not 1 <= len(arguments) <= 2:
-        raise place.error(
+        raise location.error(
             f"link is called with {len(arguments)} arguments", allowed="link(row), link(row, convention)"
         )
     row = arguments[0]
     if not isinstance(row, np.ndarray) or row.shape[0] != 1:
-        raise place.error(f"link is called with {kind_of(row)}", allowed="a row [alpha A theta D sigma]")
-    modified = len(arguments) == 2 and is_modified(place, text_of(place, arguments[1], "the convention"))
-    return link_from_row(place, Release.UP_TO_8, rows_of(row)[0], modified=modified)
+        raise location.error(f"link is called with {kind_of(row)}", allowed="a row [alpha A theta D sigma]")
+    modified = len(arguments) == 2 and is_modified(
+        location, text_of(location, arguments[1], "the convention")
+    )
+    return link_from_row(location, Release.UP_TO_8, rows_of(row)[0], modified=modified)
 
 
 def _new_link(
-    place: Place,
+    location: Location,
     arguments: list[Value],
     *,
     sigma: int | None = None,
@@ -97,72 +99,72 @@ def _new_link(
     If the joint type is not given, a link with ``d`` is revolute and a link with ``theta`` is prismatic.
     """
     if sigma is None and arguments and isinstance(arguments[0], LinkRecord) and len(arguments) == 1:
-        return replace(arguments[0], place=place)
+        return replace(arguments[0], location=location)
     if sigma is None and arguments and isinstance(arguments[0], np.ndarray):
         if arguments[0].shape[0] != 1 or len(arguments) > 2:
-            raise place.error(
+            raise location.error(
                 f"{name} is called with {kind_of(arguments[0])} and {len(arguments) - 1} more arguments",
                 allowed="Link([theta d a alpha sigma offset], convention)",
             )
         if len(arguments) == 2:
-            modified = is_modified(place, text_of(place, arguments[1], "the convention"))
-        return link_from_row(place, Release.FROM_9, rows_of(arguments[0])[0], modified=modified)
-    link = LinkRecord(place=place, release=Release.FROM_9, modified=modified, sigma=sigma or 0)
-    position, given = 0, set[str]()
+            modified = is_modified(location, text_of(location, arguments[1], "the convention"))
+        return link_from_row(location, Release.FROM_9, rows_of(arguments[0])[0], modified=modified)
+    link = LinkRecord(location=location, release=Release.FROM_9, modified=modified, sigma=sigma or 0)
+    position, assigned = 0, set[str]()
     while position < len(arguments):
-        key = text_of(place, arguments[position], f"argument {position + 1} of {name}")
+        key = text_of(location, arguments[position], f"argument {position + 1} of {name}")
         position += 1
         if key in ("revolute", "prismatic") and sigma is None:
-            given.add(key)
+            assigned.add(key)
             link.sigma = int(key == "prismatic")
         elif key in ("standard", "modified"):
             link.modified = key == "modified"
         elif key in _KEYS:
             if position == len(arguments):
-                raise place.error(f"'{key}' of {name} has no value", allowed=f"{name}('{key}', value)")
-            set_link_field(place, link, key, arguments[position])
-            given.add(key)
+                raise location.error(f"'{key}' of {name} has no value", allowed=f"{name}('{key}', value)")
+            set_link_field(location, link, key, arguments[position])
+            assigned.add(key)
             position += 1
         else:
-            raise place.error(
+            raise location.error(
                 f"{name} has no parameter '{key}'",
                 allowed=", ".join((*_KEYS, "revolute", "prismatic", "modified")),
             )
-    _check_joint(place, link, given, fixed=sigma is not None, name=name)
+    _check_joint(location, link, assigned, fixed=sigma is not None, name=name)
     return link
 
 
 _KEYS = ("theta", "d", "a", "alpha", "sigma", "offset", "qlim", "m", "r", "I", "Jm", "G", "B", "Tc")
 
 
-def _check_joint(place: Place, link: LinkRecord, given: set[str], *, fixed: bool, name: str) -> None:
+def _check_joint(location: Location, link: LinkRecord, assigned: set[str], *, fixed: bool, name: str) -> None:
     """Set the joint type if it is not given, and check that the joint variable, d or theta, is not given."""
-    unstated = not fixed and not given & {"sigma", "revolute", "prismatic"}
-    if unstated and {"d", "theta"} <= given:
-        raise place.error(
+    unstated = not fixed and not assigned & {"sigma", "revolute", "prismatic"}
+    if unstated and {"d", "theta"} <= assigned:
+        raise location.error(
             f"{name} is given both 'd' and 'theta'",
             allowed="'d' of a revolute joint or 'theta' of a prismatic one: the other is the joint variable",
         )
     if unstated:
-        link.sigma = int("theta" in given)
+        link.sigma = int("theta" in assigned)
     variable = "d" if link.sigma else "theta"
-    if variable in given and (fixed or not unstated):
-        raise place.error(
+    if variable in assigned and (fixed or not unstated):
+        raise location.error(
             f"'{variable}' is the variable of this joint and cannot be given",
             allowed="'theta' of a prismatic, 'd' of a revolute joint",
             fix=f"remove '{variable}', or give it as 'offset'",
         )
 
 
-CONSTRUCTORS: dict[str, Callable[[Place, list[Value]], LinkRecord]] = {
+CONSTRUCTORS: dict[str, Callable[[Location, list[Value]], LinkRecord]] = {
     "link": make_link,
     "Link": _new_link,
-    "Revolute": lambda place, arguments: _new_link(place, arguments, sigma=0, name="Revolute"),
-    "Prismatic": lambda place, arguments: _new_link(place, arguments, sigma=1, name="Prismatic"),
-    "RevoluteMDH": lambda place, arguments: _new_link(
-        place, arguments, sigma=0, modified=True, name="RevoluteMDH"
+    "Revolute": lambda location, arguments: _new_link(location, arguments, sigma=0, name="Revolute"),
+    "Prismatic": lambda location, arguments: _new_link(location, arguments, sigma=1, name="Prismatic"),
+    "RevoluteMDH": lambda location, arguments: _new_link(
+        location, arguments, sigma=0, modified=True, name="RevoluteMDH"
     ),
-    "PrismaticMDH": lambda place, arguments: _new_link(
-        place, arguments, sigma=1, modified=True, name="PrismaticMDH"
+    "PrismaticMDH": lambda location, arguments: _new_link(
+        location, arguments, sigma=1, modified=True, name="PrismaticMDH"
     ),
 }

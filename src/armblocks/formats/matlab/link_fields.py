@@ -11,7 +11,7 @@ from armblocks.errors import ArmblocksError
 from armblocks.formats.matlab.records import LinkRecord
 from armblocks.formats.matlab.values import Value
 from armblocks.matlab.arrays import Array, array_of, empty, kind_of, number_of, scalar
-from armblocks.matlab.source import Place
+from armblocks.matlab.source import Location
 from armblocks.robot import inertia_matrix
 from armblocks.spatial import Vector3
 
@@ -21,129 +21,129 @@ VECTORS = frozenset(("r", "I", "Tc", "qlim"))
 """Fields that take a row of numbers."""
 
 
-def set_link_field(place: Place, link: LinkRecord, name: str, value: Value) -> None:
+def set_link_field(location: Location, link: LinkRecord, name: str, value: Value) -> None:
     """``link.name = value``. Raises ``FormatError`` for an unknown field or an invalid value."""
     setter = _SETTERS.get(name)
     if setter is None:
-        raise place.error(f"a link has no field '{name}'", allowed=ASSIGNABLE)
-    setter(place, link, value)
+        raise location.error(f"a link has no field '{name}'", allowed=ASSIGNABLE)
+    setter(location, link, value)
 
 
-def link_field(place: Place, link: LinkRecord, name: str) -> Value:
+def link_field(location: Location, link: LinkRecord, name: str) -> Value:
     """The value of ``link.name``; ``[]`` where the script has not set it."""
     getter = _GETTERS.get(name)
     if getter is None:
-        raise place.error(f"a link has no field or method '{name}' here", allowed=ASSIGNABLE)
+        raise location.error(f"a link has no field or method '{name}' here", allowed=ASSIGNABLE)
     return getter(link)
 
 
-def finite_number(place: Place, value: Value, what: str) -> float:
+def finite_number(location: Location, value: Value, what: str) -> float:
     """A value that must be one finite number."""
-    number = number_of(place, value, what)
+    number = number_of(location, value, what)
     if not math.isfinite(number):
-        raise place.error(f"{what} is {number}", allowed="a finite number")
+        raise location.error(f"{what} is {number}", allowed="a finite number")
     return number
 
 
-def numbers(place: Place, value: Value, what: str, count: int) -> list[float]:
+def numbers(location: Location, value: Value, what: str, count: int) -> list[float]:
     """A value that must be a row or column of ``count`` finite numbers."""
-    array = array_of(place, value, what)
+    array = array_of(location, value, what)
     if array.size != count or 1 not in array.shape:
-        raise place.error(f"{what} is {kind_of(array)}", allowed=f"{count} numbers")
+        raise location.error(f"{what} is {kind_of(array)}", allowed=f"{count} numbers")
     if not np.isfinite(array).all():
-        raise place.error(f"{what} holds numbers that are not finite", allowed="finite numbers")
+        raise location.error(f"{what} holds numbers that are not finite", allowed="finite numbers")
     return [float(number) for number in array.ravel()]
 
 
-def inertia_from(place: Place, value: Value) -> tuple[Vector3, Vector3, Vector3]:
+def inertia_from(location: Location, value: Value) -> tuple[Vector3, Vector3, Vector3]:
     """``I`` in the forms of the toolbox: 3x3, or Ixx Iyy Izz, or Ixx Iyy Izz Ixy Iyz Ixz."""
-    array = array_of(place, value, "I")
+    array = array_of(location, value, "I")
     allowed = "a symmetric 3x3 matrix, [Ixx Iyy Izz], or [Ixx Iyy Izz Ixy Iyz Ixz]"
     if array.shape != (3, 3) and (1 not in array.shape or array.size not in (3, 6)):
-        raise place.error(f"I is {kind_of(array)}", allowed=allowed)
+        raise location.error(f"I is {kind_of(array)}", allowed=allowed)
     if not np.isfinite(array).all():
-        raise place.error("I holds numbers that are not finite", allowed=allowed)
+        raise location.error("I holds numbers that are not finite", allowed=allowed)
     try:
         return inertia_matrix(array if array.shape == (3, 3) else array.ravel())
     except ArmblocksError as error:
-        raise place.error(f"I is invalid: {error.what}", allowed=allowed) from None
+        raise location.error(f"I is invalid: {error.what}", allowed=allowed) from None
 
 
-def coulomb_from(place: Place, value: Value) -> tuple[float, float]:
+def coulomb_from(location: Location, value: Value) -> tuple[float, float]:
     """``Tc``: one number t stands for [t -t]."""
-    array = array_of(place, value, "Tc")
+    array = array_of(location, value, "Tc")
     if array.size == 1:
-        t = finite_number(place, array, "Tc")
+        t = finite_number(location, array, "Tc")
         return t, -t
     if array.size != 2:
-        raise place.error(f"Tc is {kind_of(array)}", allowed="a number, or [Tc+ Tc-]")
-    plus, minus = numbers(place, array, "Tc", 2)
+        raise location.error(f"Tc is {kind_of(array)}", allowed="a number, or [Tc+ Tc-]")
+    plus, minus = numbers(location, array, "Tc", 2)
     if plus < minus:
-        raise place.error(
+        raise location.error(
             f"Tc has {plus:g} before {minus:g}", allowed="[Tc+ Tc-] with Tc+ above Tc-", fix="swap the two"
         )
     return plus, minus
 
 
 def _set_number(
-    attribute: str, what: str, *, least: float = -math.inf
-) -> Callable[[Place, LinkRecord, Value], None]:
-    def assign(place: Place, link: LinkRecord, value: Value) -> None:
-        number = finite_number(place, value, what)
-        if number < least:
-            raise place.error(f"{what} is {number:g}", allowed=f"{least:g} or more")
+    attribute: str, what: str, *, minimum: float = -math.inf
+) -> Callable[[Location, LinkRecord, Value], None]:
+    def assign(location: Location, link: LinkRecord, value: Value) -> None:
+        number = finite_number(location, value, what)
+        if number < minimum:
+            raise location.error(f"{what} is {number:g}", allowed=f"{minimum:g} or more")
         setattr(link, attribute, number)
 
     return assign
 
 
-def _set_sigma(place: Place, link: LinkRecord, value: Value) -> None:
+def _set_sigma(location: Location, link: LinkRecord, value: Value) -> None:
     if value in ("R", "P") if isinstance(value, str) else False:
         link.sigma = int(value == "P")
     elif isinstance(value, str):
-        raise place.error(
+        raise location.error(
             f"sigma is '{value}'", allowed="0 or 'R' (revolute), any other number or 'P' (prismatic)"
         )
     else:
-        link.sigma = int(finite_number(place, value, "sigma") != 0)
+        link.sigma = int(finite_number(location, value, "sigma") != 0)
 
 
-def _set_modified(place: Place, link: LinkRecord, value: Value) -> None:
-    link.modified = finite_number(place, value, "mdh") != 0
+def _set_modified(location: Location, link: LinkRecord, value: Value) -> None:
+    link.modified = finite_number(location, value, "mdh") != 0
 
 
-def _set_centre(place: Place, link: LinkRecord, value: Value) -> None:
-    x, y, z = numbers(place, value, "r", 3)
+def _set_centre(location: Location, link: LinkRecord, value: Value) -> None:
+    x, y, z = numbers(location, value, "r", 3)
     link.centre_of_mass = (x, y, z)
 
 
-def _set_inertia(place: Place, link: LinkRecord, value: Value) -> None:
-    link.inertia = inertia_from(place, value)
+def _set_inertia(location: Location, link: LinkRecord, value: Value) -> None:
+    link.inertia = inertia_from(location, value)
 
 
-def _set_gear(place: Place, link: LinkRecord, value: Value) -> None:
-    ratio = finite_number(place, value, "G")
+def _set_gear(location: Location, link: LinkRecord, value: Value) -> None:
+    ratio = finite_number(location, value, "G")
     if ratio == 0:
-        raise place.error("G is 0, so the motor cannot move the joint", allowed="any other number")
+        raise location.error("G is 0, so the motor cannot move the joint", allowed="any other number")
     link.gear_ratio = ratio
 
 
-def _set_coulomb(place: Place, link: LinkRecord, value: Value) -> None:
-    link.coulomb_friction = coulomb_from(place, value)
+def _set_coulomb(location: Location, link: LinkRecord, value: Value) -> None:
+    link.coulomb_friction = coulomb_from(location, value)
 
 
-def _set_limits(place: Place, link: LinkRecord, value: Value) -> None:
-    array = array_of(place, value, "qlim")
+def _set_limits(location: Location, link: LinkRecord, value: Value) -> None:
+    array = array_of(location, value, "qlim")
     if array.size == 0 or (array.size == 2 and array.ravel().tolist() == [-math.inf, math.inf]):
         link.qlim = None
         return
-    low, high = numbers(place, array, "qlim", 2)
+    low, high = numbers(location, array, "qlim", 2)
     if low > high:
-        raise place.error(f"qlim goes from {low:g} to {high:g}", allowed="the lower limit first")
+        raise location.error(f"qlim goes from {low:g} to {high:g}", allowed="the lower limit first")
     link.qlim = (low, high)
 
 
-_SETTERS: dict[str, Callable[[Place, LinkRecord, Value], None]] = {
+_SETTERS: dict[str, Callable[[Location, LinkRecord, Value], None]] = {
     "alpha": _set_number("alpha", "alpha"),
     "a": _set_number("a", "a"),
     "A": _set_number("a", "A"),
@@ -153,10 +153,10 @@ _SETTERS: dict[str, Callable[[Place, LinkRecord, Value], None]] = {
     "sigma": _set_sigma,
     "offset": _set_number("offset", "offset"),
     "mdh": _set_modified,
-    "m": _set_number("mass", "m", least=0.0),
+    "m": _set_number("mass", "m", minimum=0.0),
     "r": _set_centre,
     "I": _set_inertia,
-    "Jm": _set_number("motor_inertia", "Jm", least=0.0),
+    "Jm": _set_number("motor_inertia", "Jm", minimum=0.0),
     "G": _set_gear,
     "B": _set_number("viscous_friction", "B"),
     "Tc": _set_coulomb,

@@ -34,13 +34,13 @@ def without_page_breaks(source: Source) -> tuple[Source, tuple[int, ...]]:
     lines = list(source.lines)
     changed: list[int] = []
     for i, line in enumerate(lines):
-        if not line.lstrip().startswith("%") or (found := _FIRST_STATEMENT.search(line)) is None:
+        if not line.lstrip().startswith("%") or (match := _FIRST_STATEMENT.search(line)) is None:
             continue
         following = next((text for text in lines[i + 1 :] if text.strip()), "")
-        unfinished = line[found.start() :].rpartition(";")[2].strip()
+        unfinished = line[match.start() :].rpartition(";")[2].strip()
         value_goes_on = _UNFINISHED_VALUE.fullmatch(unfinished) and _REST_OF_VALUE.match(following)
         equals_follows = _BARE_TARGET.fullmatch(unfinished) and _REST_FROM_EQUALS.match(following)
         if value_goes_on or equals_follows:
-            lines[i] = " " * found.start() + line[found.start() :]
+            lines[i] = " " * match.start() + line[match.start() :]
             changed.append(i + 1)
     return replace(source, lines=tuple(lines)), tuple(changed)

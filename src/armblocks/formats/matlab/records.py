@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass, field, replace
 
-from armblocks.matlab.source import Place
+from armblocks.matlab.source import Location
 from armblocks.spatial import Matrix3, Transform, Vector3
 
 
@@ -22,10 +22,10 @@ class Release(enum.Enum):
 class LinkRecord:
     """A link in a script; ``None``: not set by the script. Units as in ``Link`` and ``Motor``.
 
-    ``place``: where it was created, for messages.
+    ``location``: where it was created, for messages.
     """
 
-    place: Place
+    location: Location
     release: Release
     alpha: float = 0.0
     a: float = 0.0
@@ -57,7 +57,7 @@ class LinkRecord:
 class RobotRecord:
     """A robot in a script. ``gravity`` has the toolbox's sign: it points up."""
 
-    place: Place
+    location: Location
     release: Release
     links: list[LinkRecord]
     name: str = "noname"

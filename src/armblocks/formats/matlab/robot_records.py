@@ -12,7 +12,7 @@ from armblocks.formats.matlab.link_fields import finite_number, numbers, set_lin
 from armblocks.formats.matlab.records import LinkRecord, Release, RobotRecord
 from armblocks.formats.matlab.values import MOST_LINKS, Cell, LinkArray, Value
 from armblocks.matlab.arrays import Array, array_of, kind_of, scalar, text_of
-from armblocks.matlab.source import Place
+from armblocks.matlab.source import Location
 from armblocks.robot import (
     DhConvention,
     DhRow,
@@ -31,55 +31,59 @@ _DISPLAY_ONLY = ("plotopt", "lineopt", "shadowopt", "plotopt3d", "config", "conf
 """Fields and options for plots and labels: accepted and ignored, because no result depends on them."""
 
 
-def make_robot(place: Place, arguments: list[Value], variable: str) -> RobotRecord:
+def make_robot(location: Location, arguments: list[Value], variable: str) -> RobotRecord:
     """``robot(L, name, manuf, comment)`` of releases up to 8; ``L`` a cell array of links or a D-H matrix.
 
     ``variable`` is the name of the first argument's variable, and the default name of a robot from a matrix.
     """
     if not 1 <= len(arguments) <= 4:
-        raise place.error(
+        raise location.error(
             f"robot is called with {len(arguments)} arguments", allowed="robot(L, name, manuf, comment)"
         )
     first, *words = arguments
     match first:
         case RobotRecord():
-            made = first.assigned()
+            record = first.assigned()
         case Cell():
-            links = [_link_of(place, element, i) for i, element in enumerate(first.elements, start=1)]
-            made = RobotRecord(
-                place=place, release=Release.UP_TO_8, links=[link.assigned() for link in links]
+            links = [_link_of(location, element, i) for i, element in enumerate(first.elements, start=1)]
+            record = RobotRecord(
+                location=location, release=Release.UP_TO_8, links=[link.assigned() for link in links]
             )
         case _ if isinstance(first, np.ndarray) and first.size:
-            links = _links_of_matrix(place, Release.UP_TO_8, first, modified=False)
-            made = RobotRecord(place=place, release=Release.UP_TO_8, links=links, name=variable or "noname")
+            links = _links_of_matrix(location, Release.UP_TO_8, first, modified=False)
+            record = RobotRecord(
+                location=location, release=Release.UP_TO_8, links=links, name=variable or "noname"
+            )
         case _:
-            raise place.error(
+            raise location.error(
                 f"robot is called with {kind_of(first)}",
                 allowed="a cell array of links, L{1} = link(…), or a D-H matrix",
                 fix="for an array of links, [L1 L2], use SerialLink",
             )
     for field, word in zip(("name", "manuf", "comment"), words):
-        set_robot_field(place, made, field, word)
-    _check_convention(place, made)
-    return made
+        set_robot_field(location, record, field, word)
+    _check_convention(location, record)
+    return record
 
 
-def make_serial_link(place: Place, arguments: list[Value]) -> RobotRecord:
+def make_serial_link(location: Location, arguments: list[Value]) -> RobotRecord:
     """``SerialLink(links or D-H matrix, 'name', …)`` of releases 9 and later."""
     if not arguments:
-        raise place.error("SerialLink is called without links", allowed="SerialLink(links, 'name', text, …)")
+        raise location.error(
+            "SerialLink is called without links", allowed="SerialLink(links, 'name', text, …)"
+        )
     first, *options = arguments
     modified = False
     pairs: list[tuple[str, Value]] = []
     position = 0
     while position < len(options):
-        key = text_of(place, options[position], f"argument {position + 2} of SerialLink")
+        key = text_of(location, options[position], f"argument {position + 2} of SerialLink")
         position += 1
         if key in ("modified", "standard"):
-            modified = is_modified(place, key)
+            modified = is_modified(location, key)
             continue
         if position == len(options):
-            raise place.error(f"'{key}' of SerialLink has no value", allowed=f"'{key}', value")
+            raise location.error(f"'{key}' of SerialLink has no value", allowed=f"'{key}', value")
         pairs.append((key, options[position]))
         position += 1
     links: list[LinkRecord] = []
@@ -89,32 +93,36 @@ def make_serial_link(place: Place, arguments: list[Value]) -> RobotRecord:
         case LinkRecord():
             links = [first]
         case LinkArray():
-            links = [_link_of(place, link, i) for i, link in enumerate(first.links, start=1)]
+            links = [_link_of(location, link, i) for i, link in enumerate(first.links, start=1)]
         case Cell():
-            links = [_link_of(place, element, i) for i, element in enumerate(first.elements, start=1)]
+            links = [_link_of(location, element, i) for i, element in enumerate(first.elements, start=1)]
         case _ if isinstance(first, np.ndarray) and first.size:
-            links = _links_of_matrix(place, Release.FROM_9, first, modified=modified)
+            links = _links_of_matrix(location, Release.FROM_9, first, modified=modified)
         case _:
-            raise place.error(f"SerialLink is called with {kind_of(first)}", allowed="links, or a D-H matrix")
-    made = RobotRecord(place=place, release=Release.FROM_9, links=links)
+            raise location.error(
+                f"SerialLink is called with {kind_of(first)}", allowed="links, or a D-H matrix"
+            )
+    record = RobotRecord(location=location, release=Release.FROM_9, links=links)
     if isinstance(first, RobotRecord):
         for field in ("name", "manufacturer", "comment", "gravity", "base", "tool"):
-            setattr(made, field, getattr(first, field))
+            setattr(record, field, getattr(first, field))
     for key, value in pairs:
-        set_robot_field(place, made, key, value)
-    _check_convention(place, made)
-    return made
+        set_robot_field(location, record, key, value)
+    _check_convention(location, record)
+    return record
 
 
-def _links_of_matrix(place: Place, release: Release, matrix: Array, *, modified: bool) -> list[LinkRecord]:
+def _links_of_matrix(
+    location: Location, release: Release, matrix: Array, *, modified: bool
+) -> list[LinkRecord]:
     if matrix.shape[0] > MOST_LINKS:
-        raise place.error(f"a robot of {matrix.shape[0]} links", allowed=f"at most {MOST_LINKS}")
-    return [link_from_row(place, release, row, modified=modified) for row in rows_of(matrix)]
+        raise location.error(f"a robot of {matrix.shape[0]} links", allowed=f"at most {MOST_LINKS}")
+    return [link_from_row(location, release, row, modified=modified) for row in rows_of(matrix)]
 
 
-def _link_of(place: Place, element: Value | None, number: int) -> LinkRecord:
+def _link_of(location: Location, element: Value | None, number: int) -> LinkRecord:
     if not isinstance(element, LinkRecord):
-        raise place.error(
+        raise location.error(
             f"element {number} of the links is {kind_of(element)}",
             allowed="links",
             fix=f"define link {number} first",
@@ -122,42 +130,42 @@ def _link_of(place: Place, element: Value | None, number: int) -> LinkRecord:
     return element
 
 
-def _check_convention(place: Place, made: RobotRecord) -> None:
-    if not made.links:
-        raise place.error("the robot has no links", allowed="1 link or more")
-    if len({link.modified for link in made.links}) > 1:
-        raise place.error(
+def _check_convention(location: Location, record: RobotRecord) -> None:
+    if not record.links:
+        raise location.error("the robot has no links", allowed="1 link or more")
+    if len({link.modified for link in record.links}) > 1:
+        raise location.error(
             "standard and modified D-H links are mixed in one robot", allowed="one convention for all links"
         )
 
 
-def set_robot_field(place: Place, robot: RobotRecord, name: str, value: Value) -> None:
+def set_robot_field(location: Location, robot: RobotRecord, name: str, value: Value) -> None:
     """``robot.name = value``. Raises ``FormatError`` for an unknown field or an invalid value."""
     match name:
         case "name" | "comment":
-            setattr(robot, name, text_of(place, value, name))
+            setattr(robot, name, text_of(location, value, name))
         case "manuf" | "manufacturer":
-            robot.manufacturer = text_of(place, value, name)
+            robot.manufacturer = text_of(location, value, name)
         case "gravity":
-            x, y, z = numbers(place, value, "gravity", 3)
+            x, y, z = numbers(location, value, "gravity", 3)
             robot.gravity = (x, y, z)
         case "base" | "tool":
-            setattr(robot, name, _transform(place, value, name))
+            setattr(robot, name, _transform(location, value, name))
         case "links" | "link":
-            _set_links(place, robot, value)
+            _set_links(location, robot, value)
         case "offset" | "qlim":
-            _set_joint_rows(place, robot, name, value)
+            _set_joint_rows(location, robot, name, value)
         case _ if name in _DISPLAY_ONLY:
             pass
         case _:
-            raise place.error(f"a robot has no field '{name}'", allowed=ASSIGNABLE)
+            raise location.error(f"a robot has no field '{name}'", allowed=ASSIGNABLE)
 
 
-def robot_field(place: Place, robot: RobotRecord, name: str) -> Value:
+def robot_field(location: Location, robot: RobotRecord, name: str) -> Value:
     """The value of ``robot.name``."""
     getter = _GETTERS.get(name)
     if getter is None:
-        raise place.error(f"a robot has no field or method '{name}' here", allowed=f"n, {ASSIGNABLE}")
+        raise location.error(f"a robot has no field or method '{name}' here", allowed=f"n, {ASSIGNABLE}")
     return getter(robot)
 
 
@@ -175,41 +183,43 @@ _GETTERS: dict[str, Callable[[RobotRecord], Value]] = {
 }
 
 
-def _transform(place: Place, value: Value, name: str) -> Transform:
-    matrix = array_of(place, value, name)
+def _transform(location: Location, value: Value, name: str) -> Transform:
+    matrix = array_of(location, value, name)
     try:
         return Transform.from_matrix(matrix)
     except ArmblocksError as error:
-        raise place.error(f"{name} is invalid: {error.what}", allowed=error.allowed, fix=error.fix) from None
+        raise location.error(
+            f"{name} is invalid: {error.what}", allowed=error.allowed, fix=error.fix
+        ) from None
 
 
-def _set_links(place: Place, robot: RobotRecord, value: Value) -> None:
+def _set_links(location: Location, robot: RobotRecord, value: Value) -> None:
     elements = (
         value.links if isinstance(value, LinkArray) else value.elements if isinstance(value, Cell) else None
     )
     if elements is None:
-        raise place.error(f"the links of a robot are {kind_of(value)}", allowed="links")
-    robot.links = [_link_of(place, element, i) for i, element in enumerate(elements, start=1)]
+        raise location.error(f"the links of a robot are {kind_of(value)}", allowed="links")
+    robot.links = [_link_of(location, element, i) for i, element in enumerate(elements, start=1)]
 
 
-def _set_joint_rows(place: Place, robot: RobotRecord, name: str, value: Value) -> None:
+def _set_joint_rows(location: Location, robot: RobotRecord, name: str, value: Value) -> None:
     """``offset`` (n numbers) or ``qlim`` (n rows of two) for all links at once."""
     if robot.release is Release.UP_TO_8:
-        raise place.error(
+        raise location.error(
             f"releases up to 8 ignore an assignment to '{name}' of a robot",
             allowed=f"the links' own {name}",
             fix=f"write L{{i}}.{name} = … before robot(L, …)",
         )
     n = len(robot.links)
     if name == "offset":
-        for link, number in zip(robot.links, numbers(place, value, "offset", n)):
-            link.offset = finite_number(place, scalar(number), "offset")
+        for link, number in zip(robot.links, numbers(location, value, "offset", n)):
+            link.offset = finite_number(location, scalar(number), "offset")
         return
-    array = array_of(place, value, "qlim")
+    array = array_of(location, value, "qlim")
     if array.shape != (n, 2):
-        raise place.error(f"qlim is {kind_of(array)}", allowed=f"a {n}x2 matrix")
+        raise location.error(f"qlim is {kind_of(array)}", allowed=f"a {n}x2 matrix")
     for link, row in zip(robot.links, array):
-        set_link_field(place, link, "qlim", row.reshape(1, 2))
+        set_link_field(location, link, "qlim", row.reshape(1, 2))
 
 
 def finished_robot(record: RobotRecord, friction_model: FrictionModel) -> Robot:
@@ -217,7 +227,7 @@ def finished_robot(record: RobotRecord, friction_model: FrictionModel) -> Robot:
 
     Raises ``FormatError`` at the line that created the robot.
     """
-    _check_convention(record.place, record)
+    _check_convention(record.location, record)
     try:
         links = [_finished_link(i, link) for i, link in enumerate(record.links, start=1)]
         gx, gy, gz = record.gravity
@@ -230,10 +240,10 @@ def finished_robot(record: RobotRecord, friction_model: FrictionModel) -> Robot:
             tool=record.tool,
             gravity=(-gx, -gy, -gz),
             friction_model=friction_model,
-            source=record.place.source.name,
+            source=record.location.source.name,
         )
     except ArmblocksError as error:
-        raise record.place.error(str(error).rstrip("."), allowed=error.allowed, fix=error.fix) from error
+        raise record.location.error(str(error).rstrip("."), allowed=error.allowed, fix=error.fix) from error
 
 
 def _finished_link(number: int, link: LinkRecord) -> Link:
@@ -261,8 +271,8 @@ def _finished_link(number: int, link: LinkRecord) -> Link:
 
 def _motor(link: LinkRecord) -> Motor | None:
     """The motor, or ``None`` if the script sets no motor parameter."""
-    given = (link.motor_inertia, link.gear_ratio, link.viscous_friction, link.coulomb_friction)
-    if all(part is None for part in given):
+    parameters = (link.motor_inertia, link.gear_ratio, link.viscous_friction, link.coulomb_friction)
+    if all(part is None for part in parameters):
         return None
     return Motor(
         inertia=link.motor_inertia or 0.0,

@@ -13,7 +13,7 @@ from armblocks.formats.matlab.values import MOST_LINKS, Cell, LinkArray, Value, 
 from armblocks.matlab.arrays import Budget, index_of, kind_of, number_of, scalar
 from armblocks.matlab.functions import TABLE
 from armblocks.matlab.numbers import Numbers
-from armblocks.matlab.source import Place
+from armblocks.matlab.source import Location
 from armblocks.matlab.syntax import Expression, Name
 
 
@@ -28,130 +28,134 @@ class ScriptValues:
         """A number."""
         return scalar(value)
 
-    def text(self, place: Place, value: str) -> Value:
+    def text(self, location: Location, value: str) -> Value:
         """A text in quotes."""
         return value
 
-    def negative(self, place: Place, value: Value) -> Value:
+    def negative(self, location: Location, value: Value) -> Value:
         """``-value``"""
-        return self._numbers.negative(place, value)
+        return self._numbers.negative(location, value)
 
-    def logical_not(self, place: Place, value: Value) -> Value:
+    def logical_not(self, location: Location, value: Value) -> Value:
         """``~value``"""
-        return self._numbers.logical_not(place, value)
+        return self._numbers.logical_not(location, value)
 
-    def operate(self, place: Place, operator: str, left: Value, right: Value) -> Value:
+    def operate(self, location: Location, operator: str, left: Value, right: Value) -> Value:
         """``left operator right`` of arithmetic or a comparison."""
-        return self._numbers.operate(place, operator, left, right)
+        return self._numbers.operate(location, operator, left, right)
 
-    def logic(self, place: Place, operator: str, values: Sequence[Value]) -> Value:
+    def logic(self, location: Location, operator: str, values: Sequence[Value]) -> Value:
         """All values joined by one of ``&& || & |``."""
-        return self._numbers.logic(place, operator, values)
+        return self._numbers.logic(location, operator, values)
 
-    def matrix(self, place: Place, rows: Sequence[Sequence[Value]]) -> Value:
+    def matrix(self, location: Location, rows: Sequence[Sequence[Value]]) -> Value:
         """``[a b; c d]`` of matrices, of texts in one row, or of links."""
         flat = [value for row in rows for value in row]
         if any(isinstance(value, LinkRecord | LinkArray) for value in flat):
-            return join_links(place, flat)
-        return self._numbers.matrix(place, rows)
+            return join_links(location, flat)
+        return self._numbers.matrix(location, rows)
 
-    def cell(self, place: Place, elements: Sequence[Value]) -> Value:
+    def cell(self, location: Location, elements: Sequence[Value]) -> Value:
         """``{a, b}``"""
         if len(elements) > MOST_LINKS:
-            raise place.error(f"{len(elements)} elements in one cell array", allowed=f"at most {MOST_LINKS}")
+            raise location.error(
+                f"{len(elements)} elements in one cell array", allowed=f"at most {MOST_LINKS}"
+            )
         if any(isinstance(element, Cell) for element in elements):
-            raise place.error(
+            raise location.error(
                 "a cell array inside a cell array is not supported", allowed="links, numbers, text"
             )
         return Cell([copied(element) for element in elements])
 
-    def range(self, place: Place, parts: Sequence[Value]) -> Value:
+    def range(self, location: Location, parts: Sequence[Value]) -> Value:
         """``first:last`` or ``first:step:last``"""
-        return self._numbers.range(place, parts)
+        return self._numbers.range(location, parts)
 
-    def transposed(self, place: Place, value: Value) -> Value:
+    def transposed(self, location: Location, value: Value) -> Value:
         """``value'``"""
-        return value if isinstance(value, LinkArray) else self._numbers.transposed(place, value)
+        return value if isinstance(value, LinkArray) else self._numbers.transposed(location, value)
 
-    def index(self, place: Place, value: Value, written: Expression) -> Value:
+    def index(self, location: Location, value: Value, written: Expression) -> Value:
         """The value of an index: positions, or a logical array that selects elements."""
         return value
 
-    def element(self, place: Place, value: Value, indices: Sequence[Value | None], shown: str) -> Value:
+    def element(self, location: Location, value: Value, indices: Sequence[Value | None], shown: str) -> Value:
         """``value(indices)`` of a matrix or of an array of links."""
         if isinstance(value, LinkRecord):
             value = LinkArray([value])
         if isinstance(value, LinkArray):
-            index = single_index(place, indices, MOST_LINKS)
+            index = single_index(location, indices, MOST_LINKS)
             link = value.links[index] if index < len(value.links) else None
             if link is None:
-                raise place.error(f"link {index + 1} of the array is not set", allowed="links that are set")
+                raise location.error(
+                    f"link {index + 1} of the array is not set", allowed="links that are set"
+                )
             return link
-        return self._numbers.element(place, value, indices, shown)
+        return self._numbers.element(location, value, indices, shown)
 
-    def last_index(self, place: Place, value: Value, position: int, count: int) -> Value:
+    def last_index(self, location: Location, value: Value, position: int, count: int) -> Value:
         """``end`` as index ``position`` of ``count`` indices."""
         if isinstance(value, Cell | LinkArray):
             return scalar(float(_length(value)))
-        return self._numbers.last_index(place, value, position, count)
+        return self._numbers.last_index(location, value, position, count)
 
-    def cell_element(self, place: Place, value: Value, indices: Sequence[Value | None]) -> Value:
+    def cell_element(self, location: Location, value: Value, indices: Sequence[Value | None]) -> Value:
         """``value{indices}``"""
         if not isinstance(value, Cell):
-            raise place.error(f"{{}} is used on {kind_of(value)}", allowed="cell arrays")
-        index = single_index(place, indices, MOST_LINKS)
+            raise location.error(f"{{}} is used on {kind_of(value)}", allowed="cell arrays")
+        index = single_index(location, indices, MOST_LINKS)
         element = value.elements[index] if index < len(value.elements) else None
         if element is None:
-            raise place.error(
+            raise location.error(
                 f"element {index + 1} of the cell array is not set", allowed="elements that are set"
             )
         return element
 
-    def field(self, place: Place, value: Value, name: str) -> Value:
+    def field(self, location: Location, value: Value, name: str) -> Value:
         """``value.name``"""
         if isinstance(value, LinkRecord):
-            return link_field(place, value, name)
+            return link_field(location, value, name)
         if isinstance(value, RobotRecord):
-            return robot_field(place, value, name)
-        return self._numbers.field(place, value, name)
+            return robot_field(location, value, name)
+        return self._numbers.field(location, value, name)
 
-    def check_function(self, place: Place, name: str, called: bool) -> None:
+    def check_function(self, location: Location, name: str, called: bool) -> None:
         """Raise ``FormatError`` unless there is a constructor or a function of this name."""
         callable_names = ["robot", "SerialLink", *CONSTRUCTORS, *TABLE]
         if name in callable_names:
             return
         near = difflib.get_close_matches(name, [*self._variables, *callable_names], n=1, cutoff=0.6)
-        raise place.error(
+        raise location.error(
             f"'{name}' is neither a variable nor a supported function",
             allowed=f"straight-line robot scripts, with {', '.join(callable_names)}",
             fix=f"did you mean '{near[0]}'?" if near else "define it, or remove the line",
         )
 
     def call(
-        self, place: Place, name: str, arguments: Sequence[Value], written: Sequence[Expression]
+        self, location: Location, name: str, arguments: Sequence[Value], written: Sequence[Expression]
     ) -> Value:
         """``name(arguments)`` of a constructor of the toolbox, or of a function in the table."""
         if name == "robot":
             variable = written[0].name if written and isinstance(written[0], Name) else ""
-            return make_robot(place, list(arguments), variable)
+            return make_robot(location, list(arguments), variable)
         if name == "SerialLink":
-            return make_serial_link(place, list(arguments))
+            return make_serial_link(location, list(arguments))
         if name in CONSTRUCTORS:
-            return CONSTRUCTORS[name](place, list(arguments))
+            return CONSTRUCTORS[name](location, list(arguments))
         if name in ("length", "numel") and len(arguments) == 1:
             value = arguments[0]
             if isinstance(value, Cell | LinkArray | str):
                 return scalar(float(_length(value)))
-        return self._numbers.call(place, name, arguments, written)
+        return self._numbers.call(location, name, arguments, written)
 
 
-def single_index(place: Place, indices: Sequence[Value | None], most: int) -> int:
+def single_index(location: Location, indices: Sequence[Value | None], maximum: int) -> int:
     """The index into a row of links or values, from 0, given by one index or as ``L{1, 3}``."""
-    if len(indices) == 2 and indices[0] is not None and number_of(place, indices[0], "an index") == 1:
+    if len(indices) == 2 and indices[0] is not None and number_of(location, indices[0], "an index") == 1:
         indices = indices[1:]
     if len(indices) != 1 or indices[0] is None:
-        raise place.error(f"{len(indices)} indices are given", allowed="one index")
-    return index_of(place, indices[0], most)
+        raise location.error(f"{len(indices)} indices are given", allowed="one index")
+    return index_of(location, indices[0], maximum)
 
 
 def _length(value: Cell | LinkArray | str) -> int:

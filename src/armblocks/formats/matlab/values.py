@@ -9,7 +9,7 @@ import numpy as np
 
 from armblocks.formats.matlab.records import LinkRecord, RobotRecord
 from armblocks.matlab.arrays import Array, kind_of
-from armblocks.matlab.source import Place
+from armblocks.matlab.source import Location
 
 MOST_LINKS = 1000
 """Maximum number of elements of a cell array or an array of links."""
@@ -57,7 +57,7 @@ def copied(value: Value) -> Value:
             return value.copy()
 
 
-def join_links(place: Place, values: Sequence[Value]) -> LinkArray:
+def join_links(location: Location, values: Sequence[Value]) -> LinkArray:
     """``[L1 L2]`` of links and arrays of links."""
     links: list[LinkRecord | None] = []
     for value in values:
@@ -69,9 +69,9 @@ def join_links(place: Place, values: Sequence[Value]) -> LinkArray:
             case _ if isinstance(value, np.ndarray) and value.size == 0:
                 pass  # an empty array to which links are appended: L = []; L = [L L1]
             case _:
-                raise place.error(
+                raise location.error(
                     f"{kind_of(value)} is an element of an array of links", allowed="links only"
                 )
     if len(links) > MOST_LINKS:
-        raise place.error(f"{len(links)} links in one array", allowed=f"at most {MOST_LINKS}")
+        raise location.error(f"{len(links)} links in one array", allowed=f"at most {MOST_LINKS}")
     return LinkArray(links)

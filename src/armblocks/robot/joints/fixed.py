@@ -16,9 +16,9 @@ class Fixed(Joint):
     unit: ClassVar[str] = ""
 
     @property
-    def turn(self) -> float:
+    def angular(self) -> float:
         return 0.0
 
     @property
-    def slide(self) -> float:
+    def linear(self) -> float:
         return 0.0

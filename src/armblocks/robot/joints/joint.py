@@ -53,10 +53,9 @@ class JointLimits:
 class Joint(ABC):
     """A joint with at most one degree of freedom.
 
-    With ``s = q + offset`` the distal side rotates by ``turn s`` rad about ``axis`` and translates by ``slide
-    s`` m along it. ``axis`` is a unit vector in the joint frame; it is normalised here, and the robot rejects
-    a zero axis. ``offset`` (rad or m) is added to the joint coordinate.
-    """
+    With ``s = q + offset`` the distal side rotates by ``angular s`` rad about ``axis`` and translates by
+    ``linear s`` m along it. ``axis`` is a unit vector in the joint frame; it is normalised here, and the
+    robot rejects a zero axis. ``offset`` (rad or m) is added to the joint coordinate."""
 
     axis: Vector3 = (0.0, 0.0, 1.0)
     offset: float = 0.0
@@ -83,23 +82,26 @@ class Joint(ABC):
 
     @property
     @abstractmethod
-    def turn(self) -> float:
-        """Rotation about the axis per unit of the joint coordinate, rad."""
+    def angular(self) -> float:
+        """Angular part of the motion subspace: rotation about the axis per unit of the joint coordinate,
+        rad."""
 
     @property
     @abstractmethod
-    def slide(self) -> float:
-        """Translation along the axis per unit of the joint coordinate, m."""
+    def linear(self) -> float:
+        """Linear part of the motion subspace: translation along the axis per unit of the joint coordinate,
+        m."""
 
     @property
     def moves(self) -> bool:
         """Whether the joint has a coordinate."""
-        return self.turn != 0 or self.slide != 0
+        return self.angular != 0 or self.linear != 0
 
     def motion(self, s: float) -> Transform:
         """The pose of the distal side in the joint frame at ``s = q + offset``."""
         x, y, z = self.axis
-        shift = self.slide * s
+        shift = self.linear * s
         return Transform(
-            rotation=rotation_about(self.axis, self.turn * s), translation=(x * shift, y * shift, z * shift)
+            rotation=rotation_about(self.axis, self.angular * s),
+            translation=(x * shift, y * shift, z * shift),
         )

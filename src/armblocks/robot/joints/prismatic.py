@@ -16,9 +16,9 @@ class Prismatic(Joint):
     unit: ClassVar[str] = "m"
 
     @property
-    def turn(self) -> float:
+    def angular(self) -> float:
         return 0.0
 
     @property
-    def slide(self) -> float:
+    def linear(self) -> float:
         return 1.0

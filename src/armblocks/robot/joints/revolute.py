@@ -16,9 +16,9 @@ class Revolute(Joint):
     unit: ClassVar[str] = "rad"
 
     @property
-    def turn(self) -> float:
+    def angular(self) -> float:
         return 1.0
 
     @property
-    def slide(self) -> float:
+    def linear(self) -> float:
         return 0.0

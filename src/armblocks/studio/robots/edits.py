@@ -56,7 +56,7 @@ def _set_cell(edit: SetCell, robot: Robot) -> Robot:
     where = f"link '{link.name}', {column.title}"
     if why := column.locked(link):
         raise InputError("this cell cannot be edited", where=where, allowed=why, fix="edit another cell")
-    changed = column.write(link, _typed(column, link, edit, where, turns=bool(link.joint.turn)))
+    changed = column.write(link, _typed(column, link, edit, where, turns=bool(link.joint.angular)))
     return replace(robot, links=tuple(changed if each is link else each for each in robot.links))
 
 

@@ -41,7 +41,7 @@ def scene_of(robot: Robot) -> RobotScene:
             SceneJoint(
                 name=link.name,
                 row=rows[link.name],
-                turns=bool(link.joint.turn),
+                turns=bool(link.joint.angular),
                 limits=link.joint.limits.position,
                 carrier=rows[link.parent],
                 frame=(link.before @ _along(link)).matrix.ravel().tolist(),
