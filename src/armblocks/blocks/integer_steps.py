@@ -27,7 +27,8 @@ ROUNDINGS: Mapping[str, Callable[[SX], SX]] = {
 
 
 def rounding_edges(function: str, n: SX, mirrored: bool = False) -> tuple[SX, SX]:
-    """The border above which a rounding exceeds n, and whether the border itself is rounded to more than n.
+    """The boundary above which a rounding exceeds n, and whether the boundary itself is rounded to more than
+    n.
 
     ``mirrored``: the same for -f(-u) instead of f(u).
     """
@@ -43,7 +44,7 @@ def rounding_edges(function: str, n: SX, mirrored: bool = False) -> tuple[SX, SX
 def step_after(target: SX, before: SX, e: Signals, up: str = "up", down: str = "down") -> SX:
     """An integer after the events at both ends of its interval; ``target``: computed from the present values.
 
-    A jump may pass several integers at once. The integer changes by at least one, because at a border
+    A jump may pass several integers at once. The integer changes by at least one, because at a boundary
     rounding errors could give the old value again.
     """
     lower = if_else(e[down] < 0.0, fmin(target, before - 1.0), before)

@@ -36,9 +36,9 @@ def weights(
 
     Break points may be symbols, except for the method ``cubic``.
 
-    ``cell``, if given, is the number of :func:`borders` at or below u and selects the equations.
+    ``cell``, if given, is the number of :func:`boundaries` at or below u and selects the equations.
     """
-    ends = borders(points, method, extrapolation)
+    ends = boundaries(points, method, extrapolation)
     if method in ("flat", "nearest"):
         return cells(u, ends) if cell is None else [cell == float(k) for k in range(len(points))]
     if extrapolation == "linear" and method == "linear":
@@ -63,7 +63,7 @@ def weights(
     return weighted
 
 
-def borders(points: Sequence[Point], method: str, extrapolation: str) -> list[Point]:
+def boundaries(points: Sequence[Point], method: str, extrapolation: str) -> list[Point]:
     """The positions at which the curve or its derivative jumps; for a spline, only the ends if it is
     clipped."""
     if method == "flat":
@@ -90,9 +90,9 @@ def linear_weights(u: SX, points: Sequence[Point], interval: Sequence[SX] | None
     return weights
 
 
-def cells(u: SX, borders: Sequence[Point]) -> list[SX]:
-    """1 for the cell of u, else 0; one cell more than borders; a border belongs to the cell above."""
-    below = [u < border for border in borders]
+def cells(u: SX, boundaries: Sequence[Point]) -> list[SX]:
+    """1 for the cell of u, else 0; one cell more than boundaries; a boundary belongs to the cell above."""
+    below = [u < boundary for boundary in boundaries]
     inner = [logic_and(logic_not(left), right) for left, right in pairwise(below)]
     return [below[0], *inner, logic_not(below[-1])] if below else [SX(1.0)]
 

@@ -90,7 +90,7 @@ def pid_example(kind: str, **parameters: Any) -> WorkedExample:
     """A closed loop with two lags and a step of the reference."""
     plant = driver("SecondOrderLag", natural_frequency=2.0, damping=0.8).named("plant")
     step = driver("Step")
-    feeds = (
+    inputs = (
         {"r": step, "u": plant.by(u="y")}
         if kind == "two"
         else {"u": driver("Sum", signs="+-").by(u1=step, u2=plant.by(u="y"))}
@@ -98,7 +98,7 @@ def pid_example(kind: str, **parameters: Any) -> WorkedExample:
     return WorkedExample(
         shows="The plant follows a step of the reference; the control action is largest at the step.",
         parameters=parameters,
-        inputs=feeds,
+        inputs=inputs,
         shown=(step, "plant/y", "y"),
     )
 

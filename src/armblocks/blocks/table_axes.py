@@ -1,8 +1,8 @@
 """The axes of a lookup table: cells, and events at which a position enters another cell.
 
-Along each axis the *borders* are the positions at which the value or its derivative jumps. *Cell* k is above
-k borders. With event location, the cell is a mode, so that the table is smooth within a solver step. The
-points of short tables are part of the equations; long tables are read by index (see :mod:`.long_tables`).
+Along each axis the *boundaries* are the positions at which the value or its derivative jumps. *Cell* k is
+above k boundaries. With event location, the cell is a mode, so that the table is smooth within a solver step.
+The points of short tables are part of the equations; long tables are read by index (see :mod:`.long_tables`).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 from casadi import SX, fmax, fmin, if_else, reshape, vertcat
 from numpy.typing import ArrayLike, NDArray
 
-from armblocks.blocks.interpolation import borders, contract, weights
+from armblocks.blocks.interpolation import boundaries, contract, weights
 from armblocks.blocks.long_tables import inputs_with, is_spline
 from armblocks.blocks.splines import spline_corners, with_derivatives
 from armblocks.blocks.switching import THRESHOLD_OFFSET, beyond, cell_of
@@ -66,20 +66,20 @@ class Axis(Protocol):
     """One axis, for scalar positions u and cells."""
 
     @property
-    def has_borders(self) -> bool:
+    def has_boundaries(self) -> bool:
         """Whether entering another cell of the axis is an event."""
         ...
 
     def cell(self, u: SX) -> SX:
-        """The number of cell boundaries at or below u."""
+        """The number of boundaries at or below u."""
         ...
 
     def above_upper_boundary(self, u: SX, cell: SX) -> SX:
-        """The distance of u beyond the upper border of its cell; -inf without an upper border."""
+        """The distance of u beyond the upper boundary of its cell; -inf without an upper boundary."""
         ...
 
     def above_lower_boundary(self, u: SX, cell: SX) -> SX:
-        """The distance of u beyond the lower border of its cell; inf without a lower border."""
+        """The distance of u beyond the lower boundary of its cell; inf without a lower boundary."""
         ...
 
 
@@ -92,26 +92,26 @@ class ShortAxis:
     extrapolation: str
 
     @property
-    def borders(self) -> list[float | SX]:
-        """The borders, ascending."""
-        return list(borders(self.points, self.method, self.extrapolation))
+    def boundaries(self) -> list[float | SX]:
+        """The boundaries, ascending."""
+        return list(boundaries(self.points, self.method, self.extrapolation))
 
     @property
-    def has_borders(self) -> bool:
-        return bool(self.borders)
+    def has_boundaries(self) -> bool:
+        return bool(self.boundaries)
 
     def cell(self, u: SX) -> SX:
-        return sum((u >= border for border in self.borders), SX(0.0))
+        return sum((u >= boundary for boundary in self.boundaries), SX(0.0))
 
     def weights(self, u: SX, cell: SX | None = None) -> list[SX]:
         """The weight of every point."""
         return weights(u, self.points, self.method, self.extrapolation, cell)
 
     def above_upper_boundary(self, u: SX, cell: SX) -> SX:
-        return _beyond([*self.borders, math.inf], u, cell)
+        return _beyond([*self.boundaries, math.inf], u, cell)
 
     def above_lower_boundary(self, u: SX, cell: SX) -> SX:
-        return _beyond([-math.inf, *self.borders], u, cell)
+        return _beyond([-math.inf, *self.boundaries], u, cell)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +123,7 @@ class LongAxis:
     extrapolation: str
 
     @property
-    def has_borders(self) -> bool:
+    def has_boundaries(self) -> bool:
         return True
 
     @property
@@ -132,22 +132,24 @@ class LongAxis:
 
     @property
     def _count(self) -> int:
-        """The number of borders."""
+        """The number of boundaries."""
         n = self.points.numel()
         return n if self._constant_outside else n - 2 if self.method == "linear" else n - 1
 
     def cell(self, u: SX) -> SX:
         last = last_at_or_below(self.points, u)
         if self.method == "nearest":
-            border = fmin(fmax(last, 0.0), self._count - 1.0)
-            return if_else(last >= self._count, float(self._count), border + (u >= self._border(border)))
+            boundary = fmin(fmax(last, 0.0), self._count - 1.0)
+            return if_else(
+                last >= self._count, float(self._count), boundary + (u >= self._boundary(boundary))
+            )
         return fmin(fmax(last + (1.0 if self._constant_outside else 0.0), 0.0), float(self._count))
 
     def above_upper_boundary(self, u: SX, cell: SX) -> SX:
-        return if_else(cell < float(self._count), u - self._border(cell), -math.inf)
+        return if_else(cell < float(self._count), u - self._boundary(cell), -math.inf)
 
     def above_lower_boundary(self, u: SX, cell: SX) -> SX:
-        return if_else(cell > 0.0, u - self._border(cell - 1.0), math.inf)
+        return if_else(cell > 0.0, u - self._boundary(cell - 1.0), math.inf)
 
     def corners(self, u: SX, cell: SX) -> list[tuple[SX, SX]]:
         """Indices and weights of the points of a cell."""
@@ -161,8 +163,8 @@ class LongAxis:
         share = (u - begin) / (end - begin)
         return [(interval, 1.0 - share), (interval + 1.0, share)]
 
-    def _border(self, number: SX) -> SX:
-        """The position of a border; its index starts at 0 and is limited to valid values."""
+    def _boundary(self, number: SX) -> SX:
+        """The position of a boundary; its index starts at 0 and is limited to valid values."""
         k = fmin(fmax(number, 0.0), self._count - 1.0)
         if self.method == "nearest":
             return (read_entry(self.points, k) + read_entry(self.points, k + 1.0)) / 2.0
@@ -177,7 +179,7 @@ class SplineAxis:
     extrapolation: str
 
     @property
-    def has_borders(self) -> bool:
+    def has_boundaries(self) -> bool:
         return self.extrapolation == "clip"
 
     def cell(self, u: SX) -> SX:
@@ -191,7 +193,7 @@ class SplineAxis:
 
     def corners(self, u: SX, cell: SX) -> list[tuple[SX, SX]]:
         """Indices and weights of the values and derivatives of a cell."""
-        return spline_corners(u, self.points, cell, straight=not self.has_borders)
+        return spline_corners(u, self.points, cell, straight=not self.has_boundaries)
 
     @property
     def _ends(self) -> list[SX]:
@@ -214,7 +216,7 @@ class Axes:
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
         """The cells."""
-        doc = "number of cell boundaries at or below"
+        doc = "number of boundaries at or below"
         return tuple(
             State(f"cell{k}", inputs[port], f"{doc} {port}") for port, k, _ in self._axes_with_modes()
         )
@@ -225,8 +227,8 @@ class Axes:
             guard
             for port, k, _ in self._axes_with_modes()
             for guard in (
-                Guard(f"up{k}", inputs[port], f"{port} reaches the next cell boundary", 1),
-                Guard(f"down{k}", inputs[port], f"{port} falls below the lower cell boundary", -1),
+                Guard(f"up{k}", inputs[port], f"{port} reaches the next boundary", 1),
+                Guard(f"down{k}", inputs[port], f"{port} falls below the lower boundary", -1),
             )
         )
 
@@ -295,7 +297,7 @@ class Axes:
         numbered = (
             (port, str(k) if many else "", axis) for k, (port, axis) in enumerate(self.axes.items(), 1)
         )
-        return [entry for entry in numbered if self.located and entry[2].has_borders]
+        return [entry for entry in numbered if self.located and entry[2].has_boundaries]
 
 
 def axis(points: SX | Sequence[float | SX], method: str, extrapolation: str) -> Axis:

@@ -41,14 +41,14 @@ def in_order(
     """
     rest = signature.names[len(values) :]
     if set(named) == set(rest):
-        return (*values, *[named[wanted] for wanted in rest])
-    for given in named:
-        if given not in signature.names:
-            raise UnknownNameError("argument", given, [*signature.names, *options], where=name)
-    twice = [given for given in named if given not in rest]
-    missing = [wanted for wanted in rest if wanted not in named]
+        return (*values, *[named[slot_name] for slot_name in rest])
+    for argument in named:
+        if argument not in signature.names:
+            raise UnknownNameError("argument", argument, [*signature.names, *options], where=name)
+    duplicates = [argument for argument in named if argument not in rest]
+    missing = [slot_name for slot_name in rest if slot_name not in named]
     raise InputError(
-        f"'{twice[0]}' is given twice" if twice else f"'{missing[0]}' is missing",
+        f"'{duplicates[0]}' is given twice" if duplicates else f"'{missing[0]}' is missing",
         where=name,
         allowed=_listing(signature),
         fix=f"call {name}({', '.join(signature.names)}), positional or by keyword",
@@ -90,9 +90,9 @@ def count_samples(name: str, signature: Signature, arrays: Sequence[Array]) -> i
         slot.name: array.shape[0] for slot, array in zip(signature, arrays) if array.ndim > len(slot.shape)
     }
     if len(set(counts.values())) > 1:
-        found = ", ".join(f"'{slot}' {count}" for slot, count in counts.items())
+        sizes = ", ".join(f"'{slot}' {count}" for slot, count in counts.items())
         raise InputError(
-            f"the inputs hold different numbers of samples: {found}",
+            f"the inputs hold different numbers of samples: {sizes}",
             where=name,
             allowed="one number of samples; an input without a sample axis is used for all samples",
             fix="give equal numbers of samples",
@@ -109,42 +109,42 @@ def new_outputs(
     writable; a tuple of such arrays for several outputs.
     """
     if out is None:
-        fresh = [new_result(shape) for shape in shapes]
-        return fresh, fresh
-    given = cast("tuple[object, ...]", out) if isinstance(out, tuple) else (out,)
-    if len(given) != len(signature):
+        new_arrays = [new_result(shape) for shape in shapes]
+        return new_arrays, new_arrays
+    arrays = cast("tuple[object, ...]", out) if isinstance(out, tuple) else (out,)
+    if len(arrays) != len(signature):
         raise InputError(
-            f"out= holds {len(given)} arrays",
+            f"out= holds {len(arrays)} arrays",
             where=name,
             allowed=f"one per output: {_listing(signature)}",
             fix="omit out=, or give one array for each output",
         )
     written: list[Array] = []
-    handed: list[Array] = []
-    for slot, shape, array in zip(signature, shapes, given):
+    returned: list[Array] = []
+    for slot, shape, array in zip(signature, shapes, arrays):
         checked = _check_output(name, slot, shape, array)
-        handed.append(checked)
-        aliased = any(np.may_share_memory(checked, other) for other in (*inputs, *handed[:-1]))
+        returned.append(checked)
+        aliased = any(np.may_share_memory(checked, other) for other in (*inputs, *returned[:-1]))
         written.append(np.empty(shape) if aliased else checked)
-    return written, handed
+    return written, returned
 
 
 def _check_output(name: str, slot: Slot, shape: Shape, array: object) -> Array:
-    given = cast("Array", array)
+    values = cast("Array", array)
     if not isinstance(array, np.ndarray):
-        found = f"is a {type(array).__name__}"
-    elif given.dtype != np.float64 or not given.dtype.isnative:
-        found = f"holds {given.dtype.str}"
-    elif given.shape != shape:
-        found = f"has shape {given.shape}"
-    elif not given.flags.c_contiguous or not given.flags.aligned:
-        found = "is not C-contiguous"
-    elif not given.flags.writeable:
-        found = "is read-only"
+        problem = f"is a {type(array).__name__}"
+    elif values.dtype != np.float64 or not values.dtype.isnative:
+        problem = f"holds {values.dtype.str}"
+    elif values.shape != shape:
+        problem = f"has shape {values.shape}"
+    elif not values.flags.c_contiguous or not values.flags.aligned:
+        problem = "is not C-contiguous"
+    elif not values.flags.writeable:
+        problem = "is read-only"
     else:
-        return given
+        return values
     raise InputError(
-        f"out= for '{slot.name}' {found}",
+        f"out= for '{slot.name}' {problem}",
         where=name,
         allowed=f"a writable C-contiguous float64 array of shape {shape}",
         fix="omit out=, or allocate it with numpy.empty",

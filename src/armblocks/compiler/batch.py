@@ -69,12 +69,12 @@ def emit_shares(module: Module, tape: Tape, name: str) -> None:
             end = start + share
             r.call(evaluate, start, select(end < samples, end, samples), samples, *arrays)
         job.fetch_add(at_work, -1)
-        turn = r.integer(0)
+        iteration = r.integer(0)
         with r.loop() as spinning:
-            passed = turn.value
+            passed = iteration.value
             waits = (job.acquire(at_work) != 0) & (passed < patience)
             spinning.leave_unless((passed < hold) | waits)
-            turn.value = passed + 1
+            iteration.value = passed + 1
 
     program = Program()
     program.define(shares, f"{name}.shares", public=True, rest=_pointers(tape))
@@ -147,7 +147,7 @@ def _groups(tape: Tape, layout: BatchLayout, lanes: int) -> list[tuple[int, int,
     groups: list[tuple[int, int, tuple[int, ...]]] = []
     for slot, (members, kind) in enumerate(zip(tape.outputs, layout.outputs)):
         if kind is Layout.COLUMNS:
-            groups += [(slot, place, (register,)) for place, register in enumerate(members)]
+            groups += [(slot, index, (register,)) for index, register in enumerate(members)]
             continue
         for chunk in range(0, len(members), lanes):
             first = min(chunk, max(0, len(members) - lanes))
@@ -164,31 +164,31 @@ def _inputs(body: Body, tape: Tape, layout: BatchLayout, sample: str) -> Inputs:
             return loaded[register]
         slot = next(k for k, end in enumerate(tape.input_starts[1:]) if register < end)
         start, size, kind = tape.input_starts[slot], tape.input_sizes[slot], layout.inputs[slot]
-        place = register - start
+        index = register - start
         if kind is Layout.SHARED:
-            address = body.let(f"getelementptr inbounds double, ptr %i{slot}, i64 {place}")
+            address = body.let(f"getelementptr inbounds double, ptr %i{slot}, i64 {index}")
             return body.broadcast(body.let(f"load double, ptr {address}, align 8"))
         if kind is Layout.COLUMNS:
-            return body.let(f"load {body.real}, ptr {_column(body, f'%i{slot}', place, sample)}, align 8")
+            return body.let(f"load {body.real}, ptr {_column(body, f'%i{slot}', index, sample)}, align 8")
         if slot not in bases:
             row = _row(body, sample, size)
             bases[slot] = body.let(f"getelementptr inbounds double, ptr %i{slot}, i64 {row}")
-        first = min(place - place % body.lanes, max(0, size - body.lanes))
+        first = min(index - index % body.lanes, max(0, size - body.lanes))
         for k, value in enumerate(load_rows(body, bases[slot], size, first)[:size]):
             loaded.setdefault(start + first + k, value)
         return loaded[register]
 
     def line(register: int) -> Line:
-        slot, place = tape.input_place(register)
-        kind, size, step, apart = layout.inputs[slot], tape.input_sizes[slot], "1", "0"
+        slot, index = tape.input_position(register)
+        kind, size, step, lane_step = layout.inputs[slot], tape.input_sizes[slot], "1", "0"
         if kind is Layout.COLUMNS:
-            begin, step, apart = _column(body, f"%i{slot}", place, sample), "%columns", "1"
+            begin, step, lane_step = _column(body, f"%i{slot}", index, sample), "%columns", "1"
         else:
             first = "0" if kind is Layout.SHARED else _row(body, sample, size)
-            there = body.let(f"add nsw i64 {first}, {place}")
-            begin = body.let(f"getelementptr inbounds double, ptr %i{slot}, i64 {there}")
-            apart = "0" if kind is Layout.SHARED else str(size)
-        return Line(address=begin, step=step, apart=apart)
+            entry = body.let(f"add nsw i64 {first}, {index}")
+            begin = body.let(f"getelementptr inbounds double, ptr %i{slot}, i64 {entry}")
+            lane_step = "0" if kind is Layout.SHARED else str(size)
+        return Line(address=begin, step=step, apart=lane_step)
 
     return Inputs(load, line)
 
@@ -197,7 +197,7 @@ def _row(body: Body, sample: str, size: int) -> str:
     return body.let(f"mul nsw i64 {sample}, {size}")
 
 
-def _column(body: Body, pointer: str, place: int, sample: str) -> str:
-    line = body.let(f"mul nsw i64 %columns, {place}")
+def _column(body: Body, pointer: str, index: int, sample: str) -> str:
+    line = body.let(f"mul nsw i64 %columns, {index}")
     offset = body.let(f"add nsw i64 {line}, {sample}")
     return body.let(f"getelementptr inbounds double, ptr {pointer}, i64 {offset}")

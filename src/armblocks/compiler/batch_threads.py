@@ -36,9 +36,9 @@ def worth_while(samples: int, threads: int) -> int:
 
 
 def evaluate_in_threads(
-    shares: Shares, samples: int, addresses: Sequence[int], threads: int, kept: object
+    shares: Shares, samples: int, addresses: Sequence[int], threads: int, code: object
 ) -> None:
-    """Evaluate all samples. ``kept`` keeps the machine code alive until the last thread has left it."""
+    """Evaluate all samples. ``code`` keeps the machine code alive until the last thread has left it."""
     share = max(_SMALLEST_SHARE, -(-samples // (threads * _SHARES_PER_THREAD)))
     share += -share % 64  # whole cache lines
     job = (ctypes.c_int64 * 4)(0, 0, share, samples)
@@ -46,7 +46,7 @@ def evaluate_in_threads(
     def help_out() -> None:
         # If the batch is complete, this takes no share and does not access the arrays.
         shares(job, _HOLD, 0, *addresses)
-        _ = kept
+        _ = code
 
     for _ in range(threads - 1):
         _helpers().give(help_out)

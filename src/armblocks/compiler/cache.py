@@ -71,13 +71,13 @@ def package_fingerprint() -> str:
 
 def _fingerprint(*roots: Path) -> str:
     """Names, sizes and times of all Python files below the folders ``roots``."""
-    found: list[str] = []
+    entries: list[str] = []
     with contextlib.suppress(OSError):
         for root in roots:
             for entry in _python_files(root):
                 status = entry.stat()
-                found.append(f"{entry.path} {status.st_size} {status.st_mtime_ns}")
-    return _sha256("\n".join(sorted(found)).encode()).hex()
+                entries.append(f"{entry.path} {status.st_size} {status.st_mtime_ns}")
+    return _sha256("\n".join(sorted(entries)).encode()).hex()
 
 
 def _python_files(root: Path | str) -> Iterator[os.DirEntry[str]]:
@@ -148,7 +148,7 @@ def prune(root: Path, limit: int = _SIZE_LIMIT) -> None:
 
     Remains of writers that were killed are removed after a day.
     """
-    found: list[tuple[float, int, str]] = []
+    cached_files: list[tuple[float, int, str]] = []
     for shelf in root.glob("??"):
         with contextlib.suppress(OSError), os.scandir(shelf) as files:
             for file in files:
@@ -157,11 +157,11 @@ def prune(root: Path, limit: int = _SIZE_LIMIT) -> None:
                     if file.name.endswith(".tmp") and time.time() - status.st_mtime > _DAY:
                         Path(file).unlink()
                     elif file.name.endswith(_SUFFIX):
-                        found.append((status.st_mtime, status.st_size, file.path))
-    total = sum(size for _, size, _ in found)
+                        cached_files.append((status.st_mtime, status.st_size, file.path))
+    total = sum(size for _, size, _ in cached_files)
     if total <= limit:
         return
-    for _, size, path in sorted(found):
+    for _, size, path in sorted(cached_files):
         if total <= limit * 3 // 4:
             break
         with contextlib.suppress(OSError):

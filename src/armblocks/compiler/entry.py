@@ -49,7 +49,7 @@ OWNER_CALL = 16
 # Places in NumPy's table of C functions.
 _NUMPY_ARRAY_TYPE, _NUMPY_SCALAR, _NUMPY_NEW_FROM_DESCR = 2, 60, 94
 
-PLACES = (
+TABLE_ENTRIES = (
     "array_type",
     "float_type",
     "numpy_float_type",
@@ -103,11 +103,11 @@ class _Owner:
     The C function reads ``call`` by its offset.
     """
 
-    __slots__ = ("call", "kept", "maker")
+    __slots__ = ("call", "code", "maker")
 
-    def __init__(self, call: Callback, kept: object, maker: Maker | None = None) -> None:
+    def __init__(self, call: Callback, code: object, maker: Maker | None = None) -> None:
         self.call = call
-        self.kept = kept
+        self.code = code
         self.maker = maker
 
     def __reduce__(self) -> Maker:
@@ -139,13 +139,13 @@ def make_entry(
     address: int,
     table: int,
     fallback: Callback,
-    kept: object,
+    code: object,
     maker: Maker | None = None,
 ) -> Callback:
     """The builtin for the C function at ``address``.
 
     ``table`` is the address of the module's :data:`TABLE`. Calls that the C function does not handle go to
-    ``fallback``. ``kept`` (the machine code) lives as long as the builtin, which is pickled by its ``maker``.
+    ``fallback``. ``code`` (the machine code) lives as long as the builtin, which is pickled by its ``maker``.
     Where the binary interface of Python or NumPy differs from the expected one, ``fallback`` itself is
     returned.
     """
@@ -158,7 +158,7 @@ def make_entry(
     new = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_void_p, ctypes.py_object, ctypes.c_void_p)(
         ("PyCFunction_NewEx", ctypes.pythonapi)
     )
-    return new(ctypes.addressof(definition), _Owner(fallback, kept, maker), None)
+    return new(ctypes.addressof(definition), _Owner(fallback, code, maker), None)
 
 
 @dataclass(frozen=True)
@@ -189,7 +189,7 @@ def _addresses() -> list[int] | None:
     functions = _View(int(pointer))
     if functions.word(8 * _NUMPY_ARRAY_TYPE) != id(np.ndarray):
         return None
-    found = {
+    addresses = {
         "array_type": id(np.ndarray),
         "float_type": id(float),
         "numpy_float_type": id(np.float64),
@@ -210,7 +210,7 @@ def _addresses() -> list[int] | None:
         "save_thread": _python_function("PyEval_SaveThread"),
         "restore_thread": _python_function("PyEval_RestoreThread"),
     }
-    return [found[place] for place in PLACES]
+    return [addresses[entry] for entry in TABLE_ENTRIES]
 
 
 def _python_function(name: str) -> int:

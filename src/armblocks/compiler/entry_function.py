@@ -21,8 +21,8 @@ from armblocks.compiler.entry import (
     MOST_BATCH_INPUTS,
     OBJECT_TYPE,
     OWNER_CALL,
-    PLACES,
     TABLE,
+    TABLE_ENTRIES,
     WRITEABLE,
 )
 from armblocks.compiler.ir_text import Module
@@ -65,7 +65,7 @@ def emit_entry(module: Module, inputs: Signature, outputs: Signature, evaluate: 
 
 def _known(r: Routine, name: str) -> Address:
     """An address from the table that the process fills in."""
-    return r.filled_in(TABLE, len(PLACES))[PLACES.index(name)]
+    return r.filled_in(TABLE, len(TABLE_ENTRIES))[TABLE_ENTRIES.index(name)]
 
 
 def _known_function(r: Routine, function: Function[P, R]) -> Function[P, R]:
@@ -114,9 +114,10 @@ class _Argument:
 
 @dataclass(frozen=True, kw_only=True)
 class _Result:
-    """Variables of one result: the object (null for a number that is not made yet) and where to write to."""
+    """Variables of one result: the object (null for a number that does not exist yet) and where to write
+    to."""
 
-    made: AddressVariable
+    object: AddressVariable
     target: AddressVariable
 
 
@@ -157,9 +158,9 @@ class _Call:
         out = r.address(r.null)
         with r.unless(self.names.is_null):
             options = r.program.define(_options, _OPTIONS, inlined=False)
-            served, given = r.call(options, self.values.after(count), self.names)
+            served, output = r.call(options, self.values.after(count), self.names)
             self.require(served)
-            out.value = given
+            out.value = output
         return out.value
 
     def argument(self, k: int, shape: Shape) -> _Argument:
@@ -212,9 +213,9 @@ class _Call:
             index = r.constant_integer(0)
             for k, argument in enumerate(arguments):
                 index = index | ((argument.samples != _NO_SAMPLES).count() << k)
-            found = table[index]
-            self.require(~found.is_null)
-            function.value = found
+            batch = table[index]
+            self.require(~batch.is_null)
+            function.value = batch
         return function.value
 
     # ---- results -----------------------------------------------------------------------------------------
@@ -226,8 +227,8 @@ class _Call:
 
     def new_result(self, shape: Shape, samples: Integer, batched: Boolean) -> _Result:
         """A new array, or memory for one number."""
-        result = _Result(made=self.r.address(self.r.null), target=self.r.address(self.r.null))
-        self.owned.append(result.made)
+        result = _Result(object=self.r.address(self.r.null), target=self.r.address(self.r.null))
+        self.owned.append(result.object)
         self._allocate(shape, samples, batched, result)
         return result
 
@@ -259,7 +260,7 @@ class _Call:
             r.null,
         )
         self.succeed(array)
-        result.made.value = array
+        result.object.value = array
         result.target.value = array.pointer(ARRAY_DATA)
 
     def given_or_new(
@@ -275,15 +276,15 @@ class _Call:
         An array that may share memory with an input goes to the Python callable.
         """
         r = self.r
-        result = _Result(made=r.address(r.null), target=r.address(r.null))
+        result = _Result(object=r.address(r.null), target=r.address(r.null))
         with r.when(out.is_null):
             self._allocate(shape, samples, batched, result)
         with r.otherwise():
             self._require_as_new(out, shape, samples, batched, arguments)
             self.objects.call(python.reference, out)
-            result.made.value = out
+            result.object.value = out
             result.target.value = out.pointer(ARRAY_DATA)
-        self.owned.append(result.made)
+        self.owned.append(result.object)
         return result
 
     def _require_as_new(
@@ -330,10 +331,10 @@ class _Call:
                 r.call(many, start, samples, samples, *arrays)
                 objects.call(python.restore_thread, state)
 
-    def succeed(self, made: Address) -> None:
-        """If ``made`` is null, release all owned references and return null, so that Python raises the
+    def succeed(self, object: Address) -> None:
+        """If ``object`` is null, release all owned references and return null, so that Python raises the
         error."""
-        with self.r.when(made.is_null, rarely=True):
+        with self.r.when(object.is_null, rarely=True):
             for owned in self.owned:
                 self.objects.call(python.release, owned.value)
             self.r.return_(self.r.null)
@@ -344,23 +345,23 @@ class _Call:
         for shape, result in zip(shapes, results):
             if not shape:
                 self._make_number(result)
-        made = [result.made.value for result in results]
-        if len(made) == 1:
-            r.return_(made[0])
+        python_objects = [result.object.value for result in results]
+        if len(python_objects) == 1:
+            r.return_(python_objects[0])
             return
-        bundle = objects.call(python.new_tuple, r.constant_integer(len(made)))
+        bundle = objects.call(python.new_tuple, r.constant_integer(len(python_objects)))
         self.succeed(bundle)
-        for k, item in enumerate(made):  # the tuple takes over the references
+        for k, item in enumerate(python_objects):  # the tuple takes over the references
             objects.call(python.set_item, bundle, r.constant_integer(k), item)
         r.return_(bundle)
 
     def _make_number(self, result: _Result) -> None:
         """The ``numpy.float64`` of a scalar result, unless it has been written into an array."""
-        with self.r.when(result.made.value.is_null):
+        with self.r.when(result.object.value.is_null):
             float64 = self.objects.known("float64")
             number = self.objects.call(python.new_scalar, result.target.value, float64, self.r.null)
             self.succeed(number)
-            result.made.value = number
+            result.object.value = number
 
 
 def _evaluate(r: Routine, *arrays: Reals) -> None:

@@ -77,13 +77,13 @@ def tape_from(traced: TracedFunction) -> Tape:
     """
     function = Function("f", list(traced.arguments), [*traced.results, traced.rounded], {"cse": True})
     builder = TapeBuilder([slot.size for slot in traced.inputs])
-    inputs = [[builder.input(k, place) for place in range(slot.size)] for k, slot in enumerate(traced.inputs)]
+    inputs = [[builder.input(k, index) for index in range(slot.size)] for k, slot in enumerate(traced.inputs)]
     outputs = [[builder.constant(0.0)] * slot.size for slot in traced.outputs]
-    places = [function.sparsity_out(k).row() for k in range(len(outputs))]
-    *found, rounded = _inlined(builder, function, inputs, traced.name)
-    for slot, entries in enumerate(found):
-        for place, handle in zip(places[slot], entries):
-            outputs[slot][place] = handle
+    rows = [function.sparsity_out(k).row() for k in range(len(outputs))]
+    *entries_of_slots, rounded = _inlined(builder, function, inputs, traced.name)
+    for slot, entries in enumerate(entries_of_slots):
+        for index, handle in zip(rows[slot], entries):
+            outputs[slot][index] = handle
     return with_matrix_products(builder.build(outputs, rounded))
 
 
@@ -103,11 +103,11 @@ def _inlined(
             operands = [work[source] for source in sources[:arity]]
             work[targets[0]] = builder.add(opcode, *operands)
         elif number == casadi.OP_OUTPUT:
-            slot, place = targets
-            outputs[slot][place] = work[sources[0]]
+            slot, index = targets
+            outputs[slot][index] = work[sources[0]]
         elif number == casadi.OP_INPUT:
-            slot, place = sources
-            work[targets[0]] = inputs[slot][place]
+            slot, index = sources
+            work[targets[0]] = inputs[slot][index]
         elif number == casadi.OP_CONST:
             work[targets[0]] = builder.constant(function.instruction_constant(k))
         elif number == casadi.OP_CALL:

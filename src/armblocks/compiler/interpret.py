@@ -30,10 +30,10 @@ def interpret(tape: Tape, inputs: Sequence[ArrayLike], *, fused: bool = True) ->
     Raises :class:`InputError` if the number of inputs or the size of an input is wrong.
     """
     arrays = [np.asarray(value, dtype=np.float64) for value in inputs]
-    found = tuple(array.shape[-1] if array.ndim else -1 for array in arrays)
-    if found != tape.input_sizes:
+    sizes = tuple(array.shape[-1] if array.ndim else -1 for array in arrays)
+    if sizes != tape.input_sizes:
         raise InputError(
-            f"inputs of sizes {found}",
+            f"inputs of sizes {sizes}",
             allowed=f"sizes {tape.input_sizes} on the last axis",
             where="tape",
             fix="give one array for each input of the tape",
@@ -41,7 +41,7 @@ def interpret(tape: Tape, inputs: Sequence[ArrayLike], *, fused: bool = True) ->
     lead = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
     registers: list[Values] = []
     for array in arrays:
-        registers += [np.broadcast_to(array[..., place], lead) for place in range(array.shape[-1])]
+        registers += [np.broadcast_to(array[..., index], lead) for index in range(array.shape[-1])]
     registers += [np.full(lead, value) for value in tape.constants]
     with np.errstate(all="ignore"):
         for opcode, operands in tape.operations:
@@ -56,8 +56,8 @@ def interpret(tape: Tape, inputs: Sequence[ArrayLike], *, fused: bool = True) ->
                 registers.append(_product(registers, tape, operands, fused=fused))
                 continue
             if opcode is Opcode.MEMBER:
-                vector, place = operands
-                registers.append(registers[vector][..., int(tape.constants[place - tape.first_constant])])
+                vector, index = operands
+                registers.append(registers[vector][..., int(tape.constants[index - tape.first_constant])])
                 continue
             registers.append(evaluate(opcode, [registers[operand] for operand in operands], fused=fused))
     return [
@@ -69,12 +69,12 @@ def interpret(tape: Tape, inputs: Sequence[ArrayLike], *, fused: bool = True) ->
 def _read(registers: Sequence[Values], tape: Tape, first: int, count: int, index: int) -> Values:
     """The entries of a table at the indices."""
     size = int(tape.constants[count - tape.first_constant])
-    places = np.clip(np.nan_to_num(np.trunc(registers[index]), nan=0.0), 0, size - 1).astype(np.intp)
-    found = np.empty(places.shape)
-    for place in np.unique(places):
-        chosen = places == place
-        found[chosen] = registers[first + int(place)][chosen]
-    return found
+    entries = np.clip(np.nan_to_num(np.trunc(registers[index]), nan=0.0), 0, size - 1).astype(np.intp)
+    values = np.empty(entries.shape)
+    for entry in np.unique(entries):
+        chosen = entries == entry
+        values[chosen] = registers[first + int(entry)][chosen]
+    return values
 
 
 def _product(registers: Sequence[Values], tape: Tape, operands: Sequence[int], *, fused: bool) -> Values:
@@ -164,11 +164,11 @@ def multiply_add(a: Values, b: Values, c: Values) -> Values:
     odd = np.where((rest_error != 0.0) & even, np.nextafter(rest, target), rest)
     result = np.asarray(high + odd)
     size = [np.abs(value) for value in (a, b, c, product)]
-    tame = np.all([(value < 1e250) & ((value > 1e-250) | (value == 0.0)) for value in size], axis=0)
+    in_range = np.all([(value < 1e250) & ((value > 1e-250) | (value == 0.0)) for value in size], axis=0)
     # The splitting may lose the sign of a product of zero and of a sum that cancels exactly.
-    tame &= (product != 0.0) & (result != 0.0)
-    for place in zip(*np.nonzero(np.atleast_1d(~tame))):
-        at = place if result.ndim else ()
+    in_range &= (product != 0.0) & (result != 0.0)
+    for position in zip(*np.nonzero(np.atleast_1d(~in_range))):
+        at = position if result.ndim else ()
         result[at] = _exact_multiply_add(float(a[at]), float(b[at]), float(c[at]))
     return result
 

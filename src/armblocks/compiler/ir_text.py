@@ -137,25 +137,25 @@ class Body:
         real = "f64" if self.lanes == 1 else f"v{self.lanes}f64"
         to_word = f"llvm.fptosi.sat.{kind}.{real}"
         self.module.declare(self.word, to_word, self.real)
-        found = self.let(f"call {self.word} @{to_word}({self.real} {a})")
+        index = self.let(f"call {self.word} @{to_word}({self.real} {a})")
         for name, bound in (("smax", 0), ("smin", size - 1)):
             symbol = f"llvm.{name}.{kind}"
             self.module.declare(self.word, symbol, self.word, self.word)
-            found = self.let(
-                f"call {self.word} @{symbol}({self.word} {found}, {self.word} {self.integer(bound)})"
+            index = self.let(
+                f"call {self.word} @{symbol}({self.word} {index}, {self.word} {self.integer(bound)})"
             )
-        return found
+        return index
 
-    def gather(self, addresses: Callable[[str, int], str], places: str) -> str:
+    def gather(self, addresses: Callable[[str, int], str], indices: str) -> str:
         """One double for each lane, from the address that ``addresses`` emits for its integer and lane."""
         if self.lanes == 1:
-            return self.let(f"load double, ptr {addresses(places, 0)}, align 8")
-        found = "poison"
+            return self.let(f"load double, ptr {addresses(indices, 0)}, align 8")
+        vector = "poison"
         for lane in range(self.lanes):
-            place = self.let(f"extractelement {self.word} {places}, i64 {lane}")
-            value = self.let(f"load double, ptr {addresses(place, lane)}, align 8")
-            found = self.let(f"insertelement {self.real} {found}, double {value}, i64 {lane}")
-        return found
+            index = self.let(f"extractelement {self.word} {indices}, i64 {lane}")
+            value = self.let(f"load double, ptr {addresses(index, lane)}, align 8")
+            vector = self.let(f"insertelement {self.real} {vector}, double {value}, i64 {lane}")
+        return vector
 
     def absolute(self, a: str) -> str:
         """``|a|``."""

@@ -102,7 +102,7 @@ class Kernel:
                 address=code.address(ENTRY),
                 table=code.address(TABLE),
                 fallback=fallback,
-                kept=(self, code),
+                code=(self, code),
                 maker=maker,
             )
 
@@ -148,7 +148,7 @@ class Kernel:
             if workers == 1:
                 batch(0, samples, samples, *addresses)
             else:
-                evaluate_in_threads(shares, samples, addresses, workers, kept=self)
+                evaluate_in_threads(shares, samples, addresses, workers, code=self)
         for source, result in zip(written, results):
             if source is not result:
                 result[...] = source

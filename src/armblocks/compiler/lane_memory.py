@@ -37,11 +37,11 @@ class Line:
         lane."""
 
         def address(entry: str, lane: int) -> str:
-            place = body.let(f"mul nsw i64 {entry}, {self.step}")
+            offset = body.let(f"mul nsw i64 {entry}, {self.step}")
             if lane > 0 and self.apart != "0":
                 across = body.let(f"mul nsw i64 {self.apart}, {lane}")
-                place = body.let(f"add nsw i64 {place}, {across}")
-            return body.let(f"getelementptr inbounds double, ptr {self.address}, i64 {place}")
+                offset = body.let(f"add nsw i64 {offset}, {across}")
+            return body.let(f"getelementptr inbounds double, ptr {self.address}, i64 {offset}")
 
         return body.gather(address, behind)
 
@@ -83,8 +83,8 @@ def load_rows(body: Body, pointer: str, size: int, first: int) -> list[str]:
         excess = max(0, begin + lanes - lanes * size)
         value = _load(body, pointer, begin - excess)
         if excess:  # read the last full register of the block, then shift
-            places = [lane + excess if lane + excess < lanes else None for lane in range(lanes)]
-            value = shuffle(body, value, "poison", places)
+            lane_indices = [lane + excess if lane + excess < lanes else None for lane in range(lanes)]
+            value = shuffle(body, value, "poison", lane_indices)
         rows.append(value)
     return transpose(body, rows)
 
@@ -132,13 +132,13 @@ def transpose(body: Body, rows: Sequence[str]) -> list[str]:
     return values
 
 
-def shuffle(body: Body, a: str, b: str, places: Sequence[int | None]) -> str:
-    """A vector of selected lanes: ``places`` are indices into ``a`` followed by ``b``; None: any value."""
+def shuffle(body: Body, a: str, b: str, indices: Sequence[int | None]) -> str:
+    """A vector of selected lanes: ``indices`` are positions into ``a`` followed by ``b``; None: any value."""
     if a == "poison" and b == "poison":
         return "poison"
-    mask = ", ".join("i32 poison" if place is None else f"i32 {place}" for place in places)
+    mask = ", ".join("i32 poison" if index is None else f"i32 {index}" for index in indices)
     vector = f"<{body.lanes} x double>"
-    return body.let(f"shufflevector {vector} {a}, {vector} {b}, <{len(places)} x i32> <{mask}>")
+    return body.let(f"shufflevector {vector} {a}, {vector} {b}, <{len(indices)} x i32> <{mask}>")
 
 
 def _load(body: Body, pointer: str, offset: int) -> str:

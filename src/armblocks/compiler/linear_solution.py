@@ -77,7 +77,7 @@ def _blocks(tape: Tape, operands: Sequence[int]) -> Iterator[tuple[int, int]]:
     start = 0
     for k in range(1, len(operands) + 1):
         follows = k < len(operands) and operands[k] == operands[k - 1] + 1 < tape.first_constant
-        if follows and tape.input_place(operands[k])[1] > 0:
+        if follows and tape.input_position(operands[k])[1] > 0:
             continue
         yield start, k - start
         start = k
@@ -122,9 +122,9 @@ class _Solver:
         for i in r.range(0, self.n):
             largest = r.variable(Lanes.constant(r, 0.0))
             for j in r.range(0, self.n):
-                place = self.matrix.place(i, j)
-                value = self.matrix.numbers[place]
-                self.factors.numbers[place] = value
+                index = self.matrix.index(i, j)
+                value = self.matrix.numbers[index]
+                self.factors.numbers[index] = value
                 size, known = abs(value), largest.value
                 largest.value = select(size > known, size, known)
             self.weights[i] = 1.0 / largest.value
@@ -137,26 +137,26 @@ class _Solver:
             with r.when(larger.any):
                 for matrix in (self.factors, self.matrix):
                     for j in r.range(0, self.n):
-                        exchange(larger, matrix.numbers, matrix.place(i, j), matrix.place(k, j))
+                        exchange(larger, matrix.numbers, matrix.index(i, j), matrix.index(k, j))
                 for column in (self.weights, self.right):
                     exchange(larger, column, i, k)
 
     def weighted(self, row: Integer, column: Integer) -> Lanes:
         """Magnitude of an entry relative to the largest entry of its row."""
-        return abs(self.factors.numbers[self.factors.place(row, column)]) * self.weights[row]
+        return abs(self.factors.numbers[self.factors.index(row, column)]) * self.weights[row]
 
     def eliminate(self, r: Routine, k: Integer) -> None:
         """Eliminate column ``k`` from the rows below row ``k``."""
-        factors, place = self.factors.numbers, self.factors.place
+        factors, index = self.factors.numbers, self.factors.index
         for i in r.range(k + 1, self.n):
-            factor = factors[place(i, k)] / factors[place(k, k)]
-            factors[place(i, k)] = factor
+            factor = factors[index(i, k)] / factors[index(k, k)]
+            factors[index(i, k)] = factor
             self.factors.subtract_from_row(r, i, factor, k)
 
     def substitute(self, r: Routine) -> None:
         """Replace the right side in ``work`` by the solution."""
         factors = self.factors
-        factors.substitute(r, self.work, lambda value, i: value / factors.numbers[factors.place(i, i)])
+        factors.substitute(r, self.work, lambda value, i: value / factors.numbers[factors.index(i, i)])
 
 
 def exchange(where: Mask, array: NumberArray[Lanes], one: Integer, other: Integer) -> None:

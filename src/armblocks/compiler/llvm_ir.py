@@ -46,8 +46,8 @@ def emit_function(module: Module, tape: Tape, name: str, *, linkage: str = "inte
 
     def inputs_of(body: Body) -> Inputs:
         def address(register: int) -> str:
-            slot, place = tape.input_place(register)
-            return body.let(f"getelementptr inbounds double, ptr %i{slot}, i64 {place}")
+            slot, index = tape.input_position(register)
+            return body.let(f"getelementptr inbounds double, ptr %i{slot}, i64 {index}")
 
         def load(register: int) -> str:
             return body.let(f"load double, ptr {address(register)}, align 8")
@@ -62,13 +62,13 @@ def emit_function(module: Module, tape: Tape, name: str, *, linkage: str = "inte
         outputs: dict[int, list[str]] = {}
         for slot, members in enumerate(tape.outputs):
             copied = _copy_constants(body, tape, members, slot, f"{name}.constants{slot}")
-            for place, register in enumerate(members):
+            for index, register in enumerate(members):
                 if not (copied and tape.first_constant <= register < tape.first_operation):
-                    outputs.setdefault(register, []).append(f"ptr %o{slot}, i64 {place}")
+                    outputs.setdefault(register, []).append(f"ptr %o{slot}, i64 {index}")
 
         def store(body: Body, registers: Registers, register: int) -> None:
-            for place in outputs[register]:
-                address = body.let(f"getelementptr inbounds double, {place}")
+            for index in outputs[register]:
+                address = body.let(f"getelementptr inbounds double, {index}")
                 body.do(f"store double {registers.number(register)}, ptr {address}, align 8")
 
         if is_long(tape):

@@ -100,35 +100,35 @@ def _rows(tape: Tape, chain: Sequence[int]) -> Iterator[list[_Row]]:
 
     Each part is given as one row, or as two alternatives if the factors of both sides are contiguous.
     """
-    place = 0
-    while place < len(chain):
-        runs = [_run(tape, chain, place, side) for side in (0, 1)]
+    position = 0
+    while position < len(chain):
+        runs = [_run(tape, chain, position, side) for side in (0, 1)]
         length = max(map(len, runs))
         if length >= SHORTEST_ROW:
-            opcode, operands = tape.operations[chain[place]]
+            opcode, operands = tape.operations[chain[position]]
             yield [
                 _Row(
                     first=run[0][0],
                     vector=tuple(x for _, x in run),
                     start=operands[2] if opcode is Opcode.FMA else None,
-                    members=tuple(chain[place : place + length]),
+                    members=tuple(chain[position : position + length]),
                 )
                 for run in runs
                 if len(run) == length
             ]
-        place += max(1, length)
+        position += max(1, length)
 
 
-def _run(tape: Tape, chain: Sequence[int], place: int, side: int) -> list[tuple[int, int]]:
+def _run(tape: Tape, chain: Sequence[int], position: int, side: int) -> list[tuple[int, int]]:
     """Pairs of a matrix entry and its factor, starting with the entry on one side of the operation at
-    ``place``."""
-    entry = tape.operations[chain[place]].operands[side]
+    ``position``."""
+    entry = tape.operations[chain[position]].operands[side]
     if entry >= tape.first_constant:
         return []
-    slot = tape.input_place(entry)[0]
+    slot = tape.input_position(entry)[0]
     end = tape.input_starts[slot + 1]
     run: list[tuple[int, int]] = []
-    for k in chain[place:]:
+    for k in chain[position:]:
         a, b = tape.operations[k].operands[:2]
         if entry == end or entry not in (a, b):
             break
@@ -142,14 +142,14 @@ def _matrices(tape: Tape, rows: Sequence[_Row]) -> Iterator[list[_Row]]:
     by_vector: dict[tuple[int, ...], list[_Row]] = {}
     for row in rows:
         by_vector.setdefault(row.vector, []).append(row)
-    for vector, found in by_vector.items():
+    for vector, rows_of_vector in by_vector.items():
         matrix: list[_Row] = []
-        for row in sorted(found, key=lambda row: row.first):
+        for row in sorted(rows_of_vector, key=lambda row: row.first):
             together = [*matrix, row]
             ready = tape.first_operation + min(row.last for row in together)
             fits = not matrix or (
                 row.first == matrix[-1].first + len(vector)
-                and tape.input_place(row.first)[0] == tape.input_place(matrix[0].first)[0]
+                and tape.input_position(row.first)[0] == tape.input_position(matrix[0].first)[0]
                 and len(matrix) < MOST_ROWS
                 and all(row.start is None or row.start < ready for row in together)
             )
@@ -172,12 +172,12 @@ def _rewritten(tape: Tape, products: Sequence[Sequence[_Row]]) -> Tape:
         return known[text]
 
     heads: dict[int, tuple[Sequence[_Row], list[int]]] = {}
-    gone: set[int] = set()
+    removed: set[int] = set()
     for rows in products:
         sizes = [constant(float(len(rows))), constant(float(len(rows[0].vector)))]
         heads[min(row.last for row in rows)] = rows, sizes
-        gone.update(member for row in rows for member in row.members)
-    places = [constant(float(k)) for k in range(max(len(rows) for rows in products))]
+        removed.update(member for row in rows for member in row.members)
+    indices = [constant(float(k)) for k in range(max(len(rows) for rows in products))]
     none = constant(-0.0)  # a b + -0 has the bits of a b
     register = list(range(tape.first_operation)) + [-1] * len(tape.operations)
     operations: list[Operation] = []
@@ -189,10 +189,10 @@ def _rewritten(tape: Tape, products: Sequence[Sequence[_Row]]) -> Tape:
             vector = [register[x] for x in rows[0].vector]
             product = first + len(operations)
             operations.append(Operation(Opcode.PRODUCT, (rows[0].first, *sizes, *vector, *starts)))
-            for place, row in enumerate(rows):
+            for index, row in enumerate(rows):
                 register[tape.first_operation + row.last] = first + len(operations)
-                operations.append(Operation(Opcode.MEMBER, (product, places[place])))
-        if k not in gone:
+                operations.append(Operation(Opcode.MEMBER, (product, indices[index])))
+        if k not in removed:
             register[tape.first_operation + k] = first + len(operations)
             operations.append(Operation(opcode, tuple(register[operand] for operand in operands)))
     outputs = tuple(tuple(register[member] for member in slot) for slot in tape.outputs)
@@ -279,6 +279,6 @@ def _add_product(
         row.value = start + count
 
     for count in (ROWS_AT_ONCE, 1):
-        with r.loop() as turn:
-            turn.leave_when(row.value + count > m)
+        with r.loop() as iteration:
+            iteration.leave_when(row.value + count > m)
             add_rows(count)

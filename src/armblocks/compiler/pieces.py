@@ -37,10 +37,10 @@ class Piece:
 
 @dataclass(frozen=True, kw_only=True)
 class Cut:
-    """A tape in pieces. ``places`` maps registers that later pieces read to their positions in memory."""
+    """A tape in pieces. ``slots`` maps registers that later pieces read to their slots in memory."""
 
     pieces: tuple[Piece, ...]
-    places: dict[int, int]
+    slots: dict[int, int]
     size: int
 
 
@@ -64,11 +64,11 @@ def cut(tape: Tape, stores: Stores) -> Cut:
         ready.setdefault(max(registers, default=0), []).append(number)
     pieces: list[Piece] = []
     begin, weight = 0, 0
-    waiting: list[int] = []
+    pending: list[int] = []
     read: set[int] = set()
     for k, (opcode, operands) in enumerate(tape.operations):
         done = ready.pop(first + k, [])
-        waiting += done
+        pending += done
         single = () if opcode in VECTORS else operands
         new = {register for register in single if register < tape.first_constant} - read
         read |= new
@@ -77,47 +77,47 @@ def cut(tape: Tape, stores: Stores) -> Cut:
         following = tape.operations[k + 1].opcode if k + 1 < len(tape.operations) else None
         # The members of a vector are in the piece that computes it.
         if weight >= LENGTH and following is not Opcode.MEMBER:
-            pieces.append(Piece(first=begin, last=k + 1, stores=tuple(waiting)))
-            begin, weight, waiting = k + 1, 0, []
+            pieces.append(Piece(first=begin, last=k + 1, stores=tuple(pending)))
+            begin, weight, pending = k + 1, 0, []
             read.clear()
-    waiting += [number for numbers in ready.values() for number in numbers]  # only inputs and constants
-    end, most = len(tape.operations), LENGTH // ACCESS_WEIGHT
-    for start in range(0, max(1, len(waiting)), most):
-        pieces.append(Piece(first=begin, last=end, stores=tuple(waiting[start : start + most])))
+    pending += [number for numbers in ready.values() for number in numbers]  # only inputs and constants
+    end, limit = len(tape.operations), LENGTH // ACCESS_WEIGHT
+    for start in range(0, max(1, len(pending)), limit):
+        pieces.append(Piece(first=begin, last=end, stores=tuple(pending[start : start + limit])))
         begin = end
-    return _with_places(tape, stores, pieces)
+    return _with_slots(tape, stores, pieces)
 
 
-def _with_places(tape: Tape, stores: Stores, pieces: Sequence[Piece]) -> Cut:
+def _with_slots(tape: Tape, stores: Stores, pieces: Sequence[Piece]) -> Cut:
     """Assign memory to each register that crosses a boundary, reusable after the last piece that reads it."""
     first = tape.first_operation
-    made: dict[int, int] = {}
+    computed_in: dict[int, int] = {}
     last_read: dict[int, int] = {}
     for number, piece in enumerate(pieces):
         for k in range(piece.first, piece.last):
-            made[first + k] = number
+            computed_in[first + k] = number
         read = [r for k in range(piece.first, piece.last) for r in tape.operations[k].operands]
         read += [r for store in piece.stores for r in stores[store]]
         for register in read:
             if register >= first:
                 last_read[register] = number
     ends: dict[int, list[int]] = {}
-    places: dict[int, int] = {}
+    slots: dict[int, int] = {}
     free: list[int] = []
     size = 0
-    crossing = sorted(register for register, piece in last_read.items() if piece > made[register])
+    crossing = sorted(register for register, piece in last_read.items() if piece > computed_in[register])
     starts: dict[int, list[int]] = {}
     for register in crossing:
-        starts.setdefault(made[register], []).append(register)
+        starts.setdefault(computed_in[register], []).append(register)
     for number in range(len(pieces)):
         for register in starts.get(number, []):
             if not free:
                 free.append(size)
                 size += 1
-            places[register] = free.pop()
-            ends.setdefault(last_read[register], []).append(places[register])
+            slots[register] = free.pop()
+            ends.setdefault(last_read[register], []).append(slots[register])
         free += ends.pop(number, [])
-    return Cut(pieces=tuple(pieces), places=places, size=size)
+    return Cut(pieces=tuple(pieces), slots=slots, size=size)
 
 
 def emit_pieces(
@@ -137,15 +137,15 @@ def emit_pieces(
     there are no such lanes.
     """
     module, lanes = caller.module, caller.lanes
-    done = cut(tape, stores)
-    memory = WorkSpace(caller, done.size)
+    tape_cut = cut(tape, stores)
+    memory = WorkSpace(caller, tape_cut.size)
     declared = ", ".join([f"{kind} {argument}" for kind, argument in arguments] + ["ptr noalias %memory"])
     passed = [f"{kind.split()[0]} {argument}" for kind, argument in arguments] + [f"ptr {memory.address}"]
     bits = f"i{lanes}"
     undecided: str | None = None
-    for number, piece in enumerate(done.pieces):
+    for number, piece in enumerate(tape_cut.pieces):
         body = Body(module, lanes)
-        _emit_piece(body, tape, done, piece, inputs_of(body), storing)
+        _emit_piece(body, tape, tape_cut, piece, inputs_of(body), storing)
         symbol, result = f"{name}.{number}", "void" if body.undecided is None else bits
         call = f"call {result} @{symbol}({', '.join(passed)})"
         if body.undecided is None:
@@ -164,14 +164,14 @@ def emit_pieces(
 def _emit_piece(
     body: Body,
     tape: Tape,
-    done: Cut,
+    tape_cut: Cut,
     piece: Piece,
     inputs: Inputs,
     storing: Callable[[Body, Registers, int], None],
 ) -> None:
     def address(register: int) -> str:
-        place = done.places[register] * body.lanes
-        return body.let(f"getelementptr inbounds double, ptr %memory, i64 {place}")
+        offset = tape_cut.slots[register] * body.lanes
+        return body.let(f"getelementptr inbounds double, ptr %memory, i64 {offset}")
 
     def load(register: int) -> str:
         if register < tape.first_operation:
@@ -182,6 +182,6 @@ def _emit_piece(
     for store in piece.stores:
         storing(body, registers, store)
     for register in range(tape.first_operation + piece.first, tape.first_operation + piece.last):
-        if register in done.places:
+        if register in tape_cut.slots:
             value = registers.number(register)
             body.do(f"store {body.real} {value}, ptr {address(register)}, align {8 * body.lanes}")

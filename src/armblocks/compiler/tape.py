@@ -85,11 +85,11 @@ class Tape:
     @cached_property
     def sine_cosine_pairs(self) -> dict[int, tuple[int, int]]:
         """Registers of sines and cosines of the same argument: both come from one reduction."""
-        found: dict[int, dict[Opcode, int]] = {}
+        by_argument: dict[int, dict[Opcode, int]] = {}
         for k, (opcode, operands) in enumerate(self.operations):
             if opcode in (Opcode.SIN, Opcode.COS):
-                found.setdefault(operands[0], {})[opcode] = self.first_operation + k
-        pairs = [(pair[Opcode.SIN], pair[Opcode.COS]) for pair in found.values() if len(pair) == 2]
+                by_argument.setdefault(operands[0], {})[opcode] = self.first_operation + k
+        pairs = [(pair[Opcode.SIN], pair[Opcode.COS]) for pair in by_argument.values() if len(pair) == 2]
         return {register: pair for pair in pairs for register in pair}
 
     @cached_property
@@ -97,8 +97,8 @@ class Tape:
         """First register of each input slot, and at the end the first register after the inputs."""
         return (0, *(int(end) for end in np.cumsum(self.input_sizes)))
 
-    def input_place(self, register: int) -> tuple[int, int]:
-        """The slot of an input register, and its place there."""
+    def input_position(self, register: int) -> tuple[int, int]:
+        """The slot of an input register, and its index there."""
         slot = bisect_right(self.input_starts, register) - 1
         return slot, register - self.input_starts[slot]
 
@@ -132,12 +132,12 @@ class Tape:
     @cached_property
     def count(self) -> OperationCount:
         """The work of one evaluation."""
-        tally: dict[Opcode, int] = {}
+        counts: dict[Opcode, int] = {}
         for operation in self.operations:
-            tally[operation.opcode] = tally.get(operation.opcode, 0) + 1
+            counts[operation.opcode] = counts.get(operation.opcode, 0) + 1
 
         def total(*opcodes: Opcode) -> int:
-            return sum(tally.get(opcode, 0) for opcode in opcodes)
+            return sum(counts.get(opcode, 0) for opcode in opcodes)
 
         named = {
             "multiplies": total(Opcode.MULTIPLY),
@@ -148,7 +148,7 @@ class Tape:
             "comparisons": total(*COMPARISONS),
         }
         functions = tuple(
-            (opcode.name.lower(), tally[opcode]) for opcode in sorted(ELEMENTARY) if opcode in tally
+            (opcode.name.lower(), counts[opcode]) for opcode in sorted(ELEMENTARY) if opcode in counts
         )
         counted = total(Opcode.PRODUCT) + sum(count for _, count in functions)
         rest = len(self.operations) + self._products_in_matrices - sum(named.values()) - counted
@@ -215,13 +215,13 @@ class Tape:
 
 def _decode(code: list[int]) -> tuple[Operation, ...]:
     operations: list[Operation] = []
-    place = 0
-    while place < len(code):
-        opcode = Opcode(code[place])
-        first = place + (1 if opcode.arity else 2)
-        end = first + (opcode.arity or code[place + 1])
+    position = 0
+    while position < len(code):
+        opcode = Opcode(code[position])
+        first = position + (1 if opcode.arity else 2)
+        end = first + (opcode.arity or code[position + 1])
         if end > len(code):
             raise ValueError("cut short")
         operations.append(Operation(opcode, tuple(code[first:end])))
-        place = end
+        position = end
     return tuple(operations)

@@ -42,9 +42,9 @@ class TapeBuilder:
             Opcode.ABSOLUTE: self._simplify_absolute,
         }
 
-    def input(self, slot: int, place: int) -> int:
-        """The scalar at ``place`` of the flat input ``slot``."""
-        return self._starts[slot] + place
+    def input(self, slot: int, index: int) -> int:
+        """The scalar at ``index`` of the flat input ``slot``."""
+        return self._starts[slot] + index
 
     def constant(self, value: float) -> int:
         """A number; equal bits give the same handle."""
@@ -169,9 +169,9 @@ class TapeBuilder:
         ``rounded``: products that are not fused with a sum.
         """
         nodes = self._fuse(outputs, frozenset(rounded))
-        needed = _reachable(nodes, [handle for slot in outputs for handle in slot])
-        constants = [handle for handle in needed if isinstance(nodes[handle], float)]
-        computed = [handle for handle in needed if isinstance(nodes[handle], tuple)]
+        reachable = _reachable(nodes, [handle for slot in outputs for handle in slot])
+        constants = [handle for handle in reachable if isinstance(nodes[handle], float)]
+        computed = [handle for handle in reachable if isinstance(nodes[handle], tuple)]
         register = {handle: handle for handle in range(self._starts[-1])}
         for handle in (*constants, *computed):
             register[handle] = len(register)
@@ -192,11 +192,11 @@ class TapeBuilder:
         """Fuse each product that is used once with the sum that uses it, except products that must be
         rounded."""
         nodes = list(self._nodes)
-        wanted = [handle for slot in outputs for handle in slot]
+        results = [handle for slot in outputs for handle in slot]
         uses = [0] * len(nodes)
-        for handle in wanted:
+        for handle in results:
             uses[handle] += 1
-        for handle in _reachable(nodes, wanted):
+        for handle in _reachable(nodes, results):
             node = nodes[handle]
             for operand in node[1] if isinstance(node, tuple) else ():
                 uses[operand] += 1
@@ -224,10 +224,10 @@ class TapeBuilder:
         return nodes
 
 
-def _reachable(nodes: Sequence[_Node | float | None], wanted: Sequence[int]) -> list[int]:
-    """Handles on which ``wanted`` depends, in order, without the inputs."""
+def _reachable(nodes: Sequence[_Node | float | None], results: Sequence[int]) -> list[int]:
+    """Handles on which ``results`` depend, in order, without the inputs."""
     used = bytearray(len(nodes))
-    for handle in wanted:
+    for handle in results:
         used[handle] = 1
     for handle in range(len(nodes) - 1, -1, -1):
         node = nodes[handle]

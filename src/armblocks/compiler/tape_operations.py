@@ -112,8 +112,8 @@ def emit_operations(
             members = emit_matrix_product(body, tape, operands, registers.number, inputs.line)
             registers.vectors[target] = members
         elif opcode is Opcode.MEMBER:
-            vector, place = operands
-            member = int(tape.constants[place - tape.first_constant])
+            vector, member_index = operands
+            member = int(tape.constants[member_index - tape.first_constant])
             registers.set_number(target, registers.vectors[vector][member])
         elif target in partners:
             if not registers.has_number(target):

@@ -63,13 +63,13 @@ def host_target() -> Target:
     )
 
 
-def target_features(triple: str, found: str) -> str:
-    """LLVM's list of features for a processor that has those ``found`` (``"+avx2,-sve"``).
+def target_features(triple: str, features: str) -> str:
+    """LLVM's list of features for a processor with ``features`` (``"+avx2,-sve"``).
 
     On some x86-64 processors LLVM uses only half of a 512-bit register unless ``prefer-256-bit`` is switched
     off. Other architectures do not have this feature.
     """
-    return ",".join(part for part in (found, "-prefer-256-bit" if _is_x86_64(triple) else "") if part)
+    return ",".join(part for part in (features, "-prefer-256-bit" if _is_x86_64(triple) else "") if part)
 
 
 def _is_x86_64(triple: str) -> bool:

@@ -37,24 +37,24 @@ class PivotedElimination:
     def _column(self, r: Routine, k: Integer) -> None:
         """Exchange row ``k`` with the row that has the largest entry of column ``k``; eliminate the rows
         below."""
-        A, place = self.matrix, self.full.place
+        A, index = self.matrix, self.full.index
         below = k + 1
         largest = r.integer(k)
         for i in r.range(below, self.size):
             known = largest.value
-            larger = abs(A[place(i, k)]) > abs(A[place(known, k)])
+            larger = abs(A[index(i, k)]) > abs(A[index(known, k)])
             largest.value = select(larger, i, known)
         row = largest.value
         self.swaps[k] = row
         for j in r.range(0, self.size):
-            one, other = place(k, j), place(row, j)
+            one, other = index(k, j), index(row, j)
             a, b = A[one], A[other]
             A[one] = b
             A[other] = a
-        inverse = 1.0 / A[place(k, k)]
+        inverse = 1.0 / A[index(k, k)]
         self.pivots[k] = inverse
         for i in r.range(below, self.size):
-            own = place(i, k)
+            own = index(i, k)
             factor = A[own] * inverse
             A[own] = factor
             with r.when(factor != 0.0):

@@ -19,7 +19,7 @@ LONGEST = 4000
 """Maximum number of characters of a formula; longer ones should be diagrams."""
 
 _SIDES: Mapping[str, float] = {">": -1e-300, "<=": -1e-300, ">=": 1e-300, "<": 1e-300}
-"""An offset below any signal resolution: it assigns the border itself to one side."""
+"""An offset below any signal resolution: it assigns the boundary itself to one side."""
 
 
 class Formula:
@@ -71,7 +71,7 @@ class Formula:
         """
         return self._value(self._tree, names)
 
-    def borders(self, names: Mapping[str, SX]) -> list[SX]:
+    def switching_functions(self, names: Mapping[str, SX]) -> list[SX]:
         """Quantities whose zeros are the changes of comparisons in the formula: left minus right of each.
 
         At equality the offset gives the value of the comparison. For a formula without comparisons the result

@@ -24,7 +24,7 @@ class FullMatrix(Generic[NumberT]):
     size: int
     numbers: NumberArray[NumberT]
 
-    def place(self, row: Integer, column: Integer) -> Integer:
+    def index(self, row: Integer, column: Integer) -> Integer:
         """Index of an entry."""
         return row * self.size + column
 
@@ -33,8 +33,8 @@ class FullMatrix(Generic[NumberT]):
         A = self.numbers
         minus = -factor
         for j in r.range(other + 1, self.size):
-            target = self.place(row, j)
-            A[target] = fma(minus, A[self.place(other, j)], A[target])
+            target = self.index(row, j)
+            A[target] = fma(minus, A[self.index(other, j)], A[target])
 
     def less_products(
         self,
@@ -49,13 +49,13 @@ class FullMatrix(Generic[NumberT]):
         rest = r.variable(value)
         for j in r.range(start, stop):
             minus = -y[j]
-            rest.value = fma(self.numbers[self.place(row, j)], minus, rest.value)
+            rest.value = fma(self.numbers[self.index(row, j)], minus, rest.value)
         return rest.value
 
     def substitute(
         self, r: Routine, y: NumberArray[NumberT], by_pivot: Callable[[NumberT, Integer], NumberT]
     ) -> None:
-        """Solve ``L U x = y`` in the place of ``y``.
+        """Solve ``L U x = y`` in place: the solution replaces ``y``.
 
         The matrix holds ``L`` below its diagonal, where ``L`` has ones, and ``U`` from the diagonal on;
         ``by_pivot(value, row)`` is the value divided by the row's pivot.

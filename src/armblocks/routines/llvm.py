@@ -286,18 +286,18 @@ class _FunctionText:
         if when.rarely:
             self._declare("i1", "llvm.expect.i1", "i1", "i1")
             condition = self._name(f"call i1 @llvm.expect.i1(i1 {condition}, i1 false)")
-        places = [self._only_jump(when.yes), self._only_jump(when.no)]
+        jumps = [self._only_jump(when.yes), self._only_jump(when.no)]
         leads_on = isinstance(following, Jump)
         after = self._label(following.mark) if isinstance(following, Jump) else self._fresh("after")
         parts: list[tuple[str, list[Statement]]] = []
         for k, (name, part) in enumerate((("when", when.yes), ("otherwise", when.no))):
             if not part:
-                places[k] = after
-            elif not places[k]:
-                places[k] = self._fresh(name)
-                parts.append((places[k], part))
-        self._end(f"br i1 {condition}, label %{places[0]}, label %{places[1]}")
-        joined = after in places
+                jumps[k] = after
+            elif not jumps[k]:
+                jumps[k] = self._fresh(name)
+                parts.append((jumps[k], part))
+        self._end(f"br i1 {condition}, label %{jumps[0]}, label %{jumps[1]}")
+        joined = after in jumps
         for label, part in parts:
             self._place(label)
             self._part(part)
@@ -324,8 +324,8 @@ class _FunctionText:
                 atomic, order = (" atomic", " acquire, align 8") if acquiring else ("", "")
                 self._new(result, f"load{atomic} {kind}, ptr {self._operand(address)}{order}")
             case FetchAdd(result, address, value):
-                place = self._operand(address)
-                self._new(result, f"atomicrmw add ptr {place}, i64 {self._operand(value)} acq_rel")
+                pointer = self._operand(address)
+                self._new(result, f"atomicrmw add ptr {pointer}, i64 {self._operand(value)} acq_rel")
             case Store(value, address):
                 self._line(f"store {self._typed(value)} {self._operand(value)}, ptr {self._operand(address)}")
             case Copy(source, target, size):
@@ -339,7 +339,9 @@ class _FunctionText:
                 raise AssertionError(statement)
 
     def _call(self, call: Call) -> None:
-        arguments = ", ".join(f"{self._typed(given)} {self._operand(given)}" for given in call.arguments)
+        arguments = ", ".join(
+            f"{self._typed(argument)} {self._operand(argument)}" for argument in call.arguments
+        )
         result = self._result([result.kind for result in call.results])
         name = f"@{call.function}" if isinstance(call.function, str) else self._operand(call.function)
         text = f"call {result} {name}({arguments})"

@@ -46,8 +46,8 @@ class Address(Value):
 
     def after(self, offset: int) -> Address:
         """The address plus an offset in bytes."""
-        place = self.writer.locate(self.operand, Constant(Kind.INTEGER, offset), Kind.BYTE)
-        return Address(self.writer, place)
+        target = self.writer.locate(self.operand, Constant(Kind.INTEGER, offset), Kind.BYTE)
+        return Address(self.writer, target)
 
     def pointer(self, offset: int) -> Address:
         """The address in a field."""
@@ -91,14 +91,14 @@ class Array(Value):
 
     def address(self, index: Integer | int) -> Operand:
         """Address of an element."""
-        place: Operand
+        index_operand: Operand
         if isinstance(index, int):
             if not self.first + index:
                 return self.operand
-            place = Constant(Kind.INTEGER, self.first + index)
+            index_operand = Constant(Kind.INTEGER, self.first + index)
         else:
-            place = integer_operand(index + self.first if self.first else index)
-        return self.writer.locate(self.operand, place, self.element)
+            index_operand = integer_operand(index + self.first if self.first else index)
+        return self.writer.locate(self.operand, index_operand, self.element)
 
     @property
     def start(self) -> Address:
@@ -113,11 +113,11 @@ class NumberArray(Array, Generic[NumberT]):
     number: ClassVar[type[Number[Any]]]
 
     def __getitem__(self, index: Integer | int) -> NumberT:
-        found = self.writer.load(self.address(index), self.element)
-        return cast("NumberT", self.number(self.writer, found))
+        value = self.writer.load(self.address(index), self.element)
+        return cast("NumberT", self.number(self.writer, value))
 
     def __setitem__(self, index: Integer | int, value: NumberT | float) -> None:
-        self.writer.store(self.number.place(value), self.address(index))
+        self.writer.store(self.number.operand_of(value), self.address(index))
 
     def after(self, index: Integer | int) -> Self:
         """The numbers from an element on."""
@@ -208,7 +208,7 @@ class NumberVariable(Variable, Generic[NumberT]):
 
     @value.setter
     def value(self, value: NumberT | float) -> None:
-        self.writer.store(self.number.place(value), self.local)
+        self.writer.store(self.number.operand_of(value), self.local)
 
 
 class RealVariable(NumberVariable[Real]):

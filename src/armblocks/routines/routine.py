@@ -129,9 +129,11 @@ class Program:
             self.parts[symbol] = function
             routine = Routine(self, function.body)
             arguments = [types[name](routine, operand) for name, operand in parameters.items()]
-            given = cast("Callable[..., Value | tuple[Value, ...] | None]", write)(routine, *arguments)
+            returned = cast("Callable[..., Value | tuple[Value, ...] | None]", write)(routine, *arguments)
             assert routine.statements is function.body, "Python's break has left a loop of the routine"
-            routine.return_(*(given if isinstance(given, tuple) else () if given is None else (given,)))
+            routine.return_(
+                *(returned if isinstance(returned, tuple) else () if returned is None else (returned,))
+            )
         return Function(symbol, write, _results(write))
 
     def integers(self, symbol: str, numbers: Sequence[int]) -> Table:
@@ -351,10 +353,10 @@ class Routine(Writer):
             bound = inspect.signature(function.write).bind(self, *args, **kwargs)
             values = tuple(bound.arguments.values())[1:]
         operands = tuple(self._argument(value) for value in values)
-        found = tuple(Temporary(kind.kind) for kind in function.results)
+        temporaries = tuple(Temporary(kind.kind) for kind in function.results)
         called = function.symbol if function.address is None else function.address
-        self.statements.append(tree.Call(found, called, operands))
-        results = tuple(kind(self, operand) for kind, operand in zip(function.results, found))
+        self.statements.append(tree.Call(temporaries, called, operands))
+        results = tuple(kind(self, operand) for kind, operand in zip(function.results, temporaries))
         return cast("R", results if len(results) > 1 else results[0] if results else None)
 
     def copy(self, source: Reals | Integers, target: Reals | Integers, count: Integer | int) -> None:
@@ -378,10 +380,10 @@ class Routine(Writer):
 
     @contextmanager
     def _inside(self, statements: list[Statement]) -> Generator[None]:
-        around = self.statements
+        enclosing = self.statements
         self.statements = statements
         yield
-        self.statements = around
+        self.statements = enclosing
 
 
 class Stages:
@@ -395,11 +397,11 @@ class Stages:
         self._routine = routine
         self._marks = {name: Mark(name) for name in names}
         self._region = tree.Region([], Mark("again"), Mark("behind"))
-        self._around: list[Statement] = []
+        self._enclosing: list[Statement] = []
 
     def __enter__(self) -> Stages:
         self._routine.statements.append(self._region)
-        self._around = self._routine.statements
+        self._enclosing = self._routine.statements
         self._routine.statements = self._region.body
         for mark in self._marks.values():
             mark.open = True
@@ -408,7 +410,7 @@ class Stages:
     def __exit__(self, *_: object) -> None:
         for mark in self._marks.values():
             mark.open = False
-        self._routine.statements = self._around
+        self._routine.statements = self._enclosing
 
     def begin(self, name: str) -> None:
         """Begin this stage."""
@@ -427,14 +429,14 @@ def _parameters(write: Callable[..., object]) -> dict[str, type[Value]]:
 
 
 def _results(write: Callable[..., object]) -> tuple[type[Value], ...]:
-    found = write.__annotations__["return"]
-    if found in (None, "None"):
+    annotation = write.__annotations__["return"]
+    if annotation in (None, "None"):
         return ()
-    if isinstance(found, str):
-        found = found.removeprefix("tuple[").removesuffix("]").split(", ")
+    if isinstance(annotation, str):
+        annotation = annotation.removeprefix("tuple[").removesuffix("]").split(", ")
     else:
-        found = get_args(found) or (found,)
-    return tuple(map(_value_type, found))
+        annotation = get_args(annotation) or (annotation,)
+    return tuple(map(_value_type, annotation))
 
 
 def _value_type(annotation: type[Value] | str) -> type[Value]:

@@ -182,7 +182,9 @@ class Number(Value, Generic[ConditionT]):
 
     def compute(self, operation: Operation, *operands: Self | float) -> Self:
         """An operation on numbers of this kind."""
-        return type(self)(self.writer, self.writer.compute(self.kind, operation, *map(self.place, operands)))
+        return type(self)(
+            self.writer, self.writer.compute(self.kind, operation, *map(self.operand_of, operands))
+        )
 
     @classmethod
     def constant(cls, writer: Writer, value: float) -> Self:
@@ -190,13 +192,13 @@ class Number(Value, Generic[ConditionT]):
         return cls(writer, Constant(cls.kind, float(value)))
 
     @classmethod
-    def place(cls, value: Self | float) -> Operand:
+    def operand_of(cls, value: Self | float) -> Operand:
         """The operand of a number; a Python number is a constant."""
         return value.operand if isinstance(value, cls) else Constant(cls.kind, float(cast("float", value)))
 
     def _compare(self, operation: Operation, other: Self | float) -> ConditionT:
-        found = self.writer.compute(self.condition.kind, operation, self.operand, self.place(other))
-        return cast("ConditionT", self.condition(self.writer, found))
+        result = self.writer.compute(self.condition.kind, operation, self.operand, self.operand_of(other))
+        return cast("ConditionT", self.condition(self.writer, result))
 
 
 NumberT = TypeVar("NumberT", bound=Number[Any])
@@ -251,11 +253,11 @@ class Integer(Value):
     def __or__(self, other: Integer | int) -> Integer:
         return self._integer(Operation.OR, self, other)
 
-    def __lshift__(self, places: Integer | int) -> Integer:
-        return self._integer(Operation.SHIFT_LEFT, self, places)
+    def __lshift__(self, bits: Integer | int) -> Integer:
+        return self._integer(Operation.SHIFT_LEFT, self, bits)
 
-    def __rshift__(self, places: Integer | int) -> Integer:
-        return self._integer(Operation.SHIFT_RIGHT, self, places)
+    def __rshift__(self, bits: Integer | int) -> Integer:
+        return self._integer(Operation.SHIFT_RIGHT, self, bits)
 
     def unsigned_quotient(self, divisor: Integer | int) -> Integer:
         """The unsigned quotient."""
@@ -298,12 +300,12 @@ class Integer(Value):
         return Real(self.writer, self.writer.compute(Kind.REAL, Operation.FROM_BITS, self.operand))
 
     def _integer(self, operation: Operation, *operands: Integer | int) -> Integer:
-        places = [integer_operand(operand) for operand in operands]
-        return Integer(self.writer, self.writer.compute(Kind.INTEGER, operation, *places))
+        integers = [integer_operand(operand) for operand in operands]
+        return Integer(self.writer, self.writer.compute(Kind.INTEGER, operation, *integers))
 
     def _compare(self, operation: Operation, other: Integer | int) -> Boolean:
-        found = self.writer.compute(Kind.BOOLEAN, operation, self.operand, integer_operand(other))
-        return Boolean(self.writer, found)
+        result = self.writer.compute(Kind.BOOLEAN, operation, self.operand, integer_operand(other))
+        return Boolean(self.writer, result)
 
 
 class Int32(Value):
@@ -319,7 +321,7 @@ class Int32(Value):
 
 def real_operand(value: Real | float) -> Operand:
     """The operand of a double; a Python number is a constant."""
-    return Real.place(value)
+    return Real.operand_of(value)
 
 
 def integer_operand(value: Integer | int) -> Operand:

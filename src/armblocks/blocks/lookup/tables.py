@@ -260,7 +260,7 @@ class LookupTableDynamic(Block):
         return self._axes(u["positions"]).resets(x, u, e)
 
     def _axes(self, positions: SX | int) -> Axes:
-        """The axis of positions that are signals. Any ascending positions suffice for counting borders."""
+        """The axis of positions that are signals. Any ascending positions suffice for counting boundaries."""
         whole = isinstance(positions, int)
         points = range(positions) if whole else (positions[k] for k in range(positions.numel()))
         return Axes({"u": axis([*points], "linear", "clip")}, self.zero_crossing)

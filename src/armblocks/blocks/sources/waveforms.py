@@ -179,10 +179,10 @@ class FromTable(Block):
             return {"y": self._read(t, p)}
         times = self._times()
         by_time = vertcat(*weights(t, times, self.method, "linear" if self.outside == "linear" else "clip"))
-        course = mtimes(p["values"].T, by_time)
+        signal = mtimes(p["values"].T, by_time)
         if self.outside == "zero":
-            course = if_else(logic_and(t >= times[0], t <= times[-1]), course, 0.0)
-        return {"y": course}
+            signal = if_else(logic_and(t >= times[0], t <= times[-1]), signal, 0.0)
+        return {"y": signal}
 
     def breakpoints(self, p: Signals) -> tuple[SX, ...]:
         if self._is_long():
@@ -204,14 +204,14 @@ class FromTable(Block):
             return vertcat(*(read_entry(values, width * k + float(column)) for column in range(width)))
 
         if self.method == "flat":
-            course = row(fmax(last_at_or_below(times, t), 0.0))
+            signal = row(fmax(last_at_or_below(times, t), 0.0))
         elif smooth:
             corners = spline_corners(t, times, None, straight=self.outside == "linear")
-            course = sum((weight * row(k) for k, weight in corners), SX(0.0))
+            signal = sum((weight * row(k) for k, weight in corners), SX(0.0))
         else:
             inside = t if self.outside == "linear" else fmin(fmax(t, first), last)
-            course = line(inside, times, interval_of(t, times), row)
-        return if_else(logic_and(t >= first, t <= last), course, 0.0) if self.outside == "zero" else course
+            signal = line(inside, times, interval_of(t, times), row)
+        return if_else(logic_and(t >= first, t <= last), signal, 0.0) if self.outside == "zero" else signal
 
     @property
     def knots(self) -> Array:

@@ -14,7 +14,7 @@ from armblocks.errors import InputError
 from armblocks.matlab.formula import Formula
 
 THRESHOLD_OFFSET = 1e-300
-"""An offset below the resolution of any signal, which assigns the border itself to one side."""
+"""An offset below the resolution of any signal, which assigns the boundary itself to one side."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,13 +68,17 @@ class If(Block):
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
         return (State("case", (), "index of the output that is 1, from 1"),)
 
-    def _borders(self, t: SX, u: Signals) -> SX:
+    def _switching_functions(self, t: SX, u: Signals) -> SX:
         names = {**u, "t": t}
-        return vertcat(*(part for text in self._texts() for part in Formula(text, "").borders(names)))
+        return vertcat(
+            *(part for text in self._texts() for part in Formula(text, "").switching_functions(names))
+        )
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         u = {name: SX.sym(name, math.prod(shape)) for name, shape in inputs.items()}
-        return (Guard("borders", (self._borders(SX.sym("t"), u).numel(),), "a comparison changes"),)
+        return (
+            Guard("borders", (self._switching_functions(SX.sym("t"), u).numel(),), "a comparison changes"),
+        )
 
     def _case(self, t: SX, u: Signals) -> SX:
         texts = self._texts()
@@ -91,7 +95,7 @@ class If(Block):
         }
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"borders": self._borders(t, u)}
+        return {"borders": self._switching_functions(t, u)}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"case": self._case(t, u)}
@@ -177,7 +181,7 @@ class SwitchCase(Block):
         }
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        # A positive border belongs to the number above it, a negative one to the number below.
+        # A positive boundary belongs to the number above it, a negative one to the number below.
         return {
             "borders": vertcat(
                 *(

@@ -69,16 +69,17 @@ def arc_tangent_of_quotient(body: Body, y: str, x: str) -> str:
     """``atan2(y, x)``: the angle of the point (x, y), by octants; zeros and infinities as in C99."""
     across, along = body.absolute(y), body.absolute(x)
     steep = body.compare("ogt", across, along)
-    over, under = body.select(steep, along, across), body.select(steep, across, along)
-    over, under = _tame(body, over, under)
+    numerator, denominator = body.select(steep, along, across), body.select(steep, across, along)
+    numerator, denominator = _safe_quotient(body, numerator, denominator)
 
-    # In the upper half of the octant, rotate by pi/4: t = (over - under) / (over + under).
-    upper = body.compare("ogt", over, body.multiply(body.number(TAN_PI_8), under))
-    difference, difference_rest = body.two_sum(over, body.negate(under))
-    total, total_rest = body.two_sum(over, under)
+    # In the upper half of the octant, rotate by pi/4: t = (numerator - denominator) / (numerator +
+    # denominator).
+    upper = body.compare("ogt", numerator, body.multiply(body.number(TAN_PI_8), denominator))
+    difference, difference_rest = body.two_sum(numerator, body.negate(denominator))
+    total, total_rest = body.two_sum(numerator, denominator)
     zero = body.number(0.0)
-    top, top_rest = body.select(upper, difference, over), body.select(upper, difference_rest, zero)
-    bottom, bottom_rest = body.select(upper, total, under), body.select(upper, total_rest, zero)
+    top, top_rest = body.select(upper, difference, numerator), body.select(upper, difference_rest, zero)
+    bottom, bottom_rest = body.select(upper, total, denominator), body.select(upper, total_rest, zero)
     t = body.divide(top, bottom)
     minus = body.negate(t)
     left = body.add(body.fma(minus, bottom, top), body.fma(minus, bottom_rest, top_rest))
@@ -103,17 +104,17 @@ def arc_tangent_of_quotient(body: Body, y: str, x: str) -> str:
     return body.select(nan, body.add(y, x), angle)
 
 
-def _tame(body: Body, over: str, under: str) -> tuple[str, str]:
-    """Scale a quotient (0 <= over <= under) so that 0/0, infinities, overflow and loss of digits cannot
-    occur."""
+def _safe_quotient(body: Body, numerator: str, denominator: str) -> tuple[str, str]:
+    """Scale a quotient (0 <= numerator <= denominator) so that 0/0, infinities, overflow and loss of digits
+    cannot occur."""
     infinity = body.number(float("inf"))
     one, zero = body.number(1.0), body.number(0.0)
-    endless = body.compare("oeq", under, infinity)
-    both = body.compare("oeq", over, infinity)
-    over = body.select(endless, body.select(both, one, zero), over)
-    void = body.compare("oeq", under, zero)
-    under = body.select(body.either(endless, void), one, under)
-    large = body.compare("ogt", under, body.number(2.0**1000))
-    small = body.compare("olt", under, body.number(2.0**-800))
+    endless = body.compare("oeq", denominator, infinity)
+    both = body.compare("oeq", numerator, infinity)
+    numerator = body.select(endless, body.select(both, one, zero), numerator)
+    void = body.compare("oeq", denominator, zero)
+    denominator = body.select(body.either(endless, void), one, denominator)
+    large = body.compare("ogt", denominator, body.number(2.0**1000))
+    small = body.compare("olt", denominator, body.number(2.0**-800))
     scale = body.select(large, body.number(2.0**-100), body.select(small, body.number(2.0**200), one))
-    return body.multiply(over, scale), body.multiply(under, scale)
+    return body.multiply(numerator, scale), body.multiply(denominator, scale)

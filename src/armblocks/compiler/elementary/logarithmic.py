@@ -33,8 +33,8 @@ def inverse_hyperbolic_sine(body: Body, x: str) -> str:
     """``asinh x = ln(|x| + sqrt(x x + 1))`` with the sign of x; ``ln 2 |x|`` where squares overflow."""
     magnitude = body.absolute(x)
     square, square_rest = body.two_product(magnitude, magnitude)
-    under, under_rest = body.two_sum(square, body.number(1.0))
-    root, root_rest = _square_root(body, under, body.add(under_rest, square_rest))
+    radicand, radicand_rest = body.two_sum(square, body.number(1.0))
+    root, root_rest = _square_root(body, radicand, body.add(radicand_rest, square_rest))
     total, rest = body.two_sum(root, magnitude)
     rest = body.add(rest, root_rest)
     huge = body.compare("ogt", magnitude, body.number(2.0**500))
@@ -51,9 +51,9 @@ def inverse_hyperbolic_sine(body: Body, x: str) -> str:
 def inverse_hyperbolic_cosine(body: Body, x: str) -> str:
     """``acosh x = ln(x + sqrt(x x - 1))``; NaN below 1."""
     square, square_rest = body.two_product(x, x)
-    under, under_rest = body.two_sum(square, body.number(-1.0))
-    under, under_rest = body.fast_two_sum(under, body.add(under_rest, square_rest))
-    root, root_rest = _square_root(body, under, under_rest)
+    radicand, radicand_rest = body.two_sum(square, body.number(-1.0))
+    radicand, radicand_rest = body.fast_two_sum(radicand, body.add(radicand_rest, square_rest))
+    root, root_rest = _square_root(body, radicand, radicand_rest)
     total, rest = body.two_sum(x, root)
     rest = body.add(rest, root_rest)
     huge = body.compare("ogt", x, body.number(2.0**500))
@@ -67,13 +67,13 @@ def inverse_hyperbolic_cosine(body: Body, x: str) -> str:
 def inverse_hyperbolic_tangent(body: Body, x: str) -> str:
     """``atanh x = ln((1 + x) / (1 - x)) / 2``; infinite at -1 and 1, NaN beyond."""
     magnitude = body.absolute(x)
-    over, over_rest = body.two_sum(body.number(1.0), magnitude)
-    under, under_rest = body.two_sum(body.number(1.0), body.negate(magnitude))
-    quotient = body.divide(over, under)
+    numerator, numerator_rest = body.two_sum(body.number(1.0), magnitude)
+    denominator, denominator_rest = body.two_sum(body.number(1.0), body.negate(magnitude))
+    quotient = body.divide(numerator, denominator)
     minus = body.negate(quotient)
-    left = body.fma(minus, under, over)
-    left = body.add(left, body.fma(minus, under_rest, over_rest))
-    rest = _finite_or_zero(body, body.divide(left, under))
+    left = body.fma(minus, denominator, numerator)
+    left = body.add(left, body.fma(minus, denominator_rest, numerator_rest))
+    rest = _finite_or_zero(body, body.divide(left, denominator))
     high, low = logarithm_of_pair(body, *body.fast_two_sum(quotient, rest))
     half = body.multiply(body.add(high, low), body.number(0.5))
     result = _ends(body, quotient, half)
@@ -108,16 +108,18 @@ def logarithm_of_pair(
         count = body.select(doubled, body.add(count, body.number(1.0)), count)
 
     # s = (m - 1) / (m + 1), its rounding error, its square
-    over = body.subtract(m, body.number(1.0))
-    under, under_rest = body.two_sum(m, body.number(1.0))
-    over_rest = body.number(0.0)
+    numerator = body.subtract(m, body.number(1.0))
+    denominator, denominator_rest = body.two_sum(m, body.number(1.0))
+    numerator_rest = body.number(0.0)
     if m_low is not None:
-        over, over_rest = body.two_sum(over, m_low)
-        under_rest = body.add(under_rest, m_low)
-    s = body.divide(over, under)
+        numerator, numerator_rest = body.two_sum(numerator, m_low)
+        denominator_rest = body.add(denominator_rest, m_low)
+    s = body.divide(numerator, denominator)
     minus = body.negate(s)
-    left = body.add(body.fma(minus, under, over), body.fma(minus, under_rest, over_rest))
-    s_low = body.divide(left, under)
+    left = body.add(
+        body.fma(minus, denominator, numerator), body.fma(minus, denominator_rest, numerator_rest)
+    )
+    s_low = body.divide(left, denominator)
     z, z_low = body.two_product(s, s)
     z_low = body.fma(body.add(s, s), s_low, z_low)
 
@@ -129,14 +131,14 @@ def logarithm_of_pair(
     curve_low = body.add(curve_low, third_low)
 
     # k ln 2 + 2 s + 2 s curve
-    twice, twice_low = body.add(s, s), body.add(s_low, s_low)
-    bend, bend_low = body.two_product(twice, curve)
-    bend_low = body.fma(twice, curve_low, body.fma(twice_low, curve, bend_low))
+    doubled_s, doubled_s_low = body.add(s, s), body.add(s_low, s_low)
+    bend, bend_low = body.two_product(doubled_s, curve)
+    bend_low = body.fma(doubled_s, curve_low, body.fma(doubled_s_low, curve, bend_low))
     shift, shift_low = body.two_product(count, body.number(LN2[0]))
     shift_low = body.fma(count, body.number(LN2[1]), shift_low)
-    total, error = body.two_sum(shift, twice)
-    total, more = body.two_sum(total, bend)
-    small = body.add(body.add(error, more), body.add(body.add(shift_low, twice_low), bend_low))
+    total, error = body.two_sum(shift, doubled_s)
+    total, bend_error = body.two_sum(total, bend)
+    small = body.add(body.add(error, bend_error), body.add(body.add(shift_low, doubled_s_low), bend_low))
     return body.fast_two_sum(total, small)
 
 

@@ -26,10 +26,12 @@ def remainder(body: Body, x: str, y: str) -> str:
     """IEEE 754 remainder: of division to the nearest integer, ties to even. NaN for y = 0 or infinite x."""
     a, b = body.absolute(x), body.absolute(y)
     rest = _modulo(body, a, body.add(b, b))  # a divisor that overflows leaves a unchanged
-    once = body.select(_exceeds_half(body, rest, b, "ogt"), body.subtract(rest, b), rest)
-    twice = body.select(_exceeds_half(body, once, b, "oge"), body.subtract(once, b), once)
+    first_step = body.select(_exceeds_half(body, rest, b, "ogt"), body.subtract(rest, b), rest)
+    second_step = body.select(
+        _exceeds_half(body, first_step, b, "oge"), body.subtract(first_step, b), first_step
+    )
     # If the first step was not taken, the second must not be: a tie goes to the even quotient 0.
-    result = body.select(_exceeds_half(body, rest, b, "ogt"), twice, rest)
+    result = body.select(_exceeds_half(body, rest, b, "ogt"), second_step, rest)
     sign = body.word_op("and", body.bits(x), body.integer(1 << 63))
     return body.from_bits(body.word_op("xor", body.bits(result), sign))
 
@@ -81,12 +83,12 @@ def long_division(r: Routine, a: Real, b: Real) -> Real:
     divisor, unit = _mantissa_and_exponent(b)
     rest = r.integer(dividend.unsigned_remainder(divisor))
     left = r.integer(exponent - unit)
-    with r.loop() as turn:
-        places = left.value
-        turn.leave_unless(places > 0)
-        step = select(places < 11, places, 11)
+    with r.loop() as iteration:
+        remaining = left.value
+        iteration.leave_unless(remaining > 0)
+        step = select(remaining < 11, remaining, 11)
         rest.value = (rest.value << step).unsigned_remainder(divisor)
-        left.value = places - step
+        left.value = remaining - step
     # rest 2**unit, exact: a multiple of the smallest number, times a power of two in two halves
     power = unit - 1
     half = power >> 1

@@ -69,13 +69,13 @@ def tangent(body: Body, x: str) -> str:
     sine, sine_rest = body.fast_two_sum(*_sine_parts(body, reduced, squared))
     cosine, cosine_rest = body.fast_two_sum(*_cosine_parts(body, reduced, squared))
     odd = _is_odd(body, reduced.quarter)
-    over, over_rest = body.select(odd, cosine, sine), body.select(odd, cosine_rest, sine_rest)
-    under, under_rest = body.select(odd, sine, cosine), body.select(odd, sine_rest, cosine_rest)
-    quotient = body.divide(over, under)
+    numerator, numerator_rest = body.select(odd, cosine, sine), body.select(odd, cosine_rest, sine_rest)
+    denominator, denominator_rest = body.select(odd, sine, cosine), body.select(odd, sine_rest, cosine_rest)
+    quotient = body.divide(numerator, denominator)
     minus = body.negate(quotient)
-    left = body.fma(minus, under, over)
-    left = body.add(left, body.fma(minus, under_rest, over_rest))
-    result = body.add(quotient, body.divide(left, under))
+    left = body.fma(minus, denominator, numerator)
+    left = body.add(left, body.fma(minus, denominator_rest, numerator_rest))
+    result = body.add(quotient, body.divide(left, denominator))
     flipped = body.word_op("shl", reduced.quarter, body.integer(63))
     return _signed(body, result, body.word_op("xor", flipped, _sign_of(body, x)))
 
@@ -143,15 +143,15 @@ def _sign_of(body: Body, x: str) -> str:
 
 def _sine_sign(body: Body, x: str, quarter: str) -> str:
     """Sine is odd, and negative in quarters 2 and 3."""
-    moved = body.word_op("shl", quarter, body.integer(62))
-    return body.word_op("and", body.word_op("xor", moved, body.bits(x)), body.integer(_SIGN_BIT))
+    shifted = body.word_op("shl", quarter, body.integer(62))
+    return body.word_op("and", body.word_op("xor", shifted, body.bits(x)), body.integer(_SIGN_BIT))
 
 
 def _cosine_sign(body: Body, quarter: str) -> str:
     """Cosine is negative in quarters 1 and 2: where the two bits differ."""
     next_one = body.word_op("add", quarter, body.integer(1))
-    moved = body.word_op("shl", next_one, body.integer(62))
-    return body.word_op("and", moved, body.integer(_SIGN_BIT))
+    shifted = body.word_op("shl", next_one, body.integer(62))
+    return body.word_op("and", shifted, body.integer(_SIGN_BIT))
 
 
 def _signed(body: Body, value: str, sign: str) -> str:
@@ -178,8 +178,8 @@ def _huge_text(module: Module) -> str:
     biased = body.word_op("lshr", bits, "52")
     # A word of zeros precedes the table, because the window may begin above the binary point.
     begin = body.word_op("sub", biased, str(1075 + 2 - 64))
-    place, shift = body.word_op("lshr", begin, "6"), body.word_op("and", begin, "63")
-    words = [_table_word(body, place, k) for k in range(4)]
+    word_index, shift = body.word_op("lshr", begin, "6"), body.word_op("and", begin, "63")
+    words = [_table_word(body, word_index, k) for k in range(4)]
     back = body.word_op("sub", "63", shift)
     window = [
         body.word_op(
@@ -213,8 +213,8 @@ def _huge_text(module: Module) -> str:
     return "\n".join([head, "entry:", *body.lines, "}"])
 
 
-def _table_word(body: Body, place: str, offset: int) -> str:
-    index = body.word_op("add", place, str(offset))
+def _table_word(body: Body, word_index: str, offset: int) -> str:
+    index = body.word_op("add", word_index, str(offset))
     address = body.let(f"getelementptr inbounds i64, ptr @armblocks_two_over_pi, i64 {index}")
     return body.let(f"load i64, ptr {address}, align 8")
 
@@ -245,5 +245,5 @@ def _sum_of_words(body: Body, upper: str, lower: str) -> tuple[str, str]:
             number = body.let(f"uitofp i64 {part} to double")
             pieces.append(body.multiply(number, body.number(scale)))
     total, error = body.fast_two_sum(pieces[0], pieces[1])
-    total, more = body.two_sum(total, pieces[2])
-    return body.fast_two_sum(total, body.add(body.add(error, more), pieces[3]))
+    total, second_error = body.two_sum(total, pieces[2])
+    return body.fast_two_sum(total, body.add(body.add(error, second_error), pieces[3]))
