@@ -91,13 +91,13 @@ class UnknownNameError(ArmblocksError):
         )
 
 
-def _legible(names: Sequence[str], wanted: str) -> str:
-    """All names if they are few, else the names most similar to the wanted one and the number of others."""
+def _legible(names: Sequence[str], unknown: str) -> str:
+    """All names if they are few, else the names most similar to the unknown one and the number of others."""
     if not names:
         return "none exist"
     if len(whole := ", ".join(names)) <= LONGEST_LIST:
         return whole
-    matcher = difflib.SequenceMatcher(b=wanted.casefold())
+    matcher = difflib.SequenceMatcher(b=unknown.casefold())
 
     def likeness(name: str) -> float:
         matcher.set_seq1(name.casefold())

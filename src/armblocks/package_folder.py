@@ -29,21 +29,21 @@ def classes_with(package: str, attribute: str) -> Iterator[tuple[str, str]]:
     """
     folder = importlib.import_module(package)
     line = re.compile(rb"^class (\w+)|^    %b(?::[^=\n]*)? = " % attribute.encode(), re.MULTILINE)
-    for path in sorted(file for place in folder.__path__ for file in Path(place).glob("*.py")):
+    for path in sorted(file for directory in folder.__path__ for file in Path(directory).glob("*.py")):
         name = b""
-        for found in line.finditer(path.read_bytes()):
-            if found[1]:
-                name = found[1]
+        for match in line.finditer(path.read_bytes()):
+            if match[1]:
+                name = match[1]
             elif name:
                 yield name.decode(), f"{package}.{path.stem}"
 
 
 def values_in(package: str, kind: type[Kind] | tuple[type[Kind], ...]) -> list[Kind]:
     """The values of a kind that the modules of a package have, each once."""
-    found: dict[int, Kind] = {}
+    values: dict[int, Kind] = {}
     for module in modules_in(package):
-        found |= {id(value): value for value in vars(module).values() if isinstance(value, kind)}
-    return list(found.values())
+        values |= {id(value): value for value in vars(module).values() if isinstance(value, kind)}
+    return list(values.values())
 
 
 def classes_in(package: str, base: type[Kind]) -> list[type[Kind]]:

@@ -37,14 +37,14 @@ def _fixed(x: float | Fraction, bits: int) -> int:
 def _rounded(value: int, bits: int, sign_of: float = 0.0) -> float:
     """``value 2**-bits`` rounded to nearest; a zero result takes the sign of ``sign_of``."""
     try:
-        found = value / (1 << bits) if bits >= 0 else float(value << -bits)
+        result = value / (1 << bits) if bits >= 0 else float(value << -bits)
     except OverflowError:
         return INFINITY if value > 0 else -INFINITY
-    return found or math.copysign(0.0, sign_of)
+    return result or math.copysign(0.0, sign_of)
 
 
-def _quotient(over: int, under: int, bits: int) -> int:
-    return (over << bits) // under
+def _quotient(numerator: int, denominator: int, bits: int) -> int:
+    return (numerator << bits) // denominator
 
 
 # Constants and series, as fixed-point numbers.
@@ -53,8 +53,8 @@ def _quotient(over: int, under: int, bits: int) -> int:
 @lru_cache(maxsize=64)
 def _pi(bits: int) -> int:
     """Machin: pi = 16 atan(1/5) - 4 atan(1/239)."""
-    more = bits + 16
-    return (16 * _arc_tangent_of_inverse(5, more) - 4 * _arc_tangent_of_inverse(239, more)) >> 16
+    wide_bits = bits + 16
+    return (16 * _arc_tangent_of_inverse(5, wide_bits) - 4 * _arc_tangent_of_inverse(239, wide_bits)) >> 16
 
 
 def _arc_tangent_of_inverse(n: int, bits: int) -> int:
@@ -70,8 +70,8 @@ def _arc_tangent_of_inverse(n: int, bits: int) -> int:
 @lru_cache(maxsize=64)
 def _ln2(bits: int) -> int:
     """ln 2 = 2 atanh(1/3)."""
-    more = bits + 16
-    return (2 * _odd_series(_quotient(1, 3, more), more, 1)) >> 16
+    wide_bits = bits + 16
+    return (2 * _odd_series(_quotient(1, 3, wide_bits), wide_bits, 1)) >> 16
 
 
 def _odd_series(x: int, bits: int, sign: int) -> int:
@@ -89,16 +89,16 @@ def _odd_series(x: int, bits: int, sign: int) -> int:
 def _exponential(x: int, bits: int) -> tuple[int, int]:
     """``exp x = m 2**k`` with ``m`` about 1: returns m and k, by halving the argument and squaring."""
     k = x // _ln2(bits)
-    halvings, more = 12, bits + 32
+    halvings, wide_bits = 12, bits + 32
     r = ((x - k * _ln2(bits)) << 32) >> halvings
-    term = total = 1 << more
+    term = total = 1 << wide_bits
     n = 1
     while term:
-        term = (term * r >> more) // n
+        term = (term * r >> wide_bits) // n
         total += term
         n += 1
     for _ in range(halvings):
-        total = (total * total) >> more
+        total = (total * total) >> wide_bits
     return total >> 32, k
 
 
@@ -209,8 +209,8 @@ def asin(x: float) -> float:
         return atan2(x, 0.0)
     bits = _spare(x)
     value = _fixed(x, bits)
-    under = math.isqrt((1 << 2 * bits) - value * value)
-    return _rounded(_arc_tangent(_quotient(value, under, bits), bits), bits, x)
+    cosine = math.isqrt((1 << 2 * bits) - value * value)
+    return _rounded(_arc_tangent(_quotient(value, cosine, bits), bits), bits, x)
 
 
 def acos(x: float) -> float:
@@ -350,8 +350,8 @@ def power(x: float, y: float) -> float:
     value = Fraction(y) * _logarithm_of(abs(x), bits)
     if abs(value) > int(_FAR) << bits:
         return sign * (INFINITY if value > 0 else 0.0)
-    found, k = _exponential(math.floor(value), bits)
-    return sign * _rounded(found, bits - k)
+    result, k = _exponential(math.floor(value), bits)
+    return sign * _rounded(result, bits - k)
 
 
 def _of_fraction(value: Fraction) -> float:

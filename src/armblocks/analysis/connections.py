@@ -21,10 +21,10 @@ def _together(first: StateSpaceModel, second: StateSpaceModel) -> float:
     return first.dt
 
 
-def _refuse_sizes(what: str, found: object, wanted: object) -> InputError:
+def _refuse_sizes(subject: str, sizes: object, allowed: object) -> InputError:
     return InputError(
-        f"{what} does not fit: {found}",
-        allowed=f"{wanted}",
+        f"{subject} does not fit: {sizes}",
+        allowed=f"{allowed}",
         fix="choose inputs and outputs with select()",
         where="linear systems",
     )

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from armblocks.equations.evaluation import EvaluatedSystem, Jacobians, Point
 
 Array = NDArray[np.float64]
-Places = NDArray[np.intp]
+Indices = NDArray[np.intp]
 Realisation = tuple[Array, Array, Array, float]
 
 HIGHEST_ORDER = 10
@@ -56,7 +56,7 @@ class DeadTime:
     ``names`` are the names of ``v``. Only delays that an equation reads are included.
     """
 
-    places: Places
+    indices: Indices
     names: tuple[str, ...]
     delays: Array
     inputs: Jacobians
@@ -64,12 +64,12 @@ class DeadTime:
     @property
     def count(self) -> int:
         """Of delayed scalars."""
-        return self.places.size
+        return self.indices.size
 
     @cached_property
     def through(self) -> Array:
         """``K``: direct feedthrough from the output of a delay to the input of another one."""
-        return self.inputs.z[:, self.places]
+        return self.inputs.z[:, self.indices]
 
 
 def dead_time(
@@ -79,26 +79,26 @@ def dead_time(
     their inputs."""
     system = evaluated.system
     assert system.delays is not None
-    places = np.array([*system.delays.values, *system.delays.derivatives], dtype=np.intp)
+    indices = np.array([*system.delays.values, *system.delays.derivatives], dtype=np.intp)
     names = [name for slot in system.discrete for name in slot.elements]
     delays = np.tile(evaluated.delay_times(point), 2)
-    read = np.any([reader.z[:, places].any(axis=0) for reader in readers], axis=0)
-    for _ in range(places.size):
-        read = read | inputs.z[np.ix_(np.flatnonzero(read), places)].any(axis=0)
-    kept: Places = np.flatnonzero(read)
+    read = np.any([reader.z[:, indices].any(axis=0) for reader in readers], axis=0)
+    for _ in range(indices.size):
+        read = read | inputs.z[np.ix_(np.flatnonzero(read), indices)].any(axis=0)
+    needed: Indices = np.flatnonzero(read)
     chosen = Jacobians(
-        t=inputs.t[kept], x=inputs.x[kept], z=inputs.z[kept], w=inputs.w[kept], p=inputs.p[kept]
+        t=inputs.t[needed], x=inputs.x[needed], z=inputs.z[needed], w=inputs.w[needed], p=inputs.p[needed]
     )
-    kept_places = places[kept]
+    needed_indices = indices[needed]
     return DeadTime(
-        places=kept_places,
-        names=tuple(names[int(k)] for k in kept_places),
-        delays=delays[kept],
+        indices=needed_indices,
+        names=tuple(names[int(k)] for k in needed_indices),
+        delays=delays[needed],
         inputs=chosen,
     )
 
 
-class Approximated:
+class PadeApproximation:
     """Derivatives by ``[x; q]`` in place of ``x``, with ``q' = P q + R d`` and ``v = S q + W d``."""
 
     def __init__(self, dead: DeadTime, order: int) -> None:
@@ -109,35 +109,39 @@ class Approximated:
         for k, delay in enumerate(dead.delays.tolist()):
             own = slice(k * order, (k + 1) * order)
             P[own, own], R[own, k : k + 1], S[k : k + 1, own], W[k, k] = pade(order, delay)
-        given = dead.inputs
+        inputs = dead.inputs
         # v = S q + W (G x + H u + K v); d follows from v.
         inside = np.linalg.inv(np.eye(dead.count) - W @ dead.through)
-        self.by_x = inside @ np.hstack([W @ given.x, S])
-        self.by_z = inside @ (W @ self._others(given.z))
-        self.by_p = inside @ (W @ given.p)
+        self.by_x = inside @ np.hstack([W @ inputs.x, S])
+        self.by_z = inside @ (W @ self._others(inputs.z))
+        self.by_p = inside @ (W @ inputs.p)
         self.names = tuple(f"{name} pade[{k}]" for name in dead.names for k in range(order))
-        went_in = self(given)
-        rate = np.hstack([np.zeros((size, given.x.shape[1])), P]) + R @ went_in.x
+        input_derivatives = self(inputs)
+        rate = np.hstack([np.zeros((size, inputs.x.shape[1])), P]) + R @ input_derivatives.x
         self.rates = Jacobians(
-            t=np.zeros((size, 1)), x=rate, z=R @ went_in.z, w=np.zeros((size, 0)), p=R @ went_in.p
+            t=np.zeros((size, 1)),
+            x=rate,
+            z=R @ input_derivatives.z,
+            w=np.zeros((size, 0)),
+            p=R @ input_derivatives.p,
         )
 
     def _others(self, by_z: Array) -> Array:
         """The derivatives by all of ``z`` except delayed values."""
         others = by_z.copy()
-        others[:, self.dead.places] = 0.0
+        others[:, self.dead.indices] = 0.0
         return others
 
     def __call__(self, j: Jacobians) -> Jacobians:
         """The derivatives with the approximations in place of delayed values."""
-        late = j.z[:, self.dead.places]
+        by_delayed = j.z[:, self.dead.indices]
         wider = np.hstack([j.x, np.zeros((j.x.shape[0], self.by_x.shape[1] - j.x.shape[1]))])
         return Jacobians(
             t=j.t,
-            x=wider + late @ self.by_x,
-            z=self._others(j.z) + late @ self.by_z,
+            x=wider + by_delayed @ self.by_x,
+            z=self._others(j.z) + by_delayed @ self.by_z,
             w=j.w,
-            p=j.p + late @ self.by_p,
+            p=j.p + by_delayed @ self.by_p,
         )
 
     def flow(self, j: Jacobians) -> Jacobians:

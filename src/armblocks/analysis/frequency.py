@@ -20,16 +20,16 @@ _CHUNK = 4_000_000
 """Maximum number of entries of one batch of linear equations."""
 
 
-def evaluate(system: StateSpaceModel, places: Complex) -> Complex:
+def evaluate(system: StateSpaceModel, points: Complex) -> Complex:
     """``C (s I - A)^-1 B + D`` (N, ny, nu) at complex numbers (N,); infinite at a pole."""
     n = system.order
-    result = np.broadcast_to(system.D, (len(places), *system.D.shape)).astype(np.complex128)
+    result = np.broadcast_to(system.D, (len(points), *system.D.shape)).astype(np.complex128)
     if not n or not system.B.size or not system.C.size:
         return result
     a, b, c = balanced(system.A, system.B, system.C)
     chunk = max(1, _CHUNK // (n * n))
-    for start in range(0, len(places), chunk):
-        piece = places[start : start + chunk]
+    for start in range(0, len(points), chunk):
+        piece = points[start : start + chunk]
         matrices = piece[:, None, None] * np.eye(n) - a
         try:
             states = np.linalg.solve(matrices, np.broadcast_to(b, (len(piece), *b.shape)))
@@ -43,7 +43,7 @@ def evaluate(system: StateSpaceModel, places: Complex) -> Complex:
     return result
 
 
-def on_the_edge(system: StateSpaceModel, frequencies: Array) -> Complex:
+def boundary_points(system: StateSpaceModel, frequencies: Array) -> Complex:
     """Points on the stability boundary: ``j w``, or ``exp(j w dt)``."""
     along = (1j * frequencies).astype(np.complex128)
     return np.exp(along * system.dt) if system.is_discrete else along
@@ -51,7 +51,7 @@ def on_the_edge(system: StateSpaceModel, frequencies: Array) -> Complex:
 
 def frequency_response(system: StateSpaceModel, frequencies: Array) -> Complex:
     """See :meth:`LinearSystem.frequency_response`."""
-    return evaluate(system, on_the_edge(system, frequencies))
+    return evaluate(system, boundary_points(system, frequencies))
 
 
 def gain_and_phase(system: StateSpaceModel, frequencies: Array) -> tuple[Array, Array]:
@@ -66,22 +66,22 @@ def gain_and_phase(system: StateSpaceModel, frequencies: Array) -> tuple[Array, 
     for row in range(phase.shape[1]):
         for column in range(phase.shape[2]):
             part = minimal(system.select([system.outputs[row]], [system.inputs[column]]))
-            _mend_phase(part, frequencies, phase[:, row, column])
+            _correct_phase(part, frequencies, phase[:, row, column])
     return np.abs(response), phase
 
 
-def _mend_phase(part: StateSpaceModel, frequencies: Array, phase: Array) -> None:
+def _correct_phase(part: StateSpaceModel, frequencies: Array, phase: Array) -> None:
     """Correct the phase, in place, at points where unwrapping is ambiguous."""
     integrators = 0
-    for roots, way in ((poles(part), -1.0), (zeros(part), 1.0)):
+    for roots, direction in ((poles(part), -1.0), (zeros(part), 1.0)):
         s = as_continuous(part, roots)
         size = max(float(np.abs(s).max(initial=0.0)), 1e-300)
-        integrators -= int(way) * sum(abs(root) <= 1e-7 * size for root in s.tolist())
+        integrators -= int(direction) * sum(abs(root) <= 1e-7 * size for root in s.tolist())
         undamped = (np.abs(s.real) <= 1e-9 * np.abs(s)) & (s.imag > 1e-7 * size)
         for frequency in s.imag[undamped].tolist():
             k = int(np.searchsorted(frequencies, float(frequency)))
-            if 0 < k < len(phase) and way * (phase[k] - phase[k - 1]) < -90.0:
-                phase[k:] += way * 360.0
+            if 0 < k < len(phase) and direction * (phase[k] - phase[k - 1]) < -90.0:
+                phase[k:] += direction * 360.0
     expected = -90.0 * integrators - 1e-6  # of +180 and -180 degrees the lower one
     phase += 360.0 * round((expected - float(phase[0])) / 360.0)
 
@@ -95,14 +95,14 @@ def as_continuous(system: StateSpaceModel, roots: Complex) -> Complex:
 
 def dcgain(system: StateSpaceModel) -> Array:
     """The steady-state response of the part between each input and each output."""
-    place = np.array([1.0 if system.is_discrete else 0.0], dtype=np.complex128)
+    steady_state = np.array([1.0 if system.is_discrete else 0.0], dtype=np.complex128)
     result = np.empty(system.D.shape)
     for row in range(system.D.shape[0]):
         for column in range(system.D.shape[1]):
             # An integrator on another path must not affect this path.
             part = minimal(system.select([system.outputs[row]], [system.inputs[column]]))
-            value = float(evaluate(part, place)[0, 0, 0].real)
-            if part.order and np.linalg.cond(place[0].real * np.eye(part.order) - part.A) > 1e14:
+            value = float(evaluate(part, steady_state)[0, 0, 0].real)
+            if part.order and np.linalg.cond(steady_state[0].real * np.eye(part.order) - part.A) > 1e14:
                 value = math.inf
             result[row, column] = value
     return result

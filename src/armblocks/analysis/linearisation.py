@@ -20,7 +20,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.analysis.dead_time import HIGHEST_ORDER, Approximated, dead_time
+from armblocks.analysis.dead_time import HIGHEST_ORDER, PadeApproximation, dead_time
 from armblocks.analysis.linear_system import LinearSystem
 from armblocks.analysis.operating_point import OperatingPoint
 from armblocks.equations import HybridSystem, Signature
@@ -64,30 +64,30 @@ def linearise(
     """
     system = evaluated.system
     unknowns = _unknowns(evaluated, point)
-    flow, seen = _jacobians(evaluated, point, unknowns, ends)
+    flow, outputs = _jacobians(evaluated, point, unknowns, ends)
     names, units = _elements(system.states)
 
     def ticked(ticking: tuple[int, ...]) -> Jacobians:
         """The derivatives of ``z`` after a tick by the values before the tick."""
         jacobians = _without(evaluated.update_jacobians(point, np.array(ticking, dtype=np.float64)), unknowns)
         _check_finite(system, _elements(system.discrete)[0], jacobians, "the discrete variable")
-        return late(jacobians) if late else jacobians
+        return approximation(jacobians) if approximation else jacobians
 
-    late = _approximated(evaluated, point, unknowns, [flow, seen], delay_order)
-    if late:
-        flow, seen = late.flow(flow), late(seen)
-        names += late.names
-        units += ("",) * len(late.names)
+    approximation = _approximated(evaluated, point, unknowns, [flow, outputs], delay_order)
+    if approximation:
+        flow, outputs = approximation.flow(flow), approximation(outputs)
+        names += approximation.names
+        units += ("",) * len(approximation.names)
     if not system.clocks:
-        matrices = (flow.x, flow.p, seen.x, seen.p)
+        matrices = (flow.x, flow.p, outputs.x, outputs.p)
         dt = 0.0
     else:
-        moved = np.flatnonzero(evaluated.sampled)
-        matrices, dt = _over_a_period(system, ticked, flow, seen, moved)
+        updated = np.flatnonzero(evaluated.sampled)
+        matrices, dt = _over_a_period(system, ticked, flow, outputs, updated)
         discrete_names, discrete_units = _elements(system.discrete)
-        names += tuple(discrete_names[k] for k in moved.tolist())
-        units += tuple(discrete_units[k] for k in moved.tolist())
-        keep: list[int] = _kept(system, matrices, moved).tolist()
+        names += tuple(discrete_names[k] for k in updated.tolist())
+        units += tuple(discrete_units[k] for k in updated.tolist())
+        keep: list[int] = _needed_states(system, matrices, updated).tolist()
         a, b, c, d = matrices
         matrices = (a[np.ix_(keep, keep)], b[keep], c[:, keep], d)
         names = tuple(names[k] for k in keep)
@@ -116,32 +116,32 @@ def exact_response(evaluated: EvaluatedSystem, point: Point, ends: Ends, frequen
         return linearise(evaluated, point, ends).frequency_response(frequencies)
     if system.clocks:
         raise InputError(
-            f"the dead time of {_late_blocks(system)} is in one diagram with the clock of "
+            f"the dead time of {_delayed_blocks(system)} is in one diagram with the clock of "
             f"{system.clocks[0].period:g} s",
             where=system.name,
             allowed="an exact response of dead time among continuous blocks only",
             fix="linearize with a delay_order, and use the frequency_response of the result",
         )
     unknowns = _unknowns(evaluated, point)
-    flow, seen = _jacobians(evaluated, point, unknowns, ends)
+    flow, outputs = _jacobians(evaluated, point, unknowns, ends)
     inputs = _without(evaluated.delay_input_jacobians(point), unknowns)
-    dead = dead_time(evaluated, point, inputs, [flow, seen])
+    dead = dead_time(evaluated, point, inputs, [flow, outputs])
     opened = LinearSystem(
         flow.x,
-        np.hstack([flow.p, flow.z[:, dead.places]]),
-        np.vstack([seen.x, dead.inputs.x]),
+        np.hstack([flow.p, flow.z[:, dead.indices]]),
+        np.vstack([outputs.x, dead.inputs.x]),
         np.vstack(
             [
-                np.hstack([seen.p, seen.z[:, dead.places]]),
+                np.hstack([outputs.p, outputs.z[:, dead.indices]]),
                 np.hstack([dead.inputs.p, dead.through]),
             ]
         ),
     ).frequency_response(frequencies)
-    ny, nu = seen.p.shape
-    late = np.exp(-1j * np.multiply.outer(frequencies, dead.delays))
-    # v = late (H u + K v), y = D u + F v
-    closed = np.eye(dead.count) - late[:, :, None] * opened[:, ny:, nu:]
-    v = np.linalg.solve(closed, late[:, :, None] * opened[:, ny:, :nu])
+    ny, nu = outputs.p.shape
+    delay_factors = np.exp(-1j * np.multiply.outer(frequencies, dead.delays))
+    # v = delay_factors (H u + K v), y = D u + F v
+    closed = np.eye(dead.count) - delay_factors[:, :, None] * opened[:, ny:, nu:]
+    v = np.linalg.solve(closed, delay_factors[:, :, None] * opened[:, ny:, :nu])
     return np.asarray(opened[:, :ny, :nu] + opened[:, :ny, nu:] @ v, dtype=np.complex128)
 
 
@@ -150,10 +150,10 @@ def _jacobians(
 ) -> tuple[Jacobians, Jacobians]:
     """The derivatives of the flow and of the outputs. Raises an error if one is not finite."""
     flow = _without(evaluated.derivative_jacobians(point), unknowns)
-    seen = _without(evaluated.signal_jacobians(point), unknowns)
+    outputs = _without(evaluated.signal_jacobians(point), unknowns)
     _check_finite(evaluated.system, _elements(evaluated.system.states)[0], flow, "the rate of state")
-    _check_finite(evaluated.system, ends.outputs, seen, "the output")
-    return flow, seen
+    _check_finite(evaluated.system, ends.outputs, outputs, "the output")
+    return flow, outputs
 
 
 def _approximated(
@@ -162,14 +162,14 @@ def _approximated(
     unknowns: Jacobians | None,
     readers: list[Jacobians],
     order: int | None,
-) -> Approximated | None:
+) -> PadeApproximation | None:
     """The approximation of the dead time, or ``None`` without dead time."""
     system = evaluated.system
     if system.delays is None:
         return None
     if order is None:
         raise InputError(
-            f"the dead time of {_late_blocks(system)} has no finite linear system",
+            f"the dead time of {_delayed_blocks(system)} has no finite linear system",
             where=system.name,
             allowed="dead time with the order of its approximation",
             fix="give delay_order=3, which is accurate up to about 3 / delay in rad/s",
@@ -185,17 +185,17 @@ def _approximated(
     if system.clocks:
         all_readers.append(_without(evaluated.update_jacobians(point, np.ones(len(system.clocks))), unknowns))
     inputs = _without(evaluated.delay_input_jacobians(point), unknowns)
-    return Approximated(dead_time(evaluated, point, inputs, all_readers), order)
+    return PadeApproximation(dead_time(evaluated, point, inputs, all_readers), order)
 
 
-def _is_order(given: object) -> bool:
-    return isinstance(given, int) and not isinstance(given, bool) and 1 <= given <= HIGHEST_ORDER
+def _is_order(order: object) -> bool:
+    return isinstance(order, int) and not isinstance(order, bool) and 1 <= order <= HIGHEST_ORDER
 
 
-def _late_blocks(system: HybridSystem) -> str:
+def _delayed_blocks(system: HybridSystem) -> str:
     names, _ = _elements(system.discrete)
-    places = system.delays.values if system.delays else ()
-    return ", ".join(sorted({names[place].rpartition("/")[0] for place in places}))
+    indices = system.delays.values if system.delays else ()
+    return ", ".join(sorted({names[k].rpartition("/")[0] for k in indices}))
 
 
 def _elements(layout: Signature) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -239,11 +239,11 @@ def _without(j: Jacobians, unknowns: Jacobians | None) -> Jacobians:
     )
 
 
-def _check_finite(system: HybridSystem, names: Sequence[str], j: Jacobians, what: str) -> None:
+def _check_finite(system: HybridSystem, names: Sequence[str], j: Jacobians, subject: str) -> None:
     for row, name in enumerate(names):
         if not all(np.isfinite(part[row]).all() for part in (j.x, j.z, j.p)):
             raise SimulationError(
-                f"the derivative of {what} '{name}' is not finite",
+                f"the derivative of {subject} '{name}' is not finite",
                 where=system.name,
                 allowed="points at which all equations are smooth",
                 fix="linearize at another operating point",
@@ -254,27 +254,27 @@ def _over_a_period(
     system: HybridSystem,
     ticked: Callable[[tuple[int, ...]], Jacobians],
     flow: Jacobians,
-    seen: Jacobians,
-    moved: NDArray[np.intp],
+    outputs: Jacobians,
+    updated: NDArray[np.intp],
 ) -> tuple[tuple[Array, Array, Array, Array], float]:
     """The map of ``[x; z]`` over one period, and the output right after its first tick."""
     with from_extra("analysis", "linear systems with clocks"):
         from scipy.linalg import expm
 
-    n, m, k = flow.x.shape[1], moved.size, flow.p.shape[1]
+    n, m, k = flow.x.shape[1], updated.size, flow.p.shape[1]
     period, instants = ticks_of_a_period(system)
     generator = np.zeros((n + m + k, n + m + k))
-    generator[:n] = np.hstack([flow.x, flow.z[:, moved], flow.p])
+    generator[:n] = np.hstack([flow.x, flow.z[:, updated], flow.p])
     flows: dict[Fraction, Array] = {}
     ticks: dict[tuple[int, ...], Array] = {}
     whole = np.eye(n + m + k)
-    output = np.hstack([seen.x, seen.z[:, moved], seen.p])
+    output = np.hstack([outputs.x, outputs.z[:, updated], outputs.p])
     times = [time for time, _ in instants]
     for index, (time, ticking) in enumerate(instants):
         if ticking not in ticks:
             j = ticked(ticking)
             jump = np.eye(n + m + k)
-            jump[n : n + m] = np.hstack([j.x[moved], j.z[np.ix_(moved, moved)], j.p[moved]])
+            jump[n : n + m] = np.hstack([j.x[updated], j.z[np.ix_(updated, updated)], j.p[updated]])
             ticks[ticking] = jump
         whole = ticks[ticking] @ whole
         if index == 0:
@@ -311,18 +311,18 @@ def ticks_of_a_period(system: HybridSystem) -> tuple[Fraction, list[tuple[Fracti
     for clock, (own, offset) in enumerate(clocks):
         for tick in range(int(period / own)):
             ticking.setdefault(offset + tick * own, [0] * len(periods))[clock] = 1
-    return period, [(time, tuple(who)) for time, who in sorted(ticking.items())]
+    return period, [(time, tuple(clock_flags)) for time, clock_flags in sorted(ticking.items())]
 
 
-def _kept(
-    system: HybridSystem, matrices: tuple[Array, Array, Array, Array], moved: NDArray[np.intp]
+def _needed_states(
+    system: HybridSystem, matrices: tuple[Array, Array, Array, Array], updated: NDArray[np.intp]
 ) -> NDArray[np.intp]:
     """All states except held outputs that are recomputed before they are read."""
     a, _, c, _ = matrices
-    n = a.shape[0] - moved.size
-    held = np.zeros(n + moved.size, dtype=np.bool_)
+    n = a.shape[0] - updated.size
+    held = np.zeros(n + updated.size, dtype=np.bool_)
     names = [slot.name for slot in system.discrete for _ in range(slot.size)]
-    held[n:] = [names[k] in system.signals_layout.ranges for k in moved]
+    held[n:] = [names[k] in system.signals_layout.ranges for k in updated]
     idle = ~(a.any(axis=0) | c.any(axis=0))
     return np.flatnonzero(~(held & idle))
 
@@ -330,16 +330,16 @@ def _kept(
 def input_ends(system: HybridSystem, paths: Mapping[str, str]) -> tuple[list[int], tuple[str, ...]]:
     """Indices in ``p`` and names of the scalars of some parameters, given as a map from display names to
     paths."""
-    places: list[int] = []
+    indices: list[int] = []
     names: list[str] = []
     for name, path in paths.items():
         slot = system.parameters[path]
-        places += range(*system.parameters.ranges[path].indices(system.parameters.size))
+        indices += range(*system.parameters.ranges[path].indices(system.parameters.size))
         names += [name + element.removeprefix(path) for element in slot.elements]
-    return places, tuple(names)
+    return indices, tuple(names)
 
 
-def output_ends(system: HybridSystem, wanted: Mapping[str, str]) -> tuple[list[int], Ends]:
+def output_ends(system: HybridSystem, paths: Mapping[str, str]) -> tuple[list[int], Ends]:
     """Rows of ``y``, names and units of the scalars of some signals, given as a map from display names to
     paths. The inputs of the result are empty.
 
@@ -348,7 +348,7 @@ def output_ends(system: HybridSystem, wanted: Mapping[str, str]) -> tuple[list[i
     rows: list[int] = []
     names: list[str] = []
     units: list[str] = []
-    for name, own in wanted.items():
+    for name, own in paths.items():
         path = system.aliases.get(own, own)
         if path not in system.signals_layout.ranges:
             known = [*system.signals_layout.names, *system.aliases]

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from armblocks.analysis.connections import feedback
 from armblocks.analysis.frequency import (
+    boundary_points,
     evaluate,
     frequency_grid,
     frequency_range,
     frequency_response,
-    on_the_edge,
 )
 from armblocks.analysis.reduction import minimal
 from armblocks.analysis.shown_values import EPSILON, is_stable, response_errors, shown_dcgain
@@ -201,38 +201,38 @@ def bandwidth(system: StateSpaceModel, drop: float) -> float:
 def shown_margins(system: StateSpaceModel) -> Margins:
     """:meth:`LinearSystem.margins`; 0 dB, 0 deg, 0 s and a distance of 0 where the loop goes through -1 to
     the accuracy of the computation."""
-    found = margins(system)
+    computed = margins(system)
     loop = minimal(system)
 
     def accuracy(frequency: float) -> tuple[float, float]:
         """Relative error of the response at a frequency found by bisection, and the response."""
         if math.isinf(frequency):
             return EPSILON, abs(float(loop.D[0, 0]))
-        place = complex(on_the_edge(loop, np.array([frequency]))[0])
-        value = abs(complex(evaluate(loop, np.array([place]))[0, 0, 0]))
-        error, derivative = response_errors(loop, place)
+        s = complex(boundary_points(loop, np.array([frequency]))[0])
+        value = abs(complex(evaluate(loop, np.array([s]))[0, 0, 0]))
+        error, derivative = response_errors(loop, s)
         # The error of the frequency follows from this error of the response and from its own rounding.
         return (2.0 * error + 4.0 * EPSILON * frequency * derivative) / max(value, 1e-300), value
 
-    gains = [(f, 1.0 if abs(k - 1.0) <= accuracy(f)[0] else k) for f, k in found.gain_crossings]
+    gains = [(f, 1.0 if abs(k - 1.0) <= accuracy(f)[0] else k) for f, k in computed.gain_crossings]
     phases = [
         (f, 0.0 if abs(angle) <= math.degrees(accuracy(f)[0]) else angle)
-        for f, angle in found.phase_crossings
+        for f, angle in computed.phase_crossings
     ]
     gain = min(gains, key=lambda pair: abs(math.log(pair[1])), default=(math.nan, math.inf))
     phase = min(phases, key=lambda pair: abs(pair[1]), default=(math.nan, math.inf))
     delays = [(f, math.radians(angle % 360.0) / f) for f, angle in phases]
     delay = min(delays, key=lambda pair: pair[1], default=(math.nan, math.inf))
-    touching = found.modulus <= math.prod(accuracy(found.modulus_frequency))
+    touching = computed.modulus <= math.prod(accuracy(computed.modulus_frequency))
     return dataclasses.replace(
-        found,
+        computed,
         gain=gain[1],
         gain_frequency=gain[0],
         phase=phase[1],
         phase_frequency=phase[0],
         delay=delay[1],
         delay_frequency=delay[0],
-        modulus=0.0 if touching else found.modulus,
+        modulus=0.0 if touching else computed.modulus,
         gain_crossings=tuple(gains),
         phase_crossings=tuple(phases),
     )

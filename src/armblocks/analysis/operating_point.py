@@ -70,7 +70,9 @@ def initial_point(evaluated: EvaluatedSystem, p: Array) -> Point:
     return point
 
 
-def placed(evaluated: EvaluatedSystem, known: OperatingPoint, parameters: Mapping[str, Array]) -> Point:
+def transferred_point(
+    evaluated: EvaluatedSystem, known: OperatingPoint, parameters: Mapping[str, Array]
+) -> Point:
     """The same operating point in a system with more parameters, and possibly other unknowns.
 
     ``parameters`` are the values of the parameters that ``known`` does not have. Every unknown is the value
@@ -78,10 +80,10 @@ def placed(evaluated: EvaluatedSystem, known: OperatingPoint, parameters: Mappin
     """
     system = evaluated.system
     guess = system.initial_algebraic(system.parameter_values)[0].copy()
-    for name, place in system.algebraic.ranges.items():
+    for name, entry in system.algebraic.ranges.items():
         value = known.algebraic.get(name, _signal_entry(known.signals, name))
         if value is not None:
-            guess[place] = value
+            guess[entry] = value
     point = Point(
         t=known.time,
         x=_packed(system.states, known.states),

@@ -25,18 +25,18 @@ def staircase(A: Array, B: Array) -> tuple[Array, int]:
         return basis, 0
     scale = float(np.linalg.norm(A)) + float(np.linalg.norm(B))
     tolerance = 10.0 * n * np.finfo(np.float64).eps * scale
-    reached, block = 0, B
+    dimension, block = 0, B
     while True:
         left, sizes, _ = np.linalg.svd(block)
         rank = int((sizes > tolerance).sum())
         if not rank:
-            return basis, reached
-        basis[:, reached:] = basis[:, reached:] @ left
-        turned = basis.T @ A @ basis
-        before, reached = reached, reached + rank
-        if reached == n:
+            return basis, dimension
+        basis[:, dimension:] = basis[:, dimension:] @ left
+        rotated = basis.T @ A @ basis
+        before, dimension = dimension, dimension + rank
+        if dimension == n:
             return basis, n
-        block = turned[reached:, before:reached]
+        block = rotated[dimension:, before:dimension]
 
 
 def reachable_dimensions(A: Array, B: Array) -> int:
@@ -48,13 +48,13 @@ def reachable_dimensions(A: Array, B: Array) -> int:
 def minimal(system: SystemT) -> SystemT:
     """The system without uncontrollable and unobservable states; the same object if there are none."""
     a, b, c = balanced(system.A, system.B, system.C)
-    basis, reached = staircase(a, b)
-    basis = basis[:, :reached]
+    basis, controllable = staircase(a, b)
+    basis = basis[:, :controllable]
     a, b, c = basis.T @ a @ basis, basis.T @ b, c @ basis
-    basis, seen = staircase(a.T, c.T)
-    if seen == system.order:
+    basis, observable = staircase(a.T, c.T)
+    if observable == system.order:
         return system
-    basis = basis[:, :seen]
+    basis = basis[:, :observable]
     return dataclasses.replace(
         system,
         A=basis.T @ a @ basis,
@@ -69,23 +69,23 @@ def on_path(system: SystemT) -> SystemT:
     """Keep the states on a path from an input to an output in the graph of the nonzero matrix entries."""
     links = system.A != 0.0
 
-    def spread(begin: NDArray[np.bool_], matrix: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        found = begin
+    def connected(begin: NDArray[np.bool_], matrix: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        nodes = begin
         while True:
-            more = found | (matrix @ found)
-            if (more == found).all():
-                return found
-            found = more
+            successors = nodes | (matrix @ nodes)
+            if (successors == nodes).all():
+                return nodes
+            nodes = successors
 
-    reached = (system.B != 0.0).astype(np.intp).sum(axis=1) > 0
-    seen = (system.C != 0.0).astype(np.intp).sum(axis=0) > 0
-    kept = spread(reached, links) & spread(seen, links.T)
-    places = np.flatnonzero(kept)
+    after_inputs = (system.B != 0.0).astype(np.intp).sum(axis=1) > 0
+    before_outputs = (system.C != 0.0).astype(np.intp).sum(axis=0) > 0
+    needed = connected(after_inputs, links) & connected(before_outputs, links.T)
+    indices = np.flatnonzero(needed)
     return dataclasses.replace(
         system,
-        A=system.A[np.ix_(places, places)],
-        B=system.B[places],
-        C=system.C[:, places],
-        states=tuple(system.states[k] for k in places),
-        state_units=tuple(system.state_units[k] for k in places),
+        A=system.A[np.ix_(indices, indices)],
+        B=system.B[indices],
+        C=system.C[:, indices],
+        states=tuple(system.states[k] for k in indices),
+        state_units=tuple(system.state_units[k] for k in indices),
     )

@@ -89,7 +89,7 @@ def _adapted(loop: LinearSystem, zeros: Complex) -> tuple[Array, list[Complex]]:
     k = 0
     while k + 1 < len(gains) and len(gains) < MOST_GAINS:
         apart = gains[k + 1] - gains[k] > FINEST * gains[k + 1]
-        if apart and _moved(rows[k], rows[k + 1], reach) > 0.02 * reach:
+        if apart and _largest_movement(rows[k], rows[k + 1], reach) > 0.02 * reach:
             between = (gains[k] + gains[k + 1]) / 2.0
             gains.insert(k + 1, between)
             rows.insert(k + 1, _roots(loop, between))
@@ -105,11 +105,11 @@ def _pairs(before: Complex, after: Complex) -> NDArray[np.intp]:
     return linear_sum_assignment(np.abs(before[:, None] - after[None, :]))[1]
 
 
-def _moved(before: Complex, after: Complex, reach: float) -> float:
+def _largest_movement(before: Complex, after: Complex, reach: float) -> float:
     """The largest movement of a root that is inside the figure."""
     partners = after[_pairs(before, after)]
-    seen = (np.abs(before) < 1.3 * reach) | (np.abs(partners) < 1.3 * reach)
-    return float((np.abs(partners - before) * seen).max(initial=0.0))
+    visible = (np.abs(before) < 1.3 * reach) | (np.abs(partners) < 1.3 * reach)
+    return float((np.abs(partners - before) * visible).max(initial=0.0))
 
 
 def _tracked(rows: list[Complex]) -> Complex:

@@ -37,7 +37,7 @@ ROUNDOFFS = 10.0
 """Rounding errors that each of n rows may contribute, in units of the roundoff."""
 EPSILON = float(np.finfo(np.float64).eps)
 SHARES = (1.0, 0.75, 0.5, 0.25)
-"""Places on the line from a root to its candidate at which the pseudospectrum is checked."""
+"""Positions on the line from a root to its candidate at which the pseudospectrum is checked."""
 FAR = 100.0
 """Candidates farther from a root than this many times its first-order error are not checked."""
 
@@ -67,9 +67,9 @@ class _Pencil:
                 return candidate
         return root
 
-    def _holds(self, place: complex) -> bool:
+    def _holds(self, s: complex) -> bool:
         """Whether this number is in the pseudospectrum, so that rounding alone can make it a root."""
-        sizes = np.linalg.svd(self.M - place * self.N, compute_uv=False)
+        sizes = np.linalg.svd(self.M - s * self.N, compute_uv=False)
         return bool(sizes[-1] <= self.tolerance)
 
 
@@ -103,24 +103,24 @@ def shown_poles(system: StateSpaceModel) -> Complex:
 
 def shown_zeros(system: StateSpaceModel) -> Complex:
     """:meth:`LinearSystem.zeros`; likewise."""
-    found = zero_pencil(system.A, system.B, system.C, system.D)
-    if found is None:
+    matrices = zero_pencil(system.A, system.B, system.C, system.D)
+    if matrices is None:
         return np.empty(0, dtype=np.complex128)
-    pencil = _Pencil(*found)
+    pencil = _Pencil(*matrices)
     roots = zeros(system).tolist()
     return in_order(np.array([pencil.shown(root, _candidates(root, system.is_discrete)) for root in roots]))
 
 
 def shown_modes(system: StateSpaceModel) -> tuple[Mode, ...]:
     """:meth:`LinearSystem.damp` of the displayed poles."""
-    found: list[Mode] = []
+    modes: list[Mode] = []
     for pole in shown_poles(system).tolist():
         mode = mode_of(complex(pole), system.dt)
         if system.is_discrete and on_edge(pole, discrete=True):
             # On the unit circle the decay rate is exactly 0, but log(|z|) has a rounding error.
             mode = dataclasses.replace(mode, damping=0.0 if mode.frequency else 1.0, time_constant=math.inf)
-        found.append(mode)
-    return tuple(found)
+        modes.append(mode)
+    return tuple(modes)
 
 
 def on_edge(pole: complex, *, discrete: bool) -> bool:
@@ -144,7 +144,7 @@ def is_stable(system: StateSpaceModel) -> bool:
     return growth(system) < 0.0
 
 
-def response_errors(system: StateSpaceModel, place: complex) -> tuple[float, float]:
+def response_errors(system: StateSpaceModel, s: complex) -> tuple[float, float]:
     """For a system with one input and one output: a bound of the rounding error of its response at a complex
     number, and the magnitude of the derivative of the response there."""
     n = system.order
@@ -152,7 +152,7 @@ def response_errors(system: StateSpaceModel, place: complex) -> tuple[float, flo
     if not n:
         return EPSILON * direct, 0.0
     a, b, c = balanced(system.A, system.B, system.C)
-    matrix = place * np.eye(n) - a
+    matrix = s * np.eye(n) - a
     try:
         right, left = np.linalg.solve(matrix, b)[:, 0], np.linalg.solve(matrix.T, c[0])
     except np.linalg.LinAlgError:
@@ -165,10 +165,10 @@ def response_errors(system: StateSpaceModel, place: complex) -> tuple[float, flo
 def shown_dcgain(system: StateSpaceModel) -> Array:
     """:meth:`LinearSystem.dcgain` (ny, nu); 0 where it is 0 to the accuracy of the computation."""
     gains = dcgain(system).copy()
-    place = 1.0 if system.is_discrete else 0.0
+    s = 1.0 if system.is_discrete else 0.0
     for row, column in np.argwhere(np.isfinite(gains) & (gains != 0.0)).tolist():
         part = minimal(system.select([system.outputs[row]], [system.inputs[column]]))
-        if abs(gains[row, column]) <= response_errors(part, place)[0]:
+        if abs(gains[row, column]) <= response_errors(part, s)[0]:
             gains[row, column] = 0.0
     return gains
 

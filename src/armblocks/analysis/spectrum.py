@@ -128,6 +128,6 @@ def _evenly(time: Array, signals: ArrayLike, sample_rate: float, begin: float) -
             fix="set an earlier begin, or run longer",
         )
     rate = sample_rate or count / span
-    places = start + np.arange(count) / rate
-    columns: list[Array] = [np.interp(places, time, values[:, k]) for k in range(values.shape[1])]
+    instants = start + np.arange(count) / rate
+    columns: list[Array] = [np.interp(instants, time, values[:, k]) for k in range(values.shape[1])]
     return np.column_stack(columns), rate

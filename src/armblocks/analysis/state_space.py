@@ -47,8 +47,8 @@ class StateSpaceModel:
     def __post_init__(self) -> None:
         sizes = _checked_matrices(self)
         for letter, kind, size in zip("xuy", ("state", "input", "output"), sizes):
-            given: tuple[str, ...] = tuple(getattr(self, f"{kind}s"))
-            names = given or tuple(f"{letter}{k + 1}" for k in range(size))
+            own_names: tuple[str, ...] = tuple(getattr(self, f"{kind}s"))
+            names = own_names or tuple(f"{letter}{k + 1}" for k in range(size))
             units: tuple[str, ...] = tuple(getattr(self, f"{kind}_units")) or ("",) * size
             if len(names) != size or len(units) != size:
                 raise InputError(
@@ -158,13 +158,13 @@ def _checked_matrices(system: StateSpaceModel) -> tuple[int, int, int]:
     return nx, nu, ny
 
 
-def _chosen(names: tuple[str, ...], wanted: str | Sequence[str] | None, kind: str) -> list[int]:
-    if wanted is None:
+def _chosen(names: tuple[str, ...], selection: str | Sequence[str] | None, kind: str) -> list[int]:
+    if selection is None:
         return list(range(len(names)))
     chosen: list[int] = []
-    for name in (wanted,) if isinstance(wanted, str) else wanted:
-        places = [k for k, known in enumerate(names) if known == name or known.rpartition("[")[0] == name]
-        if not places:
+    for name in (selection,) if isinstance(selection, str) else selection:
+        indices = [k for k, known in enumerate(names) if known == name or known.rpartition("[")[0] == name]
+        if not indices:
             raise UnknownNameError(kind, name, names)
-        chosen += places
+        chosen += indices
     return chosen

@@ -177,9 +177,9 @@ def forced_response(
         from scipy.linalg import expm
 
     instants = np.asarray(time, dtype=np.float64)
-    given = np.asarray(inputs, dtype=np.float64)
+    signals = np.asarray(inputs, dtype=np.float64)
     n, nu = system.B.shape
-    given = given[:, None] if given.ndim == 1 and nu == 1 else given
+    signals = signals[:, None] if signals.ndim == 1 and nu == 1 else signals
     steps = np.diff(instants)
     if instants.ndim != 1 or instants.size < 2 or not (steps > 0.0).all():
         raise InputError(
@@ -188,9 +188,9 @@ def forced_response(
             where="time response",
             fix="sort them and remove duplicates",
         )
-    if given.shape != (instants.size, nu):
+    if signals.shape != (instants.size, nu):
         raise InputError(
-            f"the inputs have shape {given.shape}",
+            f"the inputs have shape {signals.shape}",
             allowed=f"shape {(instants.size, nu)}: times, inputs",
             where="time response",
             fix="give one row of inputs for each time",
@@ -215,7 +215,7 @@ def forced_response(
     maps: dict[float, Array] = {}
     for k, step in enumerate(steps.tolist()):
         if system.is_discrete:
-            states[k + 1] = system.A @ states[k] + system.B @ given[k]
+            states[k + 1] = system.A @ states[k] + system.B @ signals[k]
             continue
         key = float(f"{step:.12e}")
         if key not in maps:
@@ -224,9 +224,9 @@ def forced_response(
             whole[:n, : n + nu] = np.hstack([system.A, system.B])
             whole[n : n + nu, n + nu :] = np.eye(nu)
             maps[key] = expm(whole * step)[:n]
-        slope = (given[k + 1] - given[k]) / step
-        states[k + 1] = maps[key] @ np.concatenate([states[k], given[k], slope])
-    values = states @ system.C.T + given @ system.D.T
+        slope = (signals[k + 1] - signals[k]) / step
+        states[k + 1] = maps[key] @ np.concatenate([states[k], signals[k], slope])
+    values = states @ system.C.T + signals @ system.D.T
     return TimeResponse(
         system=system, kind="forced", time=instants, values=values[:, :, None], states=states[:, :, None]
     )
@@ -284,16 +284,16 @@ def _settled_after(time: Array, shares: Array, band: float) -> float:
 
 def shown_measures(response: TimeResponse[StateSpaceModel], output: int = 0, column: int = 0) -> StepMeasures:
     """:meth:`TimeResponse.measures` with overshoot and undershoot 0 if they are only rounding errors."""
-    found = response.measures(output, column)
+    computed = response.measures(output, column)
     system = response.system
-    if not found.final or not math.isfinite(found.final):
-        return found
+    if not computed.final or not math.isfinite(computed.final):
+        return computed
     # Every sample is a product with the same matrix, and the output is a sum over the states.
     terms = np.abs(response.states[:, :, column]) @ np.abs(system.C[output]) + abs(system.D[output, column])
     errors = max(system.order, 1) * response.time.size * EPSILON * float(terms.max())
-    least = 100.0 * ROUNDOFFS * errors / abs(found.final)
+    threshold = 100.0 * ROUNDOFFS * errors / abs(computed.final)
     return dataclasses.replace(
-        found,
-        overshoot=found.overshoot if found.overshoot > least else 0.0,
-        undershoot=found.undershoot if found.undershoot > least else 0.0,
+        computed,
+        overshoot=computed.overshoot if computed.overshoot > threshold else 0.0,
+        undershoot=computed.undershoot if computed.undershoot > threshold else 0.0,
     )

@@ -92,9 +92,9 @@ def polynomial(coefficients: Array, letter: str, roots: Complex) -> str:
     """
     largest = float(np.abs(roots).max(initial=0.0))
     parts: list[str] = []
-    for place, value in enumerate(coefficients.tolist()):
-        power = len(coefficients) - 1 - place
-        rounding = 4e-15 * place * math.comb(len(coefficients) - 1, place) * largest**place
+    for k, value in enumerate(coefficients.tolist()):
+        power = len(coefficients) - 1 - k
+        rounding = 4e-15 * k * math.comb(len(coefficients) - 1, k) * largest**k
         if abs(value) <= rounding * abs(float(coefficients[0])):
             continue
         number = f"{abs(value):.6g}"

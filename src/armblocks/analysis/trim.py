@@ -25,7 +25,7 @@ from armblocks.equations.evaluation import EvaluatedSystem, Jacobians, Point
 from armblocks.errors import SimulationError
 
 Array = NDArray[np.float64]
-Places = NDArray[np.intp]
+Indices = NDArray[np.intp]
 
 MOST_ITERATIONS = 200
 MOST_MODES = 20
@@ -48,10 +48,10 @@ class TrimProblem:
 
     system: HybridSystem
     start: Point
-    free_states: Places
-    resting: Places
-    free_parameters: Places
-    rows: Places
+    free_states: Indices
+    resting: Indices
+    free_parameters: Indices
+    rows: Indices
     targets: Array
     bounds: Mapping[str, tuple[float, float]]
     tolerance: float
@@ -80,8 +80,8 @@ class TrimResult:
 
     def shown(self, name: str, value: Array) -> Array:
         """A value of the point or of ``free``, with 0 for every number that is 0 within its accuracy."""
-        least = self.accuracies.get(name)
-        return value + 0.0 if least is None else np.where(np.abs(value) <= least, 0.0, value)
+        accuracy = self.accuracies.get(name)
+        return value + 0.0 if accuracy is None else np.where(np.abs(value) <= accuracy, 0.0, value)
 
     def __repr__(self) -> str:
         head = (
@@ -125,15 +125,15 @@ def _modes_afterwards(search: _Search) -> tuple[Point, int, list[str]]:
     """Solve with constant modes, update the modes, and repeat. Also returns the modes that remain
     inconsistent."""
     point, iterations = search.problem.start, 0
-    seen: list[bytes] = []
+    previous_modes: list[bytes] = []
     while True:
         point, used = search.run(point)
         iterations += used
         changing = search.inconsistent_modes(point)
         z = search.consistent_modes(point)
-        if not changing or z.tobytes() in seen or len(seen) == MOST_MODES:
+        if not changing or z.tobytes() in previous_modes or len(previous_modes) == MOST_MODES:
             return point, iterations, changing
-        seen.append(point.z.tobytes())
+        previous_modes.append(point.z.tobytes())
         point = dataclasses.replace(point, z=z)
 
 
@@ -151,19 +151,19 @@ class _Search:
         self.whole = EvaluatedSystem(system)
         self.sampled = self.evaluated.sampled
         delays = system.delays
-        self.delayed: Places = np.array(
+        self.delayed: Indices = np.array(
             [*delays.values, *delays.derivatives] if delays else [], dtype=np.intp
         )
-        self.ticked: Places = np.flatnonzero(self.sampled)
-        self.moved: Places = np.concatenate([self.ticked, self.delayed])
-        moved: list[int] = self.moved.tolist()
+        self.ticked: Indices = np.flatnonzero(self.sampled)
+        self.free_discrete: Indices = np.concatenate([self.ticked, self.delayed])
+        free_discrete: list[int] = self.free_discrete.tolist()
         self.ticking = np.ones(len(system.clocks))
         self.state_names, discrete_names = _elements(system.states), _elements(system.discrete)
         parameter_names = _elements(system.parameters)
         signal_names = _elements(system.signals_layout)
         self.unknowns: list[str] = [
             *(self.state_names[k] for k in problem.free_states.tolist()),
-            *(discrete_names[k] for k in moved),
+            *(discrete_names[k] for k in free_discrete),
             *_elements(system.algebraic),
             *(parameter_names[k] for k in problem.free_parameters.tolist()),
         ]
@@ -178,20 +178,25 @@ class _Search:
         self.lower = np.array([low for low, _ in ends], dtype=np.float64)
         self.upper = np.array([high for _, high in ends], dtype=np.float64)
 
-    def gathered(self, point: Point) -> Array:
+    def values(self, point: Point) -> Array:
         """The unknowns of a point in one vector."""
         problem = self.problem
         return np.concatenate(
-            [point.x[problem.free_states], point.z[self.moved], point.w, point.p[problem.free_parameters]]
+            [
+                point.x[problem.free_states],
+                point.z[self.free_discrete],
+                point.w,
+                point.p[problem.free_parameters],
+            ]
         )
 
-    def spread(self, values: Array, point: Point) -> Point:
+    def point_with(self, values: Array, point: Point) -> Point:
         """The point with other values of the unknowns."""
         problem = self.problem
-        sizes = [problem.free_states.size, self.moved.size, point.w.size]
+        sizes = [problem.free_states.size, self.free_discrete.size, point.w.size]
         states, ticked, unknowns, parameters = np.split(values, np.cumsum(sizes))
         x, z, p = point.x.copy(), point.z.copy(), point.p.copy()
-        x[problem.free_states], z[self.moved], p[problem.free_parameters] = states, ticked, parameters
+        x[problem.free_states], z[self.free_discrete], p[problem.free_parameters] = states, ticked, parameters
         return Point(t=point.t, x=x, z=z, w=unknowns, p=p)
 
     def residuals(self, point: Point) -> Array:
@@ -205,7 +210,7 @@ class _Search:
         parts += [evaluated.residual(point), evaluated.signals(point) - problem.targets]
         return np.concatenate(parts)
 
-    def _jacobian_rows(self, point: Point) -> list[tuple[Jacobians, Places, Places]]:
+    def _jacobian_rows(self, point: Point) -> list[tuple[Jacobians, Indices, Indices]]:
         """Derivatives of the equations in their order: the derivatives, the selected rows, and for each row
         the index of the entry of z that the equation subtracts."""
         problem, evaluated = self.problem, self.evaluated
@@ -226,9 +231,9 @@ class _Search:
         problem = self.problem
         rows: list[Array] = []
         for j, chosen, subtracted in self._jacobian_rows(point):
-            by_z = j.z[np.ix_(chosen, self.moved)]
+            by_z = j.z[np.ix_(chosen, self.free_discrete)]
             if subtracted.size:
-                by_z = by_z - (subtracted[:, None] == self.moved)
+                by_z = by_z - (subtracted[:, None] == self.free_discrete)
             by_x = j.x[np.ix_(chosen, problem.free_states)]
             rows.append(np.hstack([by_x, by_z, j.w[chosen], j.p[chosen]]))
         return np.vstack(rows)
@@ -277,7 +282,7 @@ class _Search:
 
         ``update_modes``: update the modes at each trial.
         """
-        point = self.spread(np.clip(self.gathered(start), self.lower, self.upper), start)
+        point = self.point_with(np.clip(self.values(start), self.lower, self.upper), start)
         if update_modes:
             point = dataclasses.replace(point, z=self.consistent_modes(point))
         residuals = self.residuals(point)
@@ -293,33 +298,35 @@ class _Search:
                 if damping > 1e12:
                     return point, iteration
                 step = self._step(point, jacobian, residuals, damping, scale)
-                trial = self.spread(self.gathered(point) + step, point)
+                trial = self.point_with(self.values(point) + step, point)
                 if update_modes:
                     trial = dataclasses.replace(trial, z=self.consistent_modes(trial))
-                left = self.residuals(trial)
-                if np.isfinite(left).all() and np.linalg.norm(left) < np.linalg.norm(residuals):
+                trial_residuals = self.residuals(trial)
+                if np.isfinite(trial_residuals).all() and np.linalg.norm(trial_residuals) < np.linalg.norm(
+                    residuals
+                ):
                     break
                 damping *= 10.0
-            point, residuals, damping = trial, left, max(damping / 30.0, 1e-18)
+            point, residuals, damping = trial, trial_residuals, max(damping / 30.0, 1e-18)
         return point, MOST_ITERATIONS
 
     def _step(self, point: Point, jacobian: Array, residuals: Array, damping: float, scale: Array) -> Array:
         """One step of the damped normal equations. Unknowns that would leave their bounds stay at them."""
-        here = self.gathered(point)
+        values = self.values(point)
         weights = np.sqrt(damping) * np.where(scale > 0.0, scale, 1.0)
-        free = np.ones(here.size, dtype=np.bool_)
-        step = np.zeros(here.size)
-        for _ in range(here.size + 1):
+        free = np.ones(values.size, dtype=np.bool_)
+        step = np.zeros(values.size)
+        for _ in range(values.size + 1):
             matrix = np.vstack([jacobian[:, free], np.diag(weights[free])])
             # The right-hand side includes the steps of the unknowns that are at their bounds.
             right = np.concatenate(
                 [-(residuals + jacobian[:, ~free] @ step[~free]), np.zeros(int(free.sum()))]
             )
             step[free] = np.linalg.lstsq(matrix, right, rcond=None)[0]
-            beyond = free & ((here + step < self.lower) | (here + step > self.upper))
+            beyond = free & ((values + step < self.lower) | (values + step > self.upper))
             if not beyond.any():
                 break
-            step = np.clip(here + step, self.lower, self.upper) - here
+            step = np.clip(values + step, self.lower, self.upper) - values
             free &= ~beyond
         return step
 
@@ -327,26 +334,26 @@ class _Search:
         """The result at a point, by name."""
         if self.is_solution(point):
             point = solved(self.whole, point)
-        values = self.gathered(point)
+        values = self.values(point)
         bounded = (values <= self.lower) | (values >= self.upper)
         system = self.problem.system
         known = operating_point(self.whole, point)
         chosen = {int(k) for k in self.problem.free_parameters}
         free = {
             name: known.parameters[name]
-            for name, place in system.parameters.ranges.items()
-            if chosen & set(range(*place.indices(system.parameters.size)))
+            for name, entry in system.parameters.ranges.items()
+            if chosen & set(range(*entry.indices(system.parameters.size)))
         }
         nothing = Point(t=0.0, **{part: np.zeros_like(getattr(point, part)) for part in "xzwp"})
-        least = self.spread(self.errors(point), nothing)
+        accuracies = self.point_with(self.errors(point), nothing)
         return TrimResult(
             point=known,
             free=free,
             accuracies={
-                **system.states.unpack(least.x),
-                **system.discrete.unpack(least.z),
-                **system.algebraic.unpack(least.w),
-                **{name: system.parameters.unpack(least.p)[name] for name in free},
+                **system.states.unpack(accuracies.x),
+                **system.discrete.unpack(accuracies.z),
+                **system.algebraic.unpack(accuracies.w),
+                **{name: system.parameters.unpack(accuracies.p)[name] for name in free},
             },
             residuals=dict(zip(self.equations, self.residuals(point).tolist())),
             at_bounds=tuple(self.unknowns[k] for k in np.flatnonzero(bounded).tolist()),
@@ -356,24 +363,28 @@ class _Search:
 
 def _failure(problem: TrimProblem, search: _Search, point: Point, result: TrimResult) -> SimulationError:
     """The error that names the equations that do not hold, and the likely cause."""
-    left = {name: value for name, value in result.residuals.items() if not abs(value) <= problem.tolerance}
-    worst = sorted(left, key=lambda name: -abs(left[name]) if np.isfinite(left[name]) else -np.inf)
-    listed = ", ".join(f"{name} is {_left(name, left[name])}" for name in worst[:NAMED])
-    more = f" and {len(worst) - NAMED} more" if len(worst) > NAMED else ""
+    violated = {
+        name: value for name, value in result.residuals.items() if not abs(value) <= problem.tolerance
+    }
+    worst = sorted(
+        violated, key=lambda name: -abs(violated[name]) if np.isfinite(violated[name]) else -np.inf
+    )
+    listed = ", ".join(f"{name} is {_residual_text(name, violated[name])}" for name in worst[:NAMED])
+    others = f" and {len(worst) - NAMED} more" if len(worst) > NAMED else ""
     return SimulationError(
-        f"no operating point was found: {listed}{more}",
+        f"no operating point was found: {listed}{others}",
         where=problem.system.name,
-        allowed=_why(problem, search, point, worst, result),
+        allowed=_cause(problem, search, point, worst, result),
         fix="free another parameter, give another start, or exempt a state with moving",
         partial=result,
     )
 
 
-def _left(name: str, value: float) -> str:
+def _residual_text(name: str, value: float) -> str:
     return f"{value:.4g}" if name.startswith(("rate of", "tick of", "equation of")) else f"{value:+.4g} off"
 
 
-def _why(
+def _cause(
     problem: TrimProblem, search: _Search, point: Point, worst: Sequence[str], result: TrimResult
 ) -> str:
     jacobian = search.jacobian(point)

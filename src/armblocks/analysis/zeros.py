@@ -83,12 +83,14 @@ def _reduced(a: Array, b: Array, c: Array, d: Array, tolerance: float) -> tuple[
         plain = c[rank:]  # outputs without direct feedthrough
         c, d = c[:rank], d[:rank]
         _, sizes, right = np.linalg.svd(plain)
-        seen = _rank(sizes, tolerance)
-        if not seen:
+        plain_rank = _rank(sizes, tolerance)
+        if not plain_rank:
             break
-        turn = np.vstack([right[seen:], right[:seen]]).T  # first the states that do not affect these outputs
-        a, b, c = turn.T @ a @ turn, turn.T @ b, c @ turn
-        rest = a.shape[0] - seen
+        rotation = np.vstack(
+            [right[plain_rank:], right[:plain_rank]]
+        ).T  # first the states that do not affect these outputs
+        a, b, c = rotation.T @ a @ rotation, rotation.T @ b, c @ rotation
+        rest = a.shape[0] - plain_rank
         c, d = np.vstack([c[:, :rest], a[rest:, :rest]]), np.vstack([d, b[rest:]])
         a, b = a[:rest, :rest], b[:rest]
     return a, b, c, d

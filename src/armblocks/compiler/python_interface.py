@@ -1,7 +1,7 @@
 """Functions of CPython and NumPy that the builtin of a kernel calls.
 
 Each process sets their addresses by the names in :data:`~armblocks.compiler.entry.TABLE_ENTRIES`. Python
-objects are addresses. """
+objects are addresses."""
 
 from __future__ import annotations
 

@@ -22,11 +22,11 @@ def called_functions(diagram: Diagram, compiled: CompiledSystem) -> tuple[Called
     flat, ranges = flat_diagram(diagram), compiled.discrete.ranges
     order = list(dict.fromkeys(node.block for node in diagram_model(diagram).tick_order.order))
 
-    def place(block: str, name: str) -> tuple[slice, Shape]:
+    def range_and_shape(block: str, name: str) -> tuple[slice, Shape]:
         path = f"{block}/{name}?"
         return ranges[path], compiled.discrete[path].shape
 
-    found: list[CalledFunction] = []
+    calls: list[CalledFunction] = []
     for name in sorted(compiled.called, key=order.index):
         block = flat.blocks[name]
         clock = own_clock(block)
@@ -37,13 +37,13 @@ def called_functions(diagram: Diagram, compiled: CompiledSystem) -> tuple[Called
                 allowed="a sample_time > 0, outside of triggered subsystems",
                 fix="give it a period, and move it out of the triggered subsystem",
             )
-        found.append(
+        calls.append(
             CalledFunction(
                 block=name,
                 clock=compiled.sizes.clocks.index((clock.period, clock.offset)),
-                inputs={port.name: place(name, port.name) for port in block.input_ports()},
-                outputs={port.name: place(name, port.name) for port in block.output_ports()},
+                inputs={port.name: range_and_shape(name, port.name) for port in block.input_ports()},
+                outputs={port.name: range_and_shape(name, port.name) for port in block.output_ports()},
                 call=block.call,
             )
         )
-    return tuple(found)
+    return tuple(calls)

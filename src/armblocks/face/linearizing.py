@@ -12,7 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from armblocks.analysis.linear_system import LinearSystem
 from armblocks.analysis.linearisation import exact_response, input_ends, linearise, output_ends
-from armblocks.analysis.operating_point import OperatingPoint, initial_point, operating_point, placed
+from armblocks.analysis.operating_point import (
+    OperatingPoint,
+    initial_point,
+    operating_point,
+    transferred_point,
+)
 from armblocks.diagram import Diagram, trace_diagram, with_parameters
 from armblocks.diagram.analysis_points import PreparedDiagram, with_analysis_points
 from armblocks.diagram.hierarchy import flatten_hierarchy
@@ -92,13 +97,18 @@ def linearize(
     """
     check_settings(settings, linearize)
     described = described_diagram(diagram, parameters)
-    wanted, seen, opened = _names(inputs), _names(outputs), _names(open)
+    input_names, output_names, opening_names = _names(inputs), _names(outputs), _names(open)
     if isinstance(at, float | int | RunState | OperatingPoint):
         return _linearized(
-            described, wanted, seen, opened, operating_point_at(described, at, **settings), delay_order
+            described,
+            input_names,
+            output_names,
+            opening_names,
+            operating_point_at(described, at, **settings),
+            delay_order,
         )
     points = operating_points_at(described, at, **settings)
-    prepared = _Prepared(described, wanted, seen, opened)
+    prepared = _Prepared(described, input_names, output_names, opening_names)
     return tuple(prepared.at(point, delay_order) for point in points)
 
 
@@ -113,8 +123,8 @@ def described_diagram(
     return with_parameters(diagram, parameters) if parameters else diagram
 
 
-def _names(given: str | Sequence[str]) -> tuple[str, ...]:
-    return (given,) if isinstance(given, str) else tuple(given)
+def _names(names: str | Sequence[str]) -> tuple[str, ...]:
+    return (names,) if isinstance(names, str) else tuple(names)
 
 
 def _linearized(
@@ -169,32 +179,32 @@ class _Prepared:
             else trace_diagram(self.points.diagram)
         )
         system = with_mask_parameters(system, diagram, self.points.inputs.values())
-        places, names = input_ends(system, self.points.inputs)
+        indices, names = input_ends(system, self.points.inputs)
         # The flat diagram with linearisation points has no ports of subsystems.
         aliases = flatten_hierarchy(diagram).aliases
         known = (name if name in system.aliases else str(aliases.get(name, name)) for name in outputs)
         rows, ends = output_ends(system, dict(zip(outputs, known)))
         units = tuple(unit for path in self.points.inputs.values() for unit in _units(system, path))
         self.ends = dataclasses.replace(ends, inputs=names, input_units=units)
-        self.evaluated = EvaluatedSystem(system, places, rows)
+        self.evaluated = EvaluatedSystem(system, indices, rows)
         self.system = system
 
     def at(self, known: OperatingPoint, delay_order: int | None) -> LinearSystem:
         """The linear system about an operating point of the diagram without linearisation points."""
-        return linearise(self.evaluated, self._placed(known), self.ends, known, delay_order=delay_order)
+        return linearise(self.evaluated, self._point(known), self.ends, known, delay_order=delay_order)
 
     def response(self, known: OperatingPoint, frequencies: NDArray[np.float64]) -> NDArray[np.complex128]:
         """The frequency response about an operating point."""
-        return exact_response(self.evaluated, self._placed(known), self.ends, frequencies)
+        return exact_response(self.evaluated, self._point(known), self.ends, frequencies)
 
-    def _placed(self, known: OperatingPoint) -> Point:
+    def _point(self, known: OperatingPoint) -> Point:
         layout = self.system.parameters
         levels = {
             path: known.signals[signal].reshape(layout[path].shape)
             for path, signal in self.points.levels.items()
         }
-        still = {slot.name: np.zeros(slot.shape) for slot in layout if slot.name not in known.parameters}
-        return placed(self.evaluated, known, still | levels)
+        zeros = {slot.name: np.zeros(slot.shape) for slot in layout if slot.name not in known.parameters}
+        return transferred_point(self.evaluated, known, zeros | levels)
 
 
 def _units(system: HybridSystem, path: str) -> tuple[str, ...]:
@@ -229,19 +239,19 @@ def operating_points_at(
         )
     compiled = compile_diagram(diagram)
     evaluated = EvaluatedSystem(compiled.system)
-    found: dict[float, OperatingPoint] = {}
+    points: dict[float, OperatingPoint] = {}
     state: RunState | None = None
     for time in sorted(set(times)):
         if time == 0.0:
             point = initial_point(evaluated, compiled.system.parameter_values)
-            found[time] = operating_point(evaluated, point)
+            points[time] = operating_point(evaluated, point)
             continue
         run: RunSettings = {**settings, "stop_time": time}
         result = simulate(compiled, initial_state=state, **run)
         state = result.final_state
         assert state is not None  # a failed run has raised an error
-        found[time] = _of_state(evaluated, state)
-    return [found[time] for time in times]
+        points[time] = _of_state(evaluated, state)
+    return [points[time] for time in times]
 
 
 def _of_state(evaluated: EvaluatedSystem, state: RunState) -> OperatingPoint:

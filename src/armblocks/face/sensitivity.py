@@ -93,10 +93,10 @@ def sensitivity(
     described = described_diagram(diagram, values)
     names = (parameters,) if isinstance(parameters, str) else tuple(parameters)
     system = with_mask_parameters(compile_diagram(described).system, described, names)
-    wanted = (outputs,) if isinstance(outputs, str) else tuple(outputs)
-    if not names or not wanted:
+    output_names = (outputs,) if isinstance(outputs, str) else tuple(outputs)
+    if not names or not output_names:
         raise InputError(
-            f"{len(names)} parameters and {len(wanted)} outputs are given",
+            f"{len(names)} parameters and {len(output_names)} outputs are given",
             allowed="one or more of each",
             where=system.name,
             fix="name a parameter and an output",
@@ -105,7 +105,7 @@ def sensitivity(
         if name not in system.parameters.ranges:
             known = [*mask_parameters(described), *system.parameters.names]
             raise UnknownNameError("tunable parameter", name, known, where=system.name)
-    paths = [system.aliases.get(name, name) for name in wanted]
+    paths = [system.aliases.get(name, name) for name in output_names]
     for path in paths:
         if path not in system.signals_layout.ranges:
             known = [*system.signals_layout.names, *system.aliases]
@@ -116,15 +116,15 @@ def sensitivity(
     run = run_system(compiled, options)
     _check_instants(compiled, run)
     slots = Signature(tuple(system.parameters[name] for name in dict.fromkeys(names)))
-    return SensitivityResult(run=run, outputs=wanted, parameters=names, slots=slots)
+    return SensitivityResult(run=run, outputs=output_names, parameters=names, slots=slots)
 
 
 def _check_instants(compiled: CompiledSystem, run: SimulationResult) -> None:
     """Raise ``SimulationError`` for coinciding events that a parameter change would separate."""
-    place = compiled.discrete.ranges.get(MIXED)
-    if place is None or run.final_state is None:
+    entry = compiled.discrete.ranges.get(MIXED)
+    if entry is None or run.final_state is None:
         return
-    time, guard = run.final_state.discrete[place]
+    time, guard = run.final_state.discrete[entry]
     if time >= 0.0:
         raise SimulationError(
             f"several events coincide at {time:.9g} s, one of '{compiled.guard_names[int(guard) - 1]}' among "

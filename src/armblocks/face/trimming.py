@@ -60,14 +60,14 @@ def trim(
     known = operating_point_at(described, at, **settings)
     x = system.states.pack(known.states)
     p = system.parameters.pack(known.parameters)
-    given = _values(system.states, states or {}, "state", system)
-    x[list(given)] = list(given.values())
+    fixed_states = _values(system.states, states or {}, "state", system)
+    x[list(fixed_states)] = list(fixed_states.values())
     indices = _parameter_indices(system, free)
     for name, value in (guess or {}).items():
         layout, slot = _state_or_parameter(system, name)
         kind, vector = ("state", x) if layout is system.states else ("parameter", p)
-        found = _values(layout, {slot: value}, kind, system)
-        vector[list(found)] = list(found.values())
+        guessed = _values(layout, {slot: value}, kind, system)
+        vector[list(guessed)] = list(guessed.values())
     moving_states = {index for name in moving for index in _indices(system.states, name, "state", system)}
     rows, targets = _targets(system, outputs or {})
     all_states = range(system.states.size)
@@ -81,7 +81,7 @@ def trim(
                 w=system.algebraic.pack(known.algebraic),
                 p=p,
             ),
-            free_states=np.array([k for k in all_states if k not in given], dtype=np.intp),
+            free_states=np.array([k for k in all_states if k not in fixed_states], dtype=np.intp),
             resting=np.array([k for k in all_states if k not in moving_states], dtype=np.intp),
             free_parameters=np.array(indices, dtype=np.intp),
             rows=np.array(rows, dtype=np.intp),
@@ -113,19 +113,19 @@ def _indices(layout: Signature, name: str, kind: str, system: HybridSystem) -> l
 
 def _values(layout: Signature, values: Values, kind: str, system: HybridSystem) -> dict[int, float]:
     """Values by index in the flat vector; a number is broadcast to a vector."""
-    found: dict[int, float] = {}
+    numbers: dict[int, float] = {}
     for name, value in values.items():
         slot = layout[_slot_name(layout, name, kind, system)]
         indices = _indices(layout, name, kind, system)
-        found |= dict(zip(indices, _broadcast(value, slot.shape, f"{kind} '{name}'").tolist()))
-    return found
+        numbers |= dict(zip(indices, _broadcast(value, slot.shape, f"{kind} '{name}'").tolist()))
+    return numbers
 
 
-def _broadcast(value: ArrayLike, shape: tuple[int, ...], what: str) -> Array:
+def _broadcast(value: ArrayLike, shape: tuple[int, ...], subject: str) -> Array:
     array = np.asarray(value, dtype=np.float64)
     if array.ndim and array.shape != shape:
         raise InputError(
-            f"{what} is given values of shape {array.shape}",
+            f"{subject} is given values of shape {array.shape}",
             allowed=f"a number, or shape {shape}",
             where="trim",
             fix="give one number for each element, or one for all",
@@ -138,7 +138,7 @@ def _span(layout: Signature, slot: str) -> range:
 
 
 def _parameter_indices(system: HybridSystem, free: Sequence[str]) -> list[int]:
-    found: list[int] = []
+    free_indices: list[int] = []
     tables = parameters_read_by_index(system) if free else frozenset[str]()
     for name in free:
         indices = _indices(system.parameters, name, "parameter", system)
@@ -150,8 +150,8 @@ def _parameter_indices(system: HybridSystem, free: Sequence[str]) -> list[int]:
                 allowed="parameters outside such tables",
                 fix="free the input of the table, or a gain after it",
             )
-        found += indices
-    return found
+        free_indices += indices
+    return free_indices
 
 
 def _targets(system: HybridSystem, outputs: Values) -> tuple[list[int], list[float]]:
@@ -164,9 +164,9 @@ def _targets(system: HybridSystem, outputs: Values) -> tuple[list[int], list[flo
             raise UnknownNameError("signal", name, [*layout.names, *system.aliases], where=system.name)
         required = _broadcast(value, layout[path].shape, f"signal '{name}'").tolist()
         indices = range(*layout.ranges[path].indices(layout.size))
-        given = [(index, target) for index, target in zip(indices, required) if not np.isnan(target)]
-        rows += [index for index, _ in given]
-        targets += [target for _, target in given]
+        entries = [(index, target) for index, target in zip(indices, required) if not np.isnan(target)]
+        rows += [index for index, _ in entries]
+        targets += [target for _, target in entries]
     return rows, targets
 
 
@@ -174,7 +174,7 @@ def _bounds(
     system: HybridSystem, bounds: Mapping[str, tuple[float, float]]
 ) -> dict[str, tuple[float, float]]:
     """The bounds by the name of every scalar."""
-    found: dict[str, tuple[float, float]] = {}
+    scalar_bounds: dict[str, tuple[float, float]] = {}
     for name, (low, high) in bounds.items():
         layout, slot = _state_or_parameter(system, name)
         if not low <= high:
@@ -184,8 +184,8 @@ def _bounds(
                 fix="swap them",
                 where=system.name,
             )
-        found |= dict.fromkeys(layout[slot].elements, (float(low), float(high)))
-    return found
+        scalar_bounds |= dict.fromkeys(layout[slot].elements, (float(low), float(high)))
+    return scalar_bounds
 
 
 def _state_or_parameter(system: HybridSystem, name: str) -> tuple[Signature, str]:
