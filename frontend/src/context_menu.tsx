@@ -40,11 +40,17 @@ function Items({ entries }: { entries: Entries }) {
 }
 
 function Item({ entry }: { entry: Entry }) {
-  const { title, keys, possible = true, checked, within, run } = entry
+  const { title, keys, possible = true, checked, swatch, within, run } = entry
   if (within) return <Within title={title} within={within} />
   if (checked !== undefined)
     return (
-      <Menu.CheckboxItem checked={checked} disabled={!possible} onChange={run}>
+      <Menu.CheckboxItem
+        checked={checked}
+        disabled={!possible}
+        onChange={run}
+        closeMenuOnClick
+        rightSection={swatch && <span className="swatch" style={{ background: swatch }} />}
+      >
         {title}
       </Menu.CheckboxItem>
     )

@@ -9,6 +9,8 @@ export interface Entry {
   possible?: boolean
   /** Whether an option is on. */
   checked?: boolean
+  /** A colour to show beside the title, in CSS. */
+  swatch?: string
   /** The entries of a submenu. */
   within?: Entries
   run?: () => void

@@ -96,6 +96,7 @@ export interface Change {
   edit:
     | AddBlocks
     | AddJoint
+    | SetAppearance
     | ArrangeBlocks
     | BendWires
     | BreakLink
@@ -144,7 +145,7 @@ export interface NewBlock {
   place: Place;
 }
 /**
- * Position of a block: top left corner, and its size if it is not the default, px.
+ * Position and appearance of a block: top left corner, and its size if it is not the default, px.
  */
 export interface Place {
   x: number;
@@ -153,6 +154,8 @@ export interface Place {
   height?: number | null;
   flipped?: boolean;
   rotation?: 0 | 90 | 180 | 270;
+  name_side?: "auto" | "below" | "above" | "left" | "right" | "hidden";
+  colour?: "none" | "red" | "orange" | "yellow" | "green" | "cyan" | "blue" | "purple" | "grey";
 }
 /**
  * A wire between two ports, written ``block/port``.
@@ -170,6 +173,15 @@ export interface Wire {
 export interface AddJoint {
   kind: "add_joint";
   after: string;
+}
+/**
+ * Set the side of the names of blocks, or their background; ``None`` leaves it unchanged.
+ */
+export interface SetAppearance {
+  kind: "appearance";
+  blocks: string[];
+  name_side?: ("auto" | "below" | "above" | "left" | "right" | "hidden") | null;
+  colour?: ("none" | "red" | "orange" | "yellow" | "green" | "cyan" | "blue" | "purple" | "grey") | null;
 }
 /**
  * Lay out the blocks of a sheet again, from left to right.
@@ -842,6 +854,7 @@ export interface SheetBlock {
   inputs: PortSpot[];
   outputs: PortSpot[];
   opens: boolean;
+  name_at: "below" | "above" | "left" | "right" | "corner" | "hidden";
   parameters: {
     [k: string]: unknown;
   };

@@ -73,6 +73,16 @@ export function comment(how: 'out' | 'through'): void {
   void change({ kind: 'comment', blocks, comment: already ? '' : how })
 }
 
+/** Set the side of the names of the selected blocks. */
+export function setNameSide(side: NonNullable<Place['name_side']>): void {
+  void change({ kind: 'appearance', blocks: chosenBlocks().map(({ name }) => name), name_side: side })
+}
+
+/** Set the background of the selected blocks. */
+export function setColour(colour: NonNullable<Place['colour']>): void {
+  void change({ kind: 'appearance', blocks: chosenBlocks().map(({ name }) => name), colour })
+}
+
 /** Add Ground and Terminator blocks at the unconnected ports of the selected blocks, else of the sheet. */
 export function ground(): void {
   void change({ kind: 'ground', blocks: chosenBlocks().map(({ name }) => name) })

@@ -6,7 +6,7 @@ import { create } from 'zustand'
 import type { Finding, PortSpot, SheetBlock } from '../protocol'
 import { change } from '../store'
 import { ResizeHandles } from './resize_handles'
-import { nameSide, nameWidth, PORT, side, WIDEST_NAME } from './sheet_layout'
+import { nameWidth, PORT, side, WIDEST_NAME } from './sheet_layout'
 
 export type BlockNodeType = Node<{ block: SheetBlock; findings: Finding[] }, 'block'>
 
@@ -111,7 +111,7 @@ function Name({ block }: { block: SheetBlock }) {
   if (!editing)
     return (
       <div
-        className={`name ${nameSide(block)}${nameWidth(block.name) < WIDEST_NAME ? '' : ' long'}`}
+        className={`name ${block.name_at}${nameWidth(block.name) < WIDEST_NAME ? '' : ' long'}`}
         onDoubleClick={(event) => {
           event.stopPropagation()
           rename(block.name)
@@ -122,7 +122,7 @@ function Name({ block }: { block: SheetBlock }) {
     )
   return (
     <input
-      className={`name nodrag ${nameSide(block)}`}
+      className={`name nodrag ${block.name_at}`}
       aria-label={`Name of ${block.name}`}
       autoFocus
       defaultValue={block.name}

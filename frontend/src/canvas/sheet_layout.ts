@@ -1,4 +1,5 @@
 import { Position, type FitViewOptions } from '@xyflow/react'
+import type { Rectangle } from '../model/free_place'
 import type { PortSpot, SheetBlock } from '../protocol'
 
 const NAME_SIZE = 11
@@ -13,6 +14,14 @@ export function side({ dx, dy }: PortSpot, output: boolean): Position {
   const [x, y] = output ? [dx, dy] : [-dx, -dy]
   return x > 0 ? Position.Right : x < 0 ? Position.Left : y > 0 ? Position.Bottom : Position.Top
 }
+
+/** The sides of a block with ports. */
+export const portSides = ({ inputs, outputs }: SheetBlock): Set<string> =>
+  new Set(
+    [...inputs.map((spot) => side(spot, false)), ...outputs.map((spot) => side(spot, true))].map(
+      (position) => (position === Position.Top ? 'above' : position === Position.Bottom ? 'below' : position),
+    ),
+  )
 
 let ruler: CanvasRenderingContext2D | null | undefined
 const widths = new Map<string, number>()
@@ -30,10 +39,19 @@ export function nameWidth(name: string): number {
   return width
 }
 
-/** The side of a block for its name: one without wires, as in the drawings of reports. */
-export function nameSide({ place, inputs, height }: SheetBlock): 'below' | 'beside' | 'above' {
-  if ((place.rotation ?? 0) % 180 !== 0) return 'beside' // signals run from top to bottom
-  return inputs.some(({ y }) => y >= height) ? 'above' : 'below' // wires enter a round sum from below
+/** The area of a block's name, if it is visible. */
+export function nameArea({ name, name_at: at, place: { x, y }, width, height }: SheetBlock): Rectangle[] {
+  if (at === 'hidden') return []
+  const wide = nameWidth(name)
+  const middle = { x: x + (width - wide) / 2, y: y + height / 2 - 7 }
+  const corner = {
+    below: { x: middle.x, y: y + height + 2 },
+    above: { x: middle.x, y: y - 16 },
+    left: { x: x - 5 - wide, y: middle.y },
+    right: { x: x + width + 5, y: middle.y },
+    corner: { x: x + 0.78 * width, y: y - 15 },
+  }[at]
+  return [{ ...corner, width: wide, height: 14 }]
 }
 
 /**

@@ -6,13 +6,14 @@ import { blockOf, portOf, wireKey } from '../model/wires'
 import type { SheetBlock, Wire } from '../protocol'
 import { useValues } from '../run/wire_values'
 import { change, look, useStudio, type OpenDocument } from '../store'
-import { chosenBlocks } from './arranging'
+import { chosenBlocks, setColour, setNameSide } from './arranging'
 import { pasteAt } from './clipboard'
 import { placeAt } from './insert'
 import { editNote, writeNote } from './note_node'
 import { nodeAt, wireAtElement } from './right_button'
 import { chartOf } from './sheet_actions'
 import { removeChosen } from './sheet_keys'
+import { portSides } from './sheet_layout'
 import { nameSignal } from './signal_names'
 
 type Point = { x: number; y: number }
@@ -94,10 +95,39 @@ function blockEntries(document: OpenDocument, block: SheetBlock): Entries {
     command('Rotate'),
     command('Flip'),
     ...(several ? [{ title: 'Align', within: ALIGNMENTS.map(command) }] : []),
+    { title: several ? 'Names' : 'Name', within: nameEntries(chosenBlocks()) },
+    { title: 'Colour', within: colourEntries(chosenBlocks()) },
     command('Group into a subsystem'),
     command('Comment out, or uncomment'),
     command('Comment through, or uncomment'),
   ]
+}
+
+/** The sides without ports, and the present one. */
+function nameEntries(chosen: SheetBlock[]): Entries {
+  const titles = {
+    auto: 'At a side without lines',
+    below: 'Below',
+    above: 'Above',
+    left: 'Left',
+    right: 'Right',
+    hidden: 'Hidden',
+  }
+  const present = (side: string) => chosen.every(({ place }) => (place.name_side ?? 'auto') === side)
+  return (Object.keys(titles) as (keyof typeof titles)[])
+    .filter((side) => present(side) || chosen.every((block) => !portSides(block).has(side)))
+    .map((side) => ({ title: titles[side], checked: present(side), run: () => setNameSide(side) }))
+}
+
+const COLOURS = ['none', 'red', 'orange', 'yellow', 'green', 'cyan', 'blue', 'purple', 'grey'] as const
+
+function colourEntries(chosen: SheetBlock[]): Entries {
+  return COLOURS.map((colour) => ({
+    title: `${colour[0]!.toUpperCase()}${colour.slice(1)}`,
+    swatch: colour === 'none' ? 'var(--surface)' : `var(--tint-${colour})`,
+    checked: chosen.every(({ place }) => (place.colour ?? 'none') === colour),
+    run: () => setColour(colour),
+  }))
 }
 
 const ALIGNMENTS = [

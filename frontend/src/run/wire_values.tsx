@@ -7,7 +7,7 @@ import { create } from 'zustand'
 import type { Point } from '../model/wire_lines'
 import type { WireEdgeType } from '../canvas/wire_edge'
 import { nameSignal } from '../canvas/signal_names'
-import { nameSide, nameWidth } from '../canvas/sheet_layout'
+import { nameArea } from '../canvas/sheet_layout'
 import { changed, watch } from '../frames'
 import type { Rectangle } from '../model/free_place'
 import { labelPlace, OFF_WIRE } from '../model/value_labels'
@@ -152,18 +152,8 @@ function labelStyle(
 /** The rectangles of blocks and of their names. */
 function drawnBoxes(blocks: Record<string, SheetBlock>): Rectangle[] {
   return Object.values(blocks).flatMap((block) => {
-    const { x, y } = block.place
-    const { width, height, name } = block
-    const wide = nameWidth(name)
-    const at = {
-      below: { x: x + (width - wide) / 2, y: y + height + 2 },
-      above: { x: x + 0.78 * width, y: y - 15 },
-      beside: { x: x + width + 5, y: y + height / 2 - 7 },
-    }[nameSide(block)]
-    return [
-      { x, y, width, height },
-      { ...at, width: wide, height: 14 },
-    ]
+    const { place, width, height } = block
+    return [{ x: place.x, y: place.y, width, height }, ...nameArea(block)]
   })
 }
 

@@ -15,7 +15,15 @@ from armblocks.diagram.conditional import (
     TriggeredSubsystem,
 )
 from armblocks.diagram.content_key import content_key
-from armblocks.diagram.diagram import ROTATIONS, Connection, Diagram, Note, Placement
+from armblocks.diagram.diagram import (
+    BLOCK_COLOURS,
+    NAME_SIDES,
+    ROTATIONS,
+    Connection,
+    Diagram,
+    Note,
+    Placement,
+)
 from armblocks.diagram.difference import DiagramDifference, diagram_difference
 from armblocks.diagram.features import SlotKind
 from armblocks.diagram.hierarchy import (
@@ -62,6 +70,8 @@ from armblocks.diagram.virtual_wiring import BusAssignment, BusCreator, BusSelec
 from armblocks.diagram.worked_example import Driver, ExampleBlock, WorkedExample, driver
 
 __all__ = [
+    "BLOCK_COLOURS",
+    "NAME_SIDES",
     "REQUIRED",
     "ROTATIONS",
     "ActionSubsystem",

@@ -213,12 +213,21 @@ class DiagramBuilder:
         height: float | None = None,
         flipped: bool = False,
         rotation: int = 0,
+        name_side: str = "auto",
+        colour: str = "none",
     ) -> None:
-        """Set the position of a block on the sheet, see :class:`~armblocks.diagram.Placement`."""
+        """Set the position and appearance of a block, see :class:`~armblocks.diagram.Placement`."""
         name = block if isinstance(block, str) else block.name
         self._known(name)
         self._layout[name] = Placement(
-            x=x, y=y, width=width, height=height, flipped=flipped, rotation=rotation
+            x=x,
+            y=y,
+            width=width,
+            height=height,
+            flipped=flipped,
+            rotation=rotation,
+            name_side=name_side,
+            colour=colour,
         )
 
     def bend(self, wire: Connection, bends: Sequence[float]) -> None:

@@ -34,10 +34,12 @@ class Connection:
 
 @dataclass(frozen=True, kw_only=True)
 class Placement:
-    """Position of a block on the sheet: top left corner and size in pixels, y downwards.
+    """Position and appearance of a block on the sheet: top left corner and size in pixels, y downwards.
 
     ``width`` and ``height`` ``None``: chosen by the drawing code. ``flipped``: inputs on the right.
-    ``rotation``: degrees clockwise, one of 0, 90, 180 and 270, after the flip.
+    ``rotation``: degrees clockwise, one of 0, 90, 180 and 270, after the flip. ``name_side``: the side of the
+    name, one of ``NAME_SIDES``; ``auto`` chooses a side without ports, also in place of a side with ports.
+    ``colour``: the background, one of ``BLOCK_COLOURS``. Raises ``DiagramError`` for other values.
     """
 
     x: float
@@ -46,6 +48,19 @@ class Placement:
     height: float | None = None
     flipped: bool = False
     rotation: int = 0
+    name_side: str = "auto"
+    colour: str = "none"
+
+    def __post_init__(self) -> None:
+        for name, allowed in _APPEARANCE.items():
+            value = getattr(self, name)
+            if value not in allowed:
+                raise DiagramError(
+                    f"the {name} of a block is {value!r}",
+                    where=f"position ({self.x:g}, {self.y:g})",
+                    allowed=", ".join(map(str, allowed)),
+                    fix="use one of them",
+                )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,6 +74,11 @@ class Note:
 
 ROTATIONS = (0, 90, 180, 270)
 """Allowed rotations of a block, degrees."""
+NAME_SIDES = ("auto", "below", "above", "left", "right", "hidden")
+"""Allowed sides of a block's name."""
+BLOCK_COLOURS = ("none", "red", "orange", "yellow", "green", "cyan", "blue", "purple", "grey")
+"""Allowed backgrounds of a block; ``none`` is that of all other blocks."""
+_APPEARANCE = {"rotation": ROTATIONS, "name_side": NAME_SIDES, "colour": BLOCK_COLOURS}
 
 _READ_ONLY = ("blocks", "layout", "bends", "notes", "extras", "mask_values", "commented", "signal_names")
 """The fields of a diagram that are read-only mappings."""

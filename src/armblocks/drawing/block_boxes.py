@@ -45,6 +45,8 @@ class Box:
     flipped: bool = False
     rotation: int = 0
     """Degrees clockwise."""
+    name_side: str = "auto"
+    colour: str = "none"
     inputs: tuple[PortSpot, ...] = ()
     outputs: tuple[PortSpot, ...] = ()
 
@@ -57,6 +59,30 @@ class Box:
     def name_width(self) -> float:
         """Maximum width of the block's name, px."""
         return min(text_width(self.name, NAME_SIZE), 168.0)
+
+    @property
+    def shown_name_side(self) -> str:
+        """The side of the name: below, above, left, right, hidden, or ``corner``, the upper right one of a
+        block with wires from above and below.
+
+        A side with ports has no name, because its wires would cross it.
+        """
+        ports = self._sides_with_ports()
+        if self.name_side != "auto" and self.name_side not in ports:
+            return self.name_side
+        if not self.upright:
+            return "right"
+        return "corner" if "below" in ports else "below"
+
+    def _sides_with_ports(self) -> set[str]:
+        spots = (*self.inputs, *self.outputs)
+        edges = {
+            "left": any(spot.x <= self.x for spot in spots),
+            "right": any(spot.x >= self.x + self.width for spot in spots),
+            "above": any(spot.y <= self.y for spot in spots),
+            "below": any(spot.y >= self.y + self.height for spot in spots),
+        }
+        return {side for side, has_ports in edges.items() if has_ports}
 
     def at(self, x: float, y: float) -> Box:
         """The box at another position."""
@@ -88,6 +114,8 @@ def _at_origin(block: Block, place: Placement) -> Box:
             height=place.height or height,
             flipped=place.flipped,
             rotation=place.rotation,
+            name_side=place.name_side,
+            colour=place.colour,
         )
     )
 

@@ -30,6 +30,7 @@ from armblocks.drawing.block_boxes import (
     PortSpot,
     sized_box,
 )
+from armblocks.drawing.block_colours import coloured_marks
 from armblocks.drawing.comment_marks import COMMENT_WORDS, commented_marks
 from armblocks.drawing.diagram_layout import boxes
 from armblocks.drawing.face_marks import Room
@@ -192,18 +193,21 @@ def obstacle(box: Box) -> Obstacle:
 
 
 def _label(box: Box) -> tuple[float, float, float, float]:
-    """The rectangle of the block's name: on a side without wires, as in the studio."""
-    width = box.name_width
-    if not box.upright:  # wires leave above and below
-        return box.x + box.width + 5, box.y + box.height / 2 - 7, width, NAME_ROOM - 4
-    if _name_above(box):
-        return box.x + box.width * 0.78, box.y - NAME_SIZE - 2, width, NAME_SIZE + 3
-    return box.x + (box.width - width) / 2, box.y + box.height + 2, width, NAME_ROOM - 4
-
-
-def _name_above(box: Box) -> bool:
-    """Whether wires enter a block from below, as a round sum."""
-    return any(spot.y >= box.y + box.height for spot in box.inputs)
+    """The rectangle of the block's name; that of a hidden name is the block."""
+    width, middle = box.name_width, box.y + box.height / 2 - 7
+    match box.shown_name_side:
+        case "hidden":
+            return box.x, box.y, box.width, box.height
+        case "right":
+            return box.x + box.width + 5, middle, width, NAME_ROOM - 4
+        case "left":
+            return box.x - 5 - width, middle, width, NAME_ROOM - 4
+        case "corner":
+            return box.x + box.width * 0.78, box.y - NAME_SIZE - 2, width, NAME_SIZE + 3
+        case "above":
+            return box.x + (box.width - width) / 2, box.y - NAME_ROOM + 2, width, NAME_ROOM - 4
+        case _:
+            return box.x + (box.width - width) / 2, box.y + box.height + 2, width, NAME_ROOM - 4
 
 
 def _shape(box: Box) -> Outline:
@@ -226,7 +230,7 @@ def block_marks(box: Box, trend: Trend | None = None, comment: str = "") -> list
     A rotated block has a rotated outline and an upright drawing. A block with a ``comment`` is grey.
     """
     marks = _plain_marks(box, trend)
-    return commented_marks(marks, box, comment) if comment else marks
+    return commented_marks(marks, box, comment) if comment else coloured_marks(marks, box.colour)
 
 
 def _plain_marks(box: Box, trend: Trend | None) -> list[Mark]:
@@ -268,12 +272,17 @@ def _outline(box: Box) -> Mark:
 
 def _block(box: Box, trend: Trend | None, comment: str = "") -> list[Mark]:
     marks = block_marks(box, trend, comment)
+    side = box.shown_name_side
+    if side == "hidden":
+        return marks
     lx, ly, lw, _ = _label(box)
     name = shorten(box.name, NAME_SIZE, lw + 1)
-    if _name_above(box) or not box.upright:
-        marks.append(Text(lx, ly + NAME_SIZE, name, NAME_SIZE, Tone.MUTED))
-    else:
+    if side in ("above", "below"):
         marks.append(Text(lx + lw / 2, ly + NAME_SIZE + 1, name, NAME_SIZE, Tone.MUTED, "middle"))
+    elif side == "left":
+        marks.append(Text(lx + lw, ly + NAME_SIZE, name, NAME_SIZE, Tone.MUTED, "end"))
+    else:
+        marks.append(Text(lx, ly + NAME_SIZE, name, NAME_SIZE, Tone.MUTED))
     return marks
 
 

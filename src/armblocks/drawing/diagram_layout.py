@@ -29,7 +29,7 @@ def boxes(diagram: Diagram) -> dict[str, Box]:
 
 
 def arranged_layout(diagram: Diagram) -> dict[str, Placement]:
-    """Automatic places of all blocks; blocks keep the sizes that the layout states, and stand upright."""
+    """Automatic places of all blocks; blocks keep their stated sizes and appearance, and stand upright."""
     sized: dict[str, Box] = {}
     for name, block in drawn_blocks(diagram).items():
         place = diagram.layout.get(name, _ANYWHERE)
@@ -37,12 +37,14 @@ def arranged_layout(diagram: Diagram) -> dict[str, Placement]:
             place = _ANYWHERE
         sized[name] = standing_box(name, block, replace(_ANYWHERE, width=place.width, height=place.height))
     return {
-        name: Placement(
+        name: replace(
+            diagram.layout.get(name, _ANYWHERE),
             x=round(box.x),
             y=round(box.y),
             width=None if box.width == own.width else box.width,
             height=None if box.height == own.height else box.height,
             flipped=box.flipped,
+            rotation=0,
         )
         for name, box in arranged_boxes(diagram, sized).items()
         for own in [sized_box(name, box.block)]

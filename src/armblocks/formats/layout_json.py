@@ -10,7 +10,16 @@ import dataclasses
 import re
 from collections.abc import Mapping
 
-from armblocks.diagram import ROTATIONS, Connection, Diagram, Note, Placement, PortRef
+from armblocks.diagram import (
+    BLOCK_COLOURS,
+    NAME_SIDES,
+    ROTATIONS,
+    Connection,
+    Diagram,
+    Note,
+    Placement,
+    PortRef,
+)
 from armblocks.formats.json_document import Node
 from armblocks.formats.unknown_members import Extras, members_of, split_extras
 
@@ -85,7 +94,17 @@ def _placement(key: str, node: Node, extras: Extras) -> Placement:
         height=extents.get("height"),
         flipped="flipped" in members and members["flipped"].boolean(),
         rotation=int(rotation),
+        name_side=_choice(members.get("name_side"), f"the name of block '{key}'", "auto", NAME_SIDES),
+        colour=_choice(members.get("colour"), f"the colour of block '{key}'", "none", BLOCK_COLOURS),
     )
+
+
+def _choice(node: Node | None, subject: str, default: str, choices: tuple[str, ...]) -> str:
+    if node is None:
+        return default
+    if node.text() not in choices:
+        raise node.error(f"{subject} is '{node.text()[:80]}'", allowed=", ".join(choices))
+    return node.text()
 
 
 def _members_if_any(node: Node) -> Mapping[str, Node]:

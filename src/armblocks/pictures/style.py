@@ -56,6 +56,14 @@ class Tone(Enum):
     TRACE_5 = "trace-5"
     TRACE_6 = "trace-6"
     TRACE_7 = "trace-7"
+    TINT_RED = "tint-red"
+    TINT_ORANGE = "tint-orange"
+    TINT_YELLOW = "tint-yellow"
+    TINT_GREEN = "tint-green"
+    TINT_CYAN = "tint-cyan"
+    TINT_BLUE = "tint-blue"
+    TINT_PURPLE = "tint-purple"
+    TINT_GREY = "tint-grey"
 
 
 @dataclass(frozen=True)
@@ -94,6 +102,14 @@ PALETTE: dict[Tone, Shade] = {
     Tone.TRACE_5: Shade("#23211e", "#e8ebf0"),
     Tone.TRACE_6: Shade("#2b8cc4", "#56b4e9"),
     Tone.TRACE_7: Shade("#b67c00", "#e69f00"),
+    Tone.TINT_RED: Shade("#f8d9d5", "#4a2624"),
+    Tone.TINT_ORANGE: Shade("#fbe0c8", "#4a3018"),
+    Tone.TINT_YELLOW: Shade("#faf0bf", "#423b14"),
+    Tone.TINT_GREEN: Shade("#d8efd3", "#1f3d25"),
+    Tone.TINT_CYAN: Shade("#d0eef0", "#173c42"),
+    Tone.TINT_BLUE: Shade("#d6e5f8", "#1f3352"),
+    Tone.TINT_PURPLE: Shade("#e8dcf5", "#37284c"),
+    Tone.TINT_GREY: Shade("#e3e0dc", "#343b45"),
 }
 
 TRACES: tuple[Tone, ...] = tuple(tone for tone in Tone if tone.value.startswith("trace-"))

@@ -115,6 +115,26 @@ def test_context_menus_of_blocks_lines_ports_the_sheet_and_charts(sheet: Page) -
     expect(block(sheet, "Scope")).to_have_class(re.compile("selected"))
 
 
+def test_the_menu_sets_the_colour_and_the_side_of_the_name(sheet: Page) -> None:
+    face = block(sheet, "PID").locator(".face")
+
+    def choose(submenu: str, title: str) -> None:
+        face.click(button="right")
+        entry(sheet, submenu).hover()
+        entry(sheet, title).click()
+        expect(sheet.get_by_role("menu")).to_have_count(0)
+
+    choose("Colour", "Blue")
+    expect(face.locator("[class*=tint-blue]").first).to_be_visible()
+    name = block(sheet, "PID").locator(".name")
+    choose("Name", "Above")
+    expect(name).to_have_class(re.compile("above"))
+    choose("Name", "Hidden")
+    expect(name).to_be_hidden()
+    sheet.keyboard.press("Control+z")
+    expect(name).to_have_class(re.compile("above"))
+
+
 def test_a_dragged_block_snaps_to_a_straight_line_and_alt_turns_it_off(sheet: Page) -> None:
     def levels() -> tuple[float, float]:
         return tuple(

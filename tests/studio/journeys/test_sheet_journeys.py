@@ -307,7 +307,7 @@ def test_blocks_are_rotated_and_aligned(sheet: Page) -> None:
     block(sheet, "damping").click()
     sheet.keyboard.press("Control+r")
     expect(sheet.get_by_role("button", name="Undo move damping (Ctrl+Z)")).to_be_enabled()
-    expect(block(sheet, "damping").locator(".name")).to_have_class(re.compile("beside"))
+    expect(block(sheet, "damping").locator(".name")).to_have_class(re.compile("right"))
     sheet.keyboard.press("Control+z")
     sheet.keyboard.press("Control+a")
     bar = sheet.get_by_role("toolbar", name="Arrange the selected blocks")

@@ -82,6 +82,7 @@ def requests(document: str, robot: str) -> list[dict[str, Any]]:
         {"kind": "notes", "notes": {"/1": note}},
         {"kind": "parameters", "block": "PID", "values": {"P": "1"}},
         {"kind": "move", "places": {"PID": place}, "notes": {}},
+        {"kind": "appearance", "blocks": ["PID"], "name_side": "above", "colour": "red"},
         {"kind": "rename", "block": "PID", "name": "PID"},
         {
             "kind": "mask",

@@ -6,7 +6,7 @@ import random
 from collections.abc import Callable
 from typing import Any
 
-from armblocks.diagram import Diagram, DiagramBlock, ParameterKind
+from armblocks.diagram import BLOCK_COLOURS, NAME_SIDES, Diagram, DiagramBlock, ParameterKind
 from armblocks.formats import load_robot
 from armblocks.studio.protocol.messages import sheet_edits as do
 from armblocks.studio.sheet.clipping import clipped
@@ -45,6 +45,8 @@ class Sheet:
             y=float(self.chance.randint(-500, 500)),
             flipped=self.chance.random() < 0.3,
             rotation=self.one((0, 90, 180, 270)),
+            name_side=self.one(NAME_SIDES),
+            colour=self.one(BLOCK_COLOURS),
         )
 
     def wire(self) -> do.Wire:
@@ -117,6 +119,9 @@ MAKERS: dict[type[do.DiagramEdit], Callable[[Sheet], do.DiagramEdit]] = {
     do.Connect: lambda s: do.Connect(wire=s.wire(), replace=s.chance.random() < 0.5),
     do.MoveBlocks: move,
     do.BendWires: bend,
+    do.SetAppearance: lambda s: do.SetAppearance(
+        blocks=s.some(s.blocks), name_side=s.one((None, *NAME_SIDES)), colour=s.one((None, *BLOCK_COLOURS))
+    ),
     do.SetNotes: lambda s: do.SetNotes(notes={s.one(("/1", "/2")): s.note()}),
     do.Rename: lambda s: do.Rename(block=s.one(s.blocks), name=s.one(NEW_NAMES)),
     do.SetParameters: parameters,

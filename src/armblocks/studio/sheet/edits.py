@@ -54,6 +54,7 @@ from armblocks.studio.protocol.messages.sheet_edits import (
     Place,
     RemoveBlocks,
     Rename,
+    SetAppearance,
     SetMask,
     SetNotes,
     SetParameters,
@@ -281,6 +282,21 @@ def _move(edit: MoveBlocks, diagram: Diagram, _: EditContext) -> Diagram:
             bends[wire] = moved_bends(values, leaves_sideways(wire, diagram), shift)
     moved = _noted(edit.notes, dataclasses.replace(diagram, layout=layout, bends=bends), known=True)
     return _connected(edit.wires, _without(RemoveBlocks(wires=edit.instead), moved), replace=False)
+
+
+def _appearance_title(edit: SetAppearance) -> str:
+    if edit.colour is not None:
+        return f"colour {_listed(edit.blocks)}"
+    return f"{'hide' if edit.name_side == 'hidden' else 'move'} the name of {_listed(edit.blocks)}"
+
+
+@EDITS.on(SetAppearance, _appearance_title)
+def _set_appearance(edit: SetAppearance, diagram: Diagram, _: EditContext) -> Diagram:
+    stated = edit.model_dump(include={"name_side", "colour"}, exclude_none=True)
+    changed = {
+        name: dataclasses.replace(diagram.layout[_known(name, diagram)], **stated) for name in edit.blocks
+    }
+    return dataclasses.replace(diagram, layout={**diagram.layout, **changed})
 
 
 @EDITS.on(BendWires, lambda edit: f"bend {_counted(edit.wires, 'wire')}")

@@ -162,6 +162,7 @@ def _drawn(
         inputs=_spots(box, into, inputs=True),
         outputs=_spots(box, out, inputs=False),
         opens=isinstance(block, DiagramBlock),
+        name_at=cast("Any", box.shown_name_side),
         formulas=dict(block.formulas),
         mask=[_rule(rule, block) for rule in block.diagram.mask] if isinstance(block, DiagramBlock) else [],
         link=block.diagram.link if isinstance(block, DiagramBlock) else "",

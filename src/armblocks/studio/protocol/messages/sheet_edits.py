@@ -11,10 +11,12 @@ from armblocks.studio.protocol.message import Edit, Message
 Px = Annotated[float, Field(ge=-1e7, le=1e7)]
 """A coordinate on the sheet, px; the bound keeps the drawing exact."""
 Size = Annotated[float, Field(gt=0, le=1e5)]
+NameSide = Literal["auto", "below", "above", "left", "right", "hidden"]
+BlockColour = Literal["none", "red", "orange", "yellow", "green", "cyan", "blue", "purple", "grey"]
 
 
 class Place(Message):
-    """Position of a block: top left corner, and its size if it is not the default, px."""
+    """Position and appearance of a block: top left corner, and its size if it is not the default, px."""
 
     x: Px
     y: Px
@@ -23,6 +25,8 @@ class Place(Message):
     flipped: bool = False
     rotation: Literal[0, 90, 180, 270] = 0
     """Degrees clockwise."""
+    name_side: NameSide = "auto"
+    colour: BlockColour = "none"
 
 
 class SheetNote(Message):
@@ -111,6 +115,15 @@ class MoveBlocks(DiagramEdit):
     notes: dict[str, SheetNote] = Field(default_factory=dict[str, SheetNote])
     wires: list[Wire] = Field(default_factory=list[Wire])
     instead: list[Wire] = Field(default_factory=list[Wire])
+
+
+class SetAppearance(DiagramEdit):
+    """Set the side of the names of blocks, or their background; ``None`` leaves it unchanged."""
+
+    kind: Literal["appearance"] = "appearance"
+    blocks: list[str]
+    name_side: NameSide | None = None
+    colour: BlockColour | None = None
 
 
 class BendWires(DiagramEdit):
