@@ -21,6 +21,13 @@ FRAMES_REQUESTED = """async () => {
     window.requestAnimationFrame = request
     return count
 }"""
+VIEW_RESTS = """async () => {
+    // Whether the view of the sheet is unchanged during three frames.
+    const view = () => document.querySelector('.react-flow__viewport')?.style.transform
+    const before = view()
+    for (let k = 0; k < 3; k++) await new Promise((passed) => requestAnimationFrame(passed))
+    return view() === before
+}"""
 UPPERMOST = """(element) => {
     const { x, y, width, height } = element.getBoundingClientRect()
     return document.elementFromPoint(x + width / 2, y + height / 2) === element
@@ -52,8 +59,12 @@ def middle(found: Locator) -> tuple[float, float]:
 
 
 def keep_view(page: Page) -> None:
-    """Fix the view of the sheet: without user input, the sheet fits itself into its panel."""
+    """Fix the view of the sheet: without user input, the sheet fits itself into its panel.
+
+    A fit that has begun ends first, so that positions can be measured one after the other.
+    """
     page.locator(".canvas").dispatch_event("wheel")
+    wait_until(page, lambda: page.evaluate(VIEW_RESTS))
 
 
 def choose_in_menu(page: Page, entry: str | re.Pattern[str]) -> None:

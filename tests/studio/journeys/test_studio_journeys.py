@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
 import pytest
 from accessibility import axe
 from building import (
@@ -19,6 +20,7 @@ from building import (
     play_slowly,
     run,
     select_block,
+    wait_until,
     wire,
 )
 from playwright.sync_api import Page, expect
@@ -128,9 +130,10 @@ def test_a_diagram_is_built_with_the_keyboard_alone_and_undone_completely(page: 
         add(page, typed)
     expect(page.locator(".react-flow__node")).to_have_count(3)
     ports = page.locator('[data-handleid="y"], .source, [data-id="Scope"] .target')
-    tops = [box["y"] for port in ports.all() if (box := port.bounding_box())]
-    assert len(tops) == 3
-    assert max(tops) - min(tops) < 0.01  # the wires between them are straight
+    expect(ports).to_have_count(3)
+    # The wires between them are straight. All ports are measured together, because the sheet may be moving.
+    tops = "(ports) => ports.map((port) => port.getBoundingClientRect().y)"
+    wait_until(page, lambda: np.ptp(ports.evaluate_all(tops)) < 0.01)
     for source, target in (("Sine", "Integrator"), ("Integrator", "Scope")):
         page.keyboard.press(">")
         for label, typed in (("From the output", source), ("To the input", target)):

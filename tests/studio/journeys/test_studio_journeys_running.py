@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from building import DIALOG, play_slowly, wait_until
+from building import DIALOG, keep_view, play_slowly, wait_until
 from playwright.sync_api import Locator, Page, expect
 
 import armblocks as ab
@@ -208,6 +208,7 @@ def test_a_click_logs_a_wire_and_pins_its_value(opened: Opened) -> None:
     page = opened(lag_model("logged"))
     ends = [page.locator(f'.react-flow__handle[data-nodeid="{node}"]') for node in ("gain", "lag")]
     expect(ends[1].first).to_be_in_viewport()
+    keep_view(page)
     right, left = ends[0].last.bounding_box(), ends[1].first.bounding_box()
     assert right and left
     page.mouse.click((right["x"] + left["x"] + left["width"]) / 2, right["y"] + right["height"] / 2)
