@@ -672,7 +672,7 @@ export interface RouteWires {
   document: string;
   inside?: string[];
   places: {
-    [k: string]: Spot;
+    [k: string]: BlockCorner;
   };
   wires?: Wire[] | null;
   passed?: string | null;
@@ -680,7 +680,7 @@ export interface RouteWires {
 /**
  * The top left corner of a block, px.
  */
-export interface Spot {
+export interface BlockCorner {
   x: number;
   y: number;
 }
@@ -851,8 +851,8 @@ export interface SheetBlock {
   width: number;
   height: number;
   face: string;
-  inputs: PortSpot[];
-  outputs: PortSpot[];
+  inputs: SheetPort[];
+  outputs: SheetPort[];
   opens: boolean;
   name_at: "below" | "above" | "left" | "right" | "corner" | "hidden";
   parameters: {
@@ -868,7 +868,7 @@ export interface SheetBlock {
 /**
  * A port on the edge of its block: position from the block's corner in px, and direction of its wire.
  */
-export interface PortSpot {
+export interface SheetPort {
   name: string;
   doc: string;
   label: string;

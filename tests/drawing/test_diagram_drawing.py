@@ -45,7 +45,7 @@ from armblocks.drawing.diagram_drawing import (
     diagram_svg,
 )
 from armblocks.drawing.diagram_layout import boxes
-from armblocks.drawing.wire_names import name_place
+from armblocks.drawing.wire_names import name_position
 from armblocks.drawing.wires import Obstacle
 from armblocks.face.block_examples import example_block
 from armblocks.pictures.picture import Curve, Group, Mark, Picture, Polyline, Raster, Text, text_marks
@@ -258,11 +258,11 @@ def test_the_name_of_a_signal_covers_no_block() -> None:
     far = Obstacle(500.0, 500.0, 1.0, 1.0, (500.0, 500.0, 1.0, 1.0))
     above = Obstacle(100.0, 20.0, 300.0, 38.0, (100.0, 58.0, 1.0, 1.0))
     both = Obstacle(100.0, 20.0, 300.0, 80.0, (100.0, 58.0, 1.0, 1.0))
-    assert name_place("speed", [path], [far]) == (250.0, 56.0, "middle")
-    assert name_place("speed", [path], [above]) == (250.0, 72.0, "middle")
-    assert name_place("speed", [path], [both]) == (50.0, -4.0, "middle")
-    assert name_place("speed", [path[1:3]], [far]) == (104.0, 33.6, "start")
-    assert name_place("speed", [()], [far]) is name_place("", [path], [far]) is None
+    assert name_position("speed", [path], [far]) == (250.0, 56.0, "middle")
+    assert name_position("speed", [path], [above]) == (250.0, 72.0, "middle")
+    assert name_position("speed", [path], [both]) == (50.0, -4.0, "middle")
+    assert name_position("speed", [path[1:3]], [far]) == (104.0, 33.6, "start")
+    assert name_position("speed", [()], [far]) is name_position("", [path], [far]) is None
 
 
 def test_an_empty_diagram_has_a_drawing() -> None:

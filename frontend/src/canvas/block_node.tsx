@@ -3,7 +3,7 @@ import { IconAlertCircleFilled, IconLink } from '@tabler/icons-react'
 import { Handle, type Node, type NodeProps } from '@xyflow/react'
 import { memo } from 'react'
 import { create } from 'zustand'
-import type { Finding, PortSpot, SheetBlock } from '../protocol'
+import type { Finding, SheetPort, SheetBlock } from '../protocol'
 import { change } from '../store'
 import { ResizeHandles } from './resize_handles'
 import { nameWidth, PORT, side, WIDEST_NAME } from './sheet_layout'
@@ -73,7 +73,7 @@ export const BlockNode = memo(function BlockNode({
 })
 
 interface PortProps {
-  spot: PortSpot
+  spot: SheetPort
   output: boolean
   /** The error or warning about this port. */
   finding: Finding | undefined

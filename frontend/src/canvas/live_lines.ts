@@ -1,7 +1,7 @@
 import { useEffect, useRef, useState } from 'react'
 import type { Lines } from '../model/wire_lines'
 import type { Places } from '../model/wires'
-import type { RouteWires, Spot, Wire } from '../protocol'
+import type { RouteWires, BlockCorner, Wire } from '../protocol'
 import { line, useStudio } from '../store'
 
 /** The layout of a sheet during a drag, which differs from the document. */
@@ -81,5 +81,5 @@ async function follow(
   now.busy = false
 }
 
-const spots = (places: Places): Record<string, Spot> =>
+const spots = (places: Places): Record<string, BlockCorner> =>
   Object.fromEntries(Object.entries(places).map(([name, { x, y }]) => [name, { x, y }]))

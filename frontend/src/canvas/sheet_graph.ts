@@ -1,5 +1,5 @@
 import type { NodeHandle } from '@xyflow/react'
-import type { Finding, PortSpot, SheetBlock, SheetNote, Wire, WireKind, WireLines } from '../protocol'
+import type { Finding, SheetPort, SheetBlock, SheetNote, Wire, WireKind, WireLines } from '../protocol'
 import type { BlockNodeType } from './block_node'
 import { wholeWay } from '../model/bends'
 import type { NoteNodeType } from './note_node'
@@ -192,7 +192,7 @@ function tagsOf(
   return shown.map((end) => ({ ...end, text }))
 }
 
-const port = (spot: PortSpot, output: boolean): NodeHandle => ({
+const port = (spot: SheetPort, output: boolean): NodeHandle => ({
   id: spot.name,
   type: output ? 'source' : 'target',
   position: side(spot, output),

@@ -1,6 +1,6 @@
 import { Position, type FitViewOptions } from '@xyflow/react'
 import type { Rectangle } from '../model/free_place'
-import type { PortSpot, SheetBlock } from '../protocol'
+import type { SheetPort, SheetBlock } from '../protocol'
 
 const NAME_SIZE = 11
 const NAME_FONT = `${NAME_SIZE}px 'Inter Variable', sans-serif`
@@ -10,7 +10,7 @@ export const WIDEST_NAME = 168
 export const PORT = 9
 
 /** The side of a block at which a port is. */
-export function side({ dx, dy }: PortSpot, output: boolean): Position {
+export function side({ dx, dy }: SheetPort, output: boolean): Position {
   const [x, y] = output ? [dx, dy] : [-dx, -dy]
   return x > 0 ? Position.Right : x < 0 ? Position.Left : y > 0 ? Position.Bottom : Position.Top
 }

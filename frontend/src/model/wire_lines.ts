@@ -1,4 +1,4 @@
-import type { PortSpot, SheetBlock, Wire, WireLines } from '../protocol'
+import type { SheetPort, SheetBlock, Wire, WireLines } from '../protocol'
 import { blockOf, portOf, type Places } from './wires'
 
 /** The lines of wires, as routed by the server, and their drawing. */
@@ -33,7 +33,7 @@ export function endsOf(
   return [placed(source, places[from.name] ?? from.place, 1), placed(target, places[to.name] ?? to.place, -1)]
 }
 
-const placed = (spot: PortSpot, at: { x: number; y: number }, way: number): PortPlace => ({
+const placed = (spot: SheetPort, at: { x: number; y: number }, way: number): PortPlace => ({
   x: at.x + spot.x,
   y: at.y + spot.y,
   dx: way * spot.dx,

@@ -11,7 +11,7 @@ import { nameArea } from '../canvas/sheet_layout'
 import { changed, watch } from '../frames'
 import type { Rectangle } from '../model/free_place'
 import { labelPlace, OFF_WIRE } from '../model/value_labels'
-import type { PortSpot, SheetBlock } from '../protocol'
+import type { SheetPort, SheetBlock } from '../protocol'
 import { samples } from '../samples'
 import { digits, reading, useUnits } from '../scopes/quantity'
 import { change, useStudio } from '../store'
@@ -43,7 +43,7 @@ export function valueAtTime(path: string, time: number): string {
   return `${columns.length > 1 ? `[${shown}${more}]` : shown}${unit && ` ${unit}`}`
 }
 
-function outputs(blocks: Record<string, SheetBlock>): { ref: string; block: SheetBlock; spot: PortSpot }[] {
+function outputs(blocks: Record<string, SheetBlock>): { ref: string; block: SheetBlock; spot: SheetPort }[] {
   return Object.values(blocks).flatMap((block) =>
     block.outputs.map((spot) => ({ ref: `${block.name}/${spot.name}`, block, spot })),
   )

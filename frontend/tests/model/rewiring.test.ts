@@ -1,9 +1,9 @@
 import { expect, test } from 'vitest'
 import { isLoose, levelled, putInto, rewired, takenOut, wireAt } from '../../src/model/rewiring'
 import { wireKey } from '../../src/model/wires'
-import type { PortSpot, SheetBlock, Wire } from '../../src/protocol'
+import type { SheetPort, SheetBlock, Wire } from '../../src/protocol'
 
-const port = (name: string, x: number, y: number): PortSpot => ({
+const port = (name: string, x: number, y: number): SheetPort => ({
   name,
   x,
   y,

@@ -22,7 +22,7 @@ PORT_TEXT_ROOM = 13.0
 
 
 @dataclass(frozen=True)
-class PortSpot:
+class BoxPort:
     """A port on the edge of its block, and the direction in which its wire leaves or enters (dx, dy)."""
 
     name: str
@@ -47,12 +47,12 @@ class Box:
     """Degrees clockwise."""
     name_side: str = "auto"
     colour: str = "none"
-    inputs: tuple[PortSpot, ...] = ()
-    outputs: tuple[PortSpot, ...] = ()
+    inputs: tuple[BoxPort, ...] = ()
+    outputs: tuple[BoxPort, ...] = ()
 
     @property
     def upright(self) -> bool:
-        """Whether its signals run horizontally."""
+        """Whether the signals of the block run horizontally."""
         return self.rotation % 180 == 0
 
     @property
@@ -75,12 +75,12 @@ class Box:
         return "corner" if "below" in ports else "below"
 
     def _sides_with_ports(self) -> set[str]:
-        spots = (*self.inputs, *self.outputs)
+        ports = (*self.inputs, *self.outputs)
         edges = {
-            "left": any(spot.x <= self.x for spot in spots),
-            "right": any(spot.x >= self.x + self.width for spot in spots),
-            "above": any(spot.y <= self.y for spot in spots),
-            "below": any(spot.y >= self.y + self.height for spot in spots),
+            "left": any(port.x <= self.x for port in ports),
+            "right": any(port.x >= self.x + self.width for port in ports),
+            "above": any(port.y <= self.y for port in ports),
+            "below": any(port.y >= self.y + self.height for port in ports),
         }
         return {side for side, has_ports in edges.items() if has_ports}
 
@@ -97,7 +97,7 @@ class Box:
 
 
 def standing_box(name: str, block: Block, place: Placement) -> Box:
-    """The box of a block at ``place``, independent of its connections."""
+    """The box of a block at a placement, independent of its connections."""
     return replace(_at_origin(block, replace(place, x=0.0, y=0.0)), name=name).at(place.x, place.y)
 
 
@@ -106,7 +106,7 @@ def _at_origin(block: Block, place: Placement) -> Box:
     sized = sized_box("", block)
     width, height = sized.width, sized.height
     if place.rotation % 180:
-        width, height = _standing(sized)
+        width, height = _rotated_size(sized)
     return _with_ports(
         replace(
             sized,
@@ -120,7 +120,7 @@ def _at_origin(block: Block, place: Placement) -> Box:
     )
 
 
-def _standing(box: Box) -> tuple[float, float]:
+def _rotated_size(box: Box) -> tuple[float, float]:
     """Width and height of a block rotated by 90 degrees: its ports rotate, its drawing stays upright."""
     shape = face_size(box.block)[0]
     if shape is Outline.TAG:  # as wide as its text
@@ -134,9 +134,9 @@ def _standing(box: Box) -> tuple[float, float]:
     if shape is Outline.BUS:
         return float(round(max(box.height, wide))), 30.0
     _, width, height = face_size(box.block)
-    named = sum(any(side) for side in labels)
+    labelled_sides = sum(any(side) for side in labels)
     room = CONTROL_ROOM * bool(control_ports(box.block))
-    return float(round(max(width, wide))), height + named * PORT_TEXT_ROOM + room
+    return float(round(max(width, wide))), height + labelled_sides * PORT_TEXT_ROOM + room
 
 
 def sized_box(name: str, block: Block) -> Box:
@@ -167,14 +167,14 @@ def _with_ports(box: Box) -> Box:
     upright = _with_upright_ports(replace(box, x=0.0, y=0.0, width=width, height=height))
     inputs, outputs = upright.inputs, upright.outputs
     for _ in range(box.rotation // 90):
-        inputs = tuple(_gone_round(spot, height) for spot in inputs)
-        outputs = tuple(_gone_round(spot, height) for spot in outputs)
+        inputs = tuple(_rotated_by_90(port, height) for port in inputs)
+        outputs = tuple(_rotated_by_90(port, height) for port in outputs)
         width, height = height, width
     return replace(box, x=0.0, y=0.0, inputs=inputs, outputs=outputs).at(box.x, box.y)
 
 
-def _gone_round(spot: PortSpot, height: float) -> PortSpot:
-    return PortSpot(spot.name, height - spot.y, spot.x, -spot.dy, spot.dx)
+def _rotated_by_90(port: BoxPort, height: float) -> BoxPort:
+    return BoxPort(port.name, height - port.y, port.x, -port.dy, port.dx)
 
 
 def _with_upright_ports(box: Box) -> Box:
@@ -186,31 +186,31 @@ def _with_upright_ports(box: Box) -> Box:
     if shape is Outline.CIRCLE and len(into) in (2, 3):
         # Inputs of a round sum: the first from the left, the second from below, the third from above.
         cx, cy = box.x + box.width / 2, box.y + box.height / 2
-        spots = [
-            PortSpot(into[0], entry, cy, forwards, 0),
-            PortSpot(into[1], cx, box.y + box.height, 0, -1),
-            *(PortSpot(name, cx, box.y, 0, 1) for name in into[2:]),
+        ports = [
+            BoxPort(into[0], entry, cy, forwards, 0),
+            BoxPort(into[1], cx, box.y + box.height, 0, -1),
+            *(BoxPort(name, cx, box.y, 0, 1) for name in into[2:]),
         ]
         return replace(
-            box, inputs=tuple(spots), outputs=tuple(PortSpot(n, leave, cy, forwards, 0) for n in out)
+            box, inputs=tuple(ports), outputs=tuple(BoxPort(n, leave, cy, forwards, 0) for n in out)
         )
     above = control_ports(box.block)
     side = [name for name in into if name not in above]
     top = CONTROL_ROOM if above else 0.0
-    spots = {
+    ports = {
         **_spread(side, entry, box.y + top, box.height - top, forwards),
         **{
-            name: PortSpot(name, box.x + box.width * (k + 1) / (len(above) + 1), box.y, 0, 1)
+            name: BoxPort(name, box.x + box.width * (k + 1) / (len(above) + 1), box.y, 0, 1)
             for k, name in enumerate(above)
         },
     }
     leaving = _spread(out, leave, box.y + top, box.height - top, forwards)
-    return replace(box, inputs=tuple(spots[name] for name in into), outputs=tuple(leaving.values()))
+    return replace(box, inputs=tuple(ports[name] for name in into), outputs=tuple(leaving.values()))
 
 
-def _spread(names: Sequence[str], x: float, y: float, height: float, forwards: int) -> dict[str, PortSpot]:
+def _spread(names: Sequence[str], x: float, y: float, height: float, forwards: int) -> dict[str, BoxPort]:
     """Ports at equal distances along an edge that begins at y."""
     return {
-        name: PortSpot(name, x, y + height * (k + 0.5) / len(names), forwards, 0)
+        name: BoxPort(name, x, y + height * (k + 0.5) / len(names), forwards, 0)
         for k, name in enumerate(names)
     }

@@ -105,8 +105,7 @@ def outline(block: Block, x: float, y: float, width: float, height: float, flipp
 
 
 def face(block: Block, room: Room, trend: Trend | None, *, flipped: bool = False) -> list[Mark]:
-    """The drawing inside the block, except for subsystems and switches, whose drawing depends on their
-    ports."""
+    """The drawing inside the block, except for subsystems and switches, see :func:`face_at_ports`."""
     match block:
         case kinds.Gain() | kinds.SliderGain():
             return _gain(block, room, flipped=flipped)
@@ -192,7 +191,7 @@ def bus_width(block: Block, size: float) -> float:
     return max((text_width(label, size) for label in labels), default=0.0) + BAR + 14
 
 
-def _powered(gain: object) -> str:
+def _with_exponent(gain: object) -> str:
     """A long number with a power of ten, such as 2.5e4; an empty text if that is long as well."""
     array = np.asarray(gain, dtype=np.float64)
     if array.size != 1:
@@ -203,11 +202,12 @@ def _powered(gain: object) -> str:
 
 
 def _gain(block: kinds.Gain | kinds.SliderGain, room: Room, *, flipped: bool) -> list[Mark]:
-    """The formula and the value of a gain, as far as they fit into the triangle; else the letter of all
-    gains."""
-    most = 0.56 * room.width
-    wishes = (block.stated_text("gain"), value_text(block.gain), _powered(block.gain))
-    text = next((wish for wish in wishes if wish and text_width(wish, 9.5) <= most), "K")
+    """The formula or the value of a gain, whichever fits into the triangle first; else the letter ``K``."""
+    limit = 0.56 * room.width
+    candidates = (block.stated_text("gain"), value_text(block.gain), _with_exponent(block.gain))
+    text = next(
+        (candidate for candidate in candidates if candidate and text_width(candidate, 9.5) <= limit), "K"
+    )
     size = 12.0 if text_width(text, 12.0) < 0.52 * room.width else 9.5
     share = 0.64 if flipped else 0.36
     return [Text(room.x + share * room.width, room.middle[1] + 0.36 * size, text, size, Tone.INK, "middle")]
@@ -215,7 +215,7 @@ def _gain(block: kinds.Gain | kinds.SliderGain, room: Room, *, flipped: bool) ->
 
 def _robot(room: Room, robot: Robot, caption: str) -> list[Mark]:
     """The joints and links of the robot as a small stick figure."""
-    heavy = not caption
+    is_plot = not caption
     box = room.shrunk(7.0, 7.0)
     if caption:
         box = Room(box.x, box.y + 8, box.width, box.height - 8)
@@ -228,10 +228,10 @@ def _robot(room: Room, robot: Robot, caption: str) -> list[Mark]:
     for k, link in enumerate(robot.links, start=1):
         a, b = flat[row[link.parent] if link.parent is not None else 0], flat[k]
         if float(np.hypot(*(b - a))) > 1.5:
-            marks.append(Polyline(np.stack([a, b]), stroke=Tone.PAINT, width=5.0 if heavy else 4.0))
+            marks.append(Polyline(np.stack([a, b]), stroke=Tone.PAINT, width=5.0 if is_plot else 4.0))
     for k in range(len(robot.links)):
         x, y = flat[k].tolist()
-        marks.append(Disc(x, y, 2.7 if heavy else 2.3, fill=Tone.GRAPHITE))
+        marks.append(Disc(x, y, 2.7 if is_plot else 2.3, fill=Tone.GRAPHITE))
     x, y = flat[0].tolist()
     base = (("M", x - 7, y + 5), ("L", x + 7, y + 5), ("L", x + 3.5, y), ("L", x - 3.5, y), ("Z",))
     if caption:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from armblocks.diagram.comments import passed_ports
-from armblocks.drawing.block_boxes import NAME_SIZE, Box, PortSpot
+from armblocks.drawing.block_boxes import NAME_SIZE, Box, BoxPort
 from armblocks.pictures.picture import Curve, Disc, Group, Mark, Polyline, Raster, Rectangle, Text
 from armblocks.pictures.style import Tone
 
@@ -23,11 +23,11 @@ def commented_marks(marks: Sequence[Mark], box: Box, comment: str) -> list[Mark]
     grey = [_greyed(mark) for mark in marks]
     if comment == "out":
         return [*grey, Text(box.x, box.y - 3, "%", NAME_SIZE, Tone.MUTED, bold=True)]
-    inputs, outputs = ({spot.name: spot for spot in spots} for spots in (box.inputs, box.outputs))
+    inputs, outputs = ({port.name: port for port in ports} for ports in (box.inputs, box.outputs))
     return [*grey, *(_wire(inputs[into], outputs[out]) for into, out in passed_ports(box.block))]
 
 
-def _wire(into: PortSpot, out: PortSpot) -> Mark:
+def _wire(into: BoxPort, out: BoxPort) -> Mark:
     points = [(into.x, into.y), (out.x, out.y)]
     if not into.dy and not out.dy and into.y != out.y:
         middle = (into.x + out.x) / 2

@@ -27,7 +27,7 @@ from armblocks.drawing.block_boxes import (
     PORT_TEXT,
     PORT_TEXT_ROOM,
     Box,
-    PortSpot,
+    BoxPort,
     sized_box,
 )
 from armblocks.drawing.block_colours import coloured_marks
@@ -87,8 +87,8 @@ def diagram_picture(
         comment = level.commented.get(name, "")
         block = _block(box, trend, comment)
         if (mark := clocks.mark(path + name)) is not None:
-            place = box.x + box.width, box.y - 4
-            block.append(Text(*place, mark[0], NAME_SIZE - 1.5, mark[1], "end", bold=True))
+            corner = box.x + box.width, box.y - 4
+            block.append(Text(*corner, mark[0], NAME_SIZE - 1.5, mark[1], "end", bold=True))
         marks.append(Group(tuple(block), title=_block_title(name, box, comment)))
     for (source, _), wire_net, net in zip(wires.items(), nets, routed):
         marks += label_marks(wire_net, net, wire_label(level, source))
@@ -108,12 +108,12 @@ def diagram_picture(
 
 
 def sheets(diagram: Diagram) -> dict[str, tuple[str, ...]]:
-    """The subsystems of a diagram by path, in order, each with the others of equal content."""
-    found: dict[Diagram, list[str]] = {}
+    """The subsystems of a diagram by path, in order, each with the paths of its equal copies."""
+    paths_of: dict[Diagram, list[str]] = {}
     for path, level in sorted(levels_of(diagram).items(), key=lambda entry: entry[0].split("/")):
         if path:
-            found.setdefault(level, []).append(path)
-    return {paths[0]: tuple(paths[1:]) for paths in found.values()}
+            paths_of.setdefault(level, []).append(path)
+    return {paths[0]: tuple(paths[1:]) for paths in paths_of.values()}
 
 
 def diagram_svg(
@@ -127,16 +127,16 @@ def block_picture(block: Block) -> Picture:
     """The symbol of one block, with stubs of its connections."""
     box = sized_box("", block)
     marks: list[Mark] = []
-    for spot in (*box.inputs, *box.outputs):
-        enters = spot in box.inputs
+    for port in (*box.inputs, *box.outputs):
+        enters = port in box.inputs
         reach = -_STUB if enters else _STUB
-        port, outside = (spot.x, spot.y), (spot.x + reach * spot.dx, spot.y + reach * spot.dy)
-        path = (outside, port) if enters else (port, outside)
+        edge, outside = (port.x, port.y), (port.x + reach * port.dx, port.y + reach * port.dy)
+        path = (outside, edge) if enters else (edge, outside)
         marks.append(Curve(rounded(path), stroke=Tone.WIRE, width=1.2))
         if enters:
             marks.append(arrow_head(path))
     marks += [mark for mark in _block(box, None) if not isinstance(mark, Text) or mark.text]
-    above, below = (any(spot.dy == way for spot in box.inputs) for way in (1, -1))
+    above, below = (any(port.dy == way for port in box.inputs) for way in (1, -1))
     picture = Picture(
         width=box.width + 2 * (_STUB + 2),
         height=box.height + 8 + _STUB * (above + below),
@@ -172,9 +172,9 @@ def wire_nets(
     return nets, wires
 
 
-def _end(spots: tuple[PortSpot, ...], port: str) -> WireEnd:
-    spot = next(spot for spot in spots if spot.name == port)
-    return WireEnd(spot.x, spot.y, spot.dx, spot.dy)
+def _end(ports: tuple[BoxPort, ...], name: str) -> WireEnd:
+    port = next(port for port in ports if port.name == name)
+    return WireEnd(port.x, port.y, port.dx, port.dy)
 
 
 def wire_label(diagram: Diagram, source: PortRef) -> str:
@@ -253,11 +253,11 @@ def _plain_marks(box: Box, trend: Trend | None) -> list[Mark]:
         flipped = False
     above = set(control_ports(block))
     if box.upright:
-        heights = tuple(spot.y for spot in box.inputs if spot.name not in above)
+        heights = tuple(port.y for port in box.inputs if port.name not in above)
     else:
         count = len(box.inputs)
         heights = tuple(room.y + room.height * (k + 0.5) / count for k in range(count))
-    tops = tuple((spot.name, spot.x) for spot in box.inputs if spot.name in above and not box.rotation)
+    tops = tuple((port.name, port.x) for port in box.inputs if port.name in above and not box.rotation)
     own = block_faces.face_at_ports(block, room, heights, tops, flipped=flipped)
     return marks + (own if own is not None else block_faces.face(block, room, trend, flipped=flipped))
 
@@ -291,35 +291,35 @@ def _port_names(box: Box) -> tuple[list[Mark], Room]:
     if not box.upright:
         return _port_names_above_and_below(box)
     marks: list[Mark] = []
-    taken = {"left": 0.0, "right": 0.0}
+    label_width = {"left": 0.0, "right": 0.0}
     into, out = block_faces.port_labels(box.block)
     flipped = box.flipped != (box.rotation == 180)
-    for spots, labels, side in (
+    for ports, labels, side in (
         (box.inputs, into, "right" if flipped else "left"),
         (box.outputs, out, "left" if flipped else "right"),
     ):
         if not any(labels):
             continue
-        taken[side] = max(text_width(label, PORT_TEXT) for label in labels) + 5
-        for spot, label in zip(spots, labels):
+        label_width[side] = max(text_width(label, PORT_TEXT) for label in labels) + 5
+        for port, label in zip(ports, labels):
             if not label:
                 continue
             x = box.x + 5 if side == "left" else box.x + box.width - 5
             anchor = "start" if side == "left" else "end"
-            marks.append(Text(x, spot.y + 3.2, label, PORT_TEXT, Tone.MUTED, anchor))
-    width = box.width - taken["left"] - taken["right"]
-    return marks, Room(box.x + taken["left"], box.y, width, box.height)
+            marks.append(Text(x, port.y + 3.2, label, PORT_TEXT, Tone.MUTED, anchor))
+    width = box.width - label_width["left"] - label_width["right"]
+    return marks, Room(box.x + label_width["left"], box.y, width, box.height)
 
 
 def _port_names_above_and_below(box: Box) -> tuple[list[Mark], Room]:
     marks: list[Mark] = []
     top, bottom = box.y, box.y + box.height
-    for spots, labels in zip((box.inputs, box.outputs), block_faces.port_labels(box.block)):
-        named = [(spot, label) for spot, label in zip(spots, labels) if label]
-        above = any(spot.y == box.y for spot, _ in named)
-        for spot, label in named:
+    for ports, labels in zip((box.inputs, box.outputs), block_faces.port_labels(box.block)):
+        named = [(port, label) for port, label in zip(ports, labels) if label]
+        above = any(port.y == box.y for port, _ in named)
+        for port, label in named:
             y = box.y + PORT_TEXT + 3 if above else box.y + box.height - 5
-            marks.append(Text(spot.x, y, label, PORT_TEXT, Tone.MUTED, "middle"))
+            marks.append(Text(port.x, y, label, PORT_TEXT, Tone.MUTED, "middle"))
         if named and above:
             top += PORT_TEXT_ROOM
         elif named:
@@ -331,8 +331,8 @@ def _signs(box: Box) -> list[Mark]:
     """Plus and minus of a sum beside its ports, inside the circle."""
     signs = str(getattr(box.block, "signs", ""))
     marks: list[Mark] = []
-    for sign, spot in zip(signs, box.inputs):
-        x, y = spot.x + 8.0 * spot.dx, spot.y + 8.0 * spot.dy
+    for sign, port in zip(signs, box.inputs):
+        x, y = port.x + 8.0 * port.dx, port.y + 8.0 * port.dy
         marks.append(Polyline([(x - 3, y), (x + 3, y)], stroke=Tone.INK, width=1.3))
         if sign == "+":
             marks.append(Polyline([(x, y - 3), (x, y + 3)], stroke=Tone.INK, width=1.3))

@@ -31,10 +31,10 @@ def draw_diagram(
 
     See :func:`drawing_bytes` for the arguments. Raises UnknownNameError for another suffix or sheet.
     """
-    place = Path(path)
-    kind = place.suffix.removeprefix(".").lower()
-    write_atomically(place, drawing_bytes(diagram, kind, result, sheet=sheet, theme=theme, rates=rates))
-    return place
+    target = Path(path)
+    kind = target.suffix.removeprefix(".").lower()
+    write_atomically(target, drawing_bytes(diagram, kind, result, sheet=sheet, theme=theme, rates=rates))
+    return target
 
 
 def drawing_bytes(

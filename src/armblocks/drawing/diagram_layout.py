@@ -9,12 +9,12 @@ from typing import TypeAlias
 from armblocks.diagram import Block, Diagram, Inport, Outport, Placement
 from armblocks.diagram.signs import Outline
 from armblocks.drawing.arrangement import arranged_boxes
-from armblocks.drawing.block_boxes import Box, PortSpot, sized_box, standing_box
+from armblocks.drawing.block_boxes import Box, BoxPort, sized_box, standing_box
 from armblocks.drawing.block_faces import face_size
 
 SumSides: TypeAlias = tuple[str, str, str]
 """Inputs of a round sum: behind, above, below; ``""`` for none."""
-_ANYWHERE = Placement(x=0.0, y=0.0)
+_ORIGIN = Placement(x=0.0, y=0.0)
 
 
 def boxes(diagram: Diagram) -> dict[str, Box]:
@@ -29,16 +29,16 @@ def boxes(diagram: Diagram) -> dict[str, Box]:
 
 
 def arranged_layout(diagram: Diagram) -> dict[str, Placement]:
-    """Automatic places of all blocks; blocks keep their stated sizes and appearance, and stand upright."""
+    """Automatic positions of all blocks, which become upright; their sizes and appearance are unchanged."""
     sized: dict[str, Box] = {}
     for name, block in drawn_blocks(diagram).items():
-        place = diagram.layout.get(name, _ANYWHERE)
+        place = diagram.layout.get(name, _ORIGIN)
         if place.rotation % 180:
-            place = _ANYWHERE
-        sized[name] = standing_box(name, block, replace(_ANYWHERE, width=place.width, height=place.height))
+            place = _ORIGIN
+        sized[name] = standing_box(name, block, replace(_ORIGIN, width=place.width, height=place.height))
     return {
         name: replace(
-            diagram.layout.get(name, _ANYWHERE),
+            diagram.layout.get(name, _ORIGIN),
             x=round(box.x),
             y=round(box.y),
             width=None if box.width == own.width else box.width,
@@ -52,7 +52,7 @@ def arranged_layout(diagram: Diagram) -> dict[str, Placement]:
 
 
 def _placed(diagram: Diagram) -> Mapping[str, Box]:
-    """The boxes of all blocks where the layout has them, sums upright."""
+    """The boxes of all blocks at their positions in the layout; round sums are not turned."""
     drawn = drawn_blocks(diagram)
     return diagram.keep(
         "placed boxes",
@@ -68,9 +68,9 @@ def drawn_blocks(diagram: Diagram) -> Mapping[str, Block]:
 def _numbered(diagram: Diagram) -> dict[str, Block]:
     drawn = dict(diagram.blocks)
     for kind in (Inport, Outport):
-        found = [(name, block) for name, block in diagram.blocks.items() if isinstance(block, kind)]
-        found.sort(key=lambda entry: (entry[1].port or len(drawn) + 1, entry[0]))
-        for number, (name, block) in enumerate(found, start=1):
+        ports = [(name, block) for name, block in diagram.blocks.items() if isinstance(block, kind)]
+        ports.sort(key=lambda entry: (entry[1].port or len(drawn) + 1, entry[0]))
+        for number, (name, block) in enumerate(ports, start=1):
             if not block.port:
                 drawn[name] = replace(block, port=number)
     return drawn
@@ -80,16 +80,16 @@ def turned_sum(box: Box, sides: SumSides) -> Box:
     """A round sum with each input on the side from which its wire comes; the signs move with the ports."""
     behind, above, below = sides
     x, first = box.x + box.width / 2, box.inputs[0]
-    spots = {
-        behind: PortSpot(behind, first.x, box.y + box.height / 2, first.dx, 0),
-        above: PortSpot(above, x, box.y, 0, 1),
-        below: PortSpot(below, x, box.y + box.height, 0, -1),
+    ports = {
+        behind: BoxPort(behind, first.x, box.y + box.height / 2, first.dx, 0),
+        above: BoxPort(above, x, box.y, 0, 1),
+        below: BoxPort(below, x, box.y + box.height, 0, -1),
     }
-    return replace(box, inputs=tuple(spots[spot.name] for spot in box.inputs))
+    return replace(box, inputs=tuple(ports[port.name] for port in box.inputs))
 
 
 def sum_sides(diagram: Diagram) -> Mapping[str, SumSides]:
-    """The inputs of round sums that are behind, above and below, for those that are turned by their wires."""
+    """The inputs behind, above and below of each round sum whose ports follow its wires."""
     return diagram.keep("sum sides", lambda: _sum_sides(diagram, _placed(diagram)))
 
 
@@ -105,24 +105,24 @@ def _sum_sides(diagram: Diagram, placed: Mapping[str, Box]) -> dict[str, SumSide
             source, box = placed[wire.source.block], sums[wire.target.block]
             height = _port_y(source.outputs, wire.source.port)
             sources[wire.target.block][wire.target.port] = source.x, height, source.flipped != box.flipped
-    found: dict[str, SumSides] = {}
+    sides: dict[str, SumSides] = {}
     for name, box in sums.items():
         if len(sources[name]) < len(box.inputs):
             continue  # an incomplete diagram: the direction of an open input is unknown
-        ports = [spot.name for spot in box.inputs]
+        ports = [port.name for port in box.inputs]
         # The straightest wire enters from the left, except the feedback wire of a loop.
         behind = {port: x > box.x if box.flipped else x < box.x for port, (x, _, _) in sources[name].items()}
         heights = {port: y - box.y - box.height / 2 for port, (_, y, _) in sources[name].items()}
         west = min(ports, key=lambda port: (not behind[port], abs(heights[port]), port))
         others = sorted((port for port in ports if port != west), key=lambda port: (heights[port], port))
         if len(others) == 2:
-            found[name] = west, others[0], others[1]
+            sides[name] = west, others[0], others[1]
         else:
             (other,) = others
             above = (behind[other] or sources[name][other][2]) and heights[other] < -box.height
-            found[name] = (west, other, "") if above else (west, "", other)
-    return found
+            sides[name] = (west, other, "") if above else (west, "", other)
+    return sides
 
 
-def _port_y(spots: Sequence[PortSpot], port: str) -> float:
-    return next(spot.y for spot in spots if spot.name == port)
+def _port_y(ports: Sequence[BoxPort], name: str) -> float:
+    return next(port.y for port in ports if port.name == name)

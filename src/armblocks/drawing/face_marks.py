@@ -14,7 +14,7 @@ _WORDS = (13.0, 9.0)
 """Largest and smallest legible font size of a sign, px."""
 _TITLE = 10.0
 _LEAST = 44.0
-"""Minimum width of a sign, px, so that it is visible between the port names."""
+"""Minimum width of a sign between the port names, px."""
 _MOST_TEXT = 132.0
 """Maximum width of a sign, px; longer signs are shortened."""
 
@@ -39,7 +39,7 @@ class Room:
 
 
 def least_room(sign: FaceSign) -> tuple[float, float]:
-    """Width and height (px) of a complete sign."""
+    """Width and height (px) that a complete sign needs."""
     match sign:
         case Words():
             return min(max(text_width(sign.text, 11.0) + 10, _LEAST), _MOST_TEXT), 24.0
@@ -76,11 +76,11 @@ def sign_marks(sign: FaceSign, room: Room) -> list[Mark]:
 def words(room: Room, text: str, *, size: float = _WORDS[0], italic: bool = False) -> list[Mark]:
     """Draw one line of text. A long text gets a smaller font, then it is shortened."""
     x, y = room.middle
-    shown = size
-    while shown > _WORDS[1] and text_width(text, shown) > room.width - 6:
-        shown -= 0.5
-    fitted = shorten(text, shown, room.width - 4)
-    return [Text(x, y + 0.36 * shown, fitted, shown, Tone.INK, "middle", italic=italic)]
+    font = size
+    while font > _WORDS[1] and text_width(text, font) > room.width - 6:
+        font -= 0.5
+    fitted = shorten(text, font, room.width - 4)
+    return [Text(x, y + 0.36 * font, fitted, font, Tone.INK, "middle", italic=italic)]
 
 
 def _broken(text: str, width: float) -> list[str]:

@@ -41,7 +41,7 @@ _APPROACH = 46.0
 _APPROACH_PRICE = 4.0
 """Distance before a port that other nets avoid, px, and the additional cost per px there."""
 _MIDDLE_PRICE = 1 / 16
-_LITTLE = 64.0
+_ACCEPTED_DETOUR = 64.0
 """Detour that is accepted without a search in a wider window, px: about a bend and a crossing."""
 _ON_EDGE = 1e-6
 
@@ -65,7 +65,7 @@ class Level:
 
     def most(self, least: float) -> float:
         """The maximum accepted cost of a route whose lower bound is ``least``."""
-        return least + _LITTLE + self.detour * (least + 200.0)
+        return least + _ACCEPTED_DETOUR + self.detour * (least + 200.0)
 
 
 LEVELS = (
@@ -96,8 +96,7 @@ def meet(a: Extent, b: Extent) -> bool:
 
 
 def extents(pieces: Floats, *, at_ports: bool = False) -> list[Extent]:
-    """The areas in which segments influence other nets; ``at_ports``: segments that are reserved for
-    ports."""
+    """The areas in which segments influence other nets; ``at_ports``: the segments are reserved for ports."""
     x0, y0, x1, y1 = _wider(pieces, _APPROACH if at_ports else _NEAR).T.tolist()
     return list(zip(x0, y0, x1, y1))
 
@@ -111,8 +110,8 @@ class FreeSpace:
     """The blocks of a sheet, and the lines of routed nets."""
 
     def __init__(self, sides: Sequence[Sequence[float]]) -> None:
-        found = np.array(sides, dtype=np.float64).reshape(-1, 8)
-        self._blocks, self._names = found[:, :4], found[:, 4:]
+        rectangles = np.array(sides, dtype=np.float64).reshape(-1, 8)
+        self._blocks, self._names = rectangles[:, :4], rectangles[:, 4:]
         low = np.minimum(self._blocks[:, :2], self._names[:, :2]) - _BLOCK_MARGIN
         high = np.maximum(self._blocks[:, 2:], self._names[:, 2:]) + _BLOCK_MARGIN
         self._extents = np.hstack([low, high])
@@ -247,8 +246,8 @@ class Surroundings:
         grid = self._grid(own, [], level, (start, goal) if source.dx else None)
         begins = np.full(grid.turn.shape, np.inf)
         begins[grid.node(start)] = 0.0
-        nowhere = np.full(grid.turn.shape, np.inf)
-        rightwards, downwards = (begins, nowhere) if source.dx else (nowhere, begins)
+        infinite = np.full(grid.turn.shape, np.inf)
+        rightwards, downwards = (begins, infinite) if source.dx else (infinite, begins)
         most = level.most(_least(source, start, goal, target))
         return grid.cheapest(rightwards, downwards, grid.node(goal), most, flat=target.dx != 0)
 
@@ -321,19 +320,19 @@ class Surroundings:
         tops = np.minimum(self._blocks[:, 1], self._names[:, 1])
         bottoms = np.maximum(self._blocks[:, 3], self._names[:, 3])
         below = lanes - 5.0 if level is not LEVELS[-1] else lanes
-        wanted_x = [self._blocks[:, 0] - lanes, self._blocks[:, 2] + lanes]
-        wanted_y = [tops - lanes, bottoms + below]
+        candidates_x = [self._blocks[:, 0] - lanes, self._blocks[:, 2] + lanes]
+        candidates_y = [tops - lanes, bottoms + below]
         if level is LEVELS[-1]:
-            wanted_y += [self._blocks[:, 1] - lanes, self._blocks[:, 3] + lanes]
-        for pieces, wanted, k in ((self._upright, wanted_x, 0), (self._level, wanted_y, 1)):
-            wanted += [pieces[:, k] - level.wire_lane, pieces[:, k] + level.wire_lane]
+            candidates_y += [self._blocks[:, 1] - lanes, self._blocks[:, 3] + lanes]
+        for pieces, candidates, k in ((self._upright, candidates_x, 0), (self._level, candidates_y, 1)):
+            candidates += [pieces[:, k] - level.wire_lane, pieces[:, k] + level.wire_lane]
         if middle is not None:
-            wanted_x.append(np.array([round((middle[0][0] + middle[1][0]) / 2)]))
-        found_x = np.concatenate([part.ravel() for part in wanted_x])
-        found_y = np.concatenate([part.ravel() for part in wanted_y])
+            candidates_x.append(np.array([round((middle[0][0] + middle[1][0]) / 2)]))
+        lanes_x = np.concatenate([part.ravel() for part in candidates_x])
+        lanes_y = np.concatenate([part.ravel() for part in candidates_y])
         return (
-            grid_lines(exact_x, found_x[(found_x >= x0) & (found_x <= x1)].tolist(), level.apart),
-            grid_lines(exact_y, found_y[(found_y >= y0) & (found_y <= y1)].tolist(), level.apart),
+            grid_lines(exact_x, lanes_x[(lanes_x >= x0) & (lanes_x <= x1)].tolist(), level.apart),
+            grid_lines(exact_y, lanes_y[(lanes_y >= y0) & (lanes_y <= y1)].tolist(), level.apart),
         )
 
     def _edges(
@@ -364,10 +363,10 @@ class Surroundings:
 
 def _thicker(areas: Floats, margin: float, axis: int, other: float | None = None) -> Floats:
     """Areas enlarged along one axis: by ``margin`` below, by ``other`` (by default ``margin``) above."""
-    found = areas.copy()
-    found[:, axis] -= margin
-    found[:, axis + 2] += margin if other is None else other
-    return found
+    enlarged = areas.copy()
+    enlarged[:, axis] -= margin
+    enlarged[:, axis + 2] += margin if other is None else other
+    return enlarged
 
 
 def _least(source: End, start: Point, goal: Point, target: End) -> float:
@@ -383,5 +382,5 @@ def _owns(blocks: Floats, port: Point, out: tuple[int, int]) -> Truths:
     (x, y), (dx, dy) = port, out
     edge = blocks[:, (0 if dx < 0 else 2) if dx else (1 if dy < 0 else 3)]
     beside = (blocks[:, 1] <= y) & (y <= blocks[:, 3]) if dx else (blocks[:, 0] <= x) & (x <= blocks[:, 2])
-    found = beside & (np.abs(edge - (x if dx else y)) < _ON_EDGE)
-    return found if np.count_nonzero(found) == 1 else np.zeros(len(blocks), dtype=np.bool_)
+    owners = beside & (np.abs(edge - (x if dx else y)) < _ON_EDGE)
+    return owners if np.count_nonzero(owners) == 1 else np.zeros(len(blocks), dtype=np.bool_)

@@ -14,17 +14,17 @@ from armblocks.pictures.text_width import text_width
 
 NAME_SIZE = 10.0
 """Font size of the names of signals, px."""
-_OFF = 4.0
+_GAP = 4.0
 """Distance between a line and the name, px."""
 
-NamePlace = tuple[float, float, Literal["start", "middle"]]
+NamePosition = tuple[float, float, Literal["start", "middle"]]
 """Position on the baseline of the text, px, and its anchor."""
 
 
-def name_place(
+def name_position(
     name: str, paths: Iterable[Sequence[Point]], obstacles: Iterable[Obstacle]
-) -> NamePlace | None:
-    """The place of a signal's name: at the longest horizontal segment where it covers no block and no name.
+) -> NamePosition | None:
+    """The position of a signal's name: at the longest horizontal segment where it covers no block or name.
 
     It is beside the longest segment if no segment is horizontal. ``None`` without a name, and for a signal
     without a line, whose name is in the labels at its ends.
@@ -36,26 +36,28 @@ def name_place(
     flat = [pair for pair in segments if pair[0][1] == pair[1][1]]
     if not flat:
         (ax, ay), (_, by) = segments[0]
-        return ax + _OFF, (ay + by) / 2 + 0.36 * NAME_SIZE, "start"
-    areas = [area for entry in obstacles for area in _areas(entry)]
+        return ax + _GAP, (ay + by) / 2 + 0.36 * NAME_SIZE, "start"
+    areas = [area for obstacle in obstacles for area in _areas(obstacle)]
     half = text_width(name, NAME_SIZE) / 2
-    wishes = [((a[0] + b[0]) / 2, y) for a, b in flat for y in (a[1] - _OFF, a[1] + _OFF + 0.8 * NAME_SIZE)]
+    candidates = [
+        ((a[0] + b[0]) / 2, y) for a, b in flat for y in (a[1] - _GAP, a[1] + _GAP + 0.8 * NAME_SIZE)
+    ]
     free = (
         (x, y)
-        for x, y in wishes
+        for x, y in candidates
         if not any(
             x - half < right and left < x + half and y - NAME_SIZE < low and top < y + 2
             for left, top, right, low in areas
         )
     )
-    x, y = next(free, wishes[0])
+    x, y = next(free, candidates[0])
     return x, y, "middle"
 
 
-def _areas(found: Obstacle) -> tuple[tuple[float, float, float, float], ...]:
-    x, y, width, height = found.label
+def _areas(obstacle: Obstacle) -> tuple[tuple[float, float, float, float], ...]:
+    x, y, width, height = obstacle.label
     return (
-        (found.x, found.y, found.x + found.width, found.y + found.height),
+        (obstacle.x, obstacle.y, obstacle.x + obstacle.width, obstacle.y + obstacle.height),
         (x, y, x + width, y + height),
     )
 
@@ -66,8 +68,8 @@ def _length(one: Point, other: Point) -> float:
 
 def name_marks(name: str, paths: Iterable[Sequence[Point]], obstacles: Iterable[Obstacle]) -> list[Mark]:
     """The name of a signal; nothing without a name or a line."""
-    place = name_place(name, paths, obstacles)
-    if place is None:
+    position = name_position(name, paths, obstacles)
+    if position is None:
         return []
-    x, y, anchor = place
+    x, y, anchor = position
     return [Text(x, y, name, NAME_SIZE, Tone.INK, anchor, italic=True)]

@@ -79,17 +79,17 @@ class NetRouter:
         surroundings = self._space.around(extent, self._number)
         if not surroundings.is_legal_stub((*goal, *end), level, end, (-target.dx, -target.dy)):
             return ()
-        found: list[Point]
+        route: list[Point]
         if self._tree:
-            found = surroundings.branch(self._tree, self._ports(), self._dots, goal, target, level)
+            route = surroundings.branch(self._tree, self._ports(), self._dots, goal, target, level)
         else:
             port = (source.x, source.y)
             if not surroundings.is_legal_stub((*port, *start), level, port, (source.dx, source.dy)):
                 return ()
-            found = surroundings.path(source, start, goal, target, level)
-            if found:
-                found.insert(0, port)
-        return corners([*found, end]) if found else ()
+            route = surroundings.path(source, start, goal, target, level)
+            if route:
+                route.insert(0, port)
+        return corners([*route, end]) if route else ()
 
     def _ports(self) -> list[Point]:
         return [(end.x, end.y) for end in (self._net.source, *self._net.targets)]

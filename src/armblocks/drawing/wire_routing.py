@@ -33,7 +33,7 @@ def route(obstacles: Sequence[Obstacle], nets: Sequence[Net]) -> list[RoutedNet]
 
 
 @dataclass(frozen=True)
-class _Known:
+class _RankedNet:
     """A net with its reserved segments at the ports and its rank in the routing order."""
 
     net: Net
@@ -48,9 +48,9 @@ class Routing:
     def __init__(self) -> None:
         self._obstacles: Mapping[str, Obstacle] = {}
         self._space = FreeSpace([])
-        self._known: dict[str, _Known] = {}
+        self._ranked: dict[str, _RankedNet] = {}
         self._laid: dict[str, LaidNet] = {}
-        self._given: dict[str, tuple[Net, Net]] = {}
+        self._levelled_by_key: dict[str, tuple[Net, Net]] = {}
         self._numbers = 0
 
     def update(self, obstacles: Mapping[str, Obstacle], nets: Mapping[str, Net]) -> dict[str, RoutedNet]:
@@ -61,35 +61,38 @@ class Routing:
         if not changed and nets.keys() == self._laid.keys():
             return {key: self._laid[key].routed for key in nets}
         space = self._space if obstacles == self._obstacles else FreeSpace(_sides(obstacles.values()))
-        space.reserve([(known.ends, known.number) for known in self._known.values()])
+        space.reserve([(entry.ends, entry.number) for entry in self._ranked.values()])
         stale = self._stale(changed)
         laid: dict[str, LaidNet] = {}
-        fresh: list[Extent] = []
-        for key in sorted(nets, key=lambda key: self._known[key].rank):
+        changed_areas: list[Extent] = []
+        for key in sorted(nets, key=lambda key: self._ranked[key].rank):
             net, old = nets[key], self._laid.get(key)
             if (
                 old is None
                 or key in stale
                 or old.net != net
-                or (fresh and any(meet(old.examined, extent) for extent in fresh))
+                or (changed_areas and any(meet(old.examined, extent) for extent in changed_areas))
             ):
-                found = NetRouter(space, net, self._known[key].number).routed()
-                if old is None or found.routed != old.routed:
-                    fresh += extents(found.pieces)
-                    fresh += extents(old.pieces) if old is not None else ()
-                old = found
+                rerouted = NetRouter(space, net, self._ranked[key].number).routed()
+                if old is None or rerouted.routed != old.routed:
+                    changed_areas += extents(rerouted.pieces)
+                    changed_areas += extents(old.pieces) if old is not None else ()
+                old = rerouted
             laid[key] = old
-            space.lay(old.pieces, self._known[key].number)
+            space.lay(old.pieces, self._ranked[key].number)
         self._obstacles, self._space, self._laid = dict(obstacles), space, laid
-        self._given = {key: self._given[key] for key in nets}
+        self._levelled_by_key = {key: self._levelled_by_key[key] for key in nets}
         return {key: laid[key].routed for key in nets}
 
     def _levelled(self, key: str, net: Net) -> Net:
         """The net with targets that are at most ``ALMOST_LEVEL`` off the level of the source moved to it."""
-        old = self._given.get(key)
+        old = self._levelled_by_key.get(key)
         if old is None or (old[0] is not net and old[0] != net):
             targets = tuple(_level(target, net.source) for target in net.targets)
-            old = self._given[key] = net, net if targets == net.targets else replace(net, targets=targets)
+            old = self._levelled_by_key[key] = (
+                net,
+                net if targets == net.targets else replace(net, targets=targets),
+            )
         return old[1]
 
     def _stale(self, changed: Sequence[Extent]) -> set[str]:
@@ -98,9 +101,9 @@ class Routing:
             return set()
         examined = np.array([laid.examined for laid in self._laid.values()])[:, None]
         areas = np.array(changed)[None]
-        reached = (examined[..., :2] <= areas[..., 2:]) & (areas[..., :2] <= examined[..., 2:])
-        met = np.any(np.all(reached, axis=2), axis=1)
-        return {key for key, hit in zip(self._laid, met.tolist()) if hit}
+        overlaps = (examined[..., :2] <= areas[..., 2:]) & (areas[..., :2] <= examined[..., 2:])
+        is_stale = np.any(np.all(overlaps, axis=2), axis=1)
+        return {key for key, stale in zip(self._laid, is_stale.tolist()) if stale}
 
     def _changed_obstacles(self, obstacles: Mapping[str, Obstacle]) -> Iterable[Extent]:
         for name in {*obstacles, *self._obstacles}:
@@ -110,21 +113,21 @@ class Routing:
 
     def _changed_nets(self, nets: Mapping[str, Net]) -> list[Extent]:
         changed: list[Extent] = []
-        known: dict[str, _Known] = {}
+        ranked: dict[str, _RankedNet] = {}
         for key, net in nets.items():
-            old = self._known.get(key)
+            old = self._ranked.get(key)
             if old is None or (old.net is not net and old.net != net):
                 self._numbers += 1
                 rank = not any(net.bends), _length(net), key
-                known[key] = _Known(net, self._numbers, _ends(net), rank)
-                changed += extents(known[key].ends, at_ports=True)
+                ranked[key] = _RankedNet(net, self._numbers, _ends(net), rank)
+                changed += extents(ranked[key].ends, at_ports=True)
             else:
-                known[key] = old
-        for key, old in self._known.items():
-            if known.get(key) is not old:
+                ranked[key] = old
+        for key, old in self._ranked.items():
+            if ranked.get(key) is not old:
                 changed += extents(old.ends, at_ports=True)
                 changed += extents(self._laid[key].pieces)
-        self._known = known
+        self._ranked = ranked
         return changed
 
 

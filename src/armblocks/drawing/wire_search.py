@@ -27,20 +27,20 @@ BLOCKED = 1e6
 _MOST_BENDS = 14
 
 
-def grid_lines(exact: Sequence[float], wanted: Sequence[float], apart: float) -> Floats:
-    """All ``exact`` coordinates, and those of ``wanted`` that are ``apart`` from all others; sorted."""
-    kept = sorted(set(exact))
-    found, k = list(kept), 0
+def grid_lines(exact: Sequence[float], candidates: Sequence[float], apart: float) -> Floats:
+    """All ``exact`` coordinates, and those of ``candidates`` that are ``apart`` from all others; sorted."""
+    fixed = sorted(set(exact))
+    lines, k = list(fixed), 0
     last = -np.inf
-    for value in sorted(set(wanted)):
-        while k < len(kept) and kept[k] < value:
+    for value in sorted(set(candidates)):
+        while k < len(fixed) and fixed[k] < value:
             k += 1
-        near_exact = (k < len(kept) and kept[k] - value < apart) or (k > 0 and value - kept[k - 1] < apart)
+        near_exact = (k < len(fixed) and fixed[k] - value < apart) or (k > 0 and value - fixed[k - 1] < apart)
         if near_exact or value - last < apart:
             continue
-        found.append(value)
+        lines.append(value)
         last = value
-    return np.array(sorted(found))
+    return np.array(sorted(lines))
 
 
 def painted(rectangles: Floats, weights: Floats, line: Floats, levels: Floats) -> Floats:
@@ -60,10 +60,10 @@ def painted(rectangles: Floats, weights: Floats, line: Floats, levels: Floats) -
     corners = np.concatenate(
         [first * width + top, first * width + bottom, last * width + top, last * width + bottom]
     )
-    found = [
+    corner_weights = [
         np.bincount(corners, np.concatenate([weight, -weight, -weight, weight]), size) for weight in weights.T
     ]
-    sums = np.array(found, dtype=np.float64).reshape(-1, len(line) + 1, width)
+    sums = np.array(corner_weights, dtype=np.float64).reshape(-1, len(line) + 1, width)
     return np.cumsum(np.cumsum(sums, axis=1), axis=2)[:, : len(line) - 1, : len(levels)]
 
 
@@ -94,18 +94,18 @@ class Grid:
         """
         left = np.abs(self.ys - self.ys[goal[0]])[:, None] + np.abs(self.xs - self.xs[goal[1]])
         rows, columns = _Sweeps(self.right, self.turn.T, left.T), _Sweeps(self.down, self.turn, left)
-        arriving, place = (rows, goal[::-1]) if flat else (columns, goal)
-        fresh = rows.sweep(rightwards.T), columns.sweep(downwards)
+        arriving, index = (rows, goal[::-1]) if flat else (columns, goal)
+        improved = rows.sweep(rightwards.T), columns.sweep(downwards)
         best, bends = min(most, BLOCKED / 2), -1
         for k in range(_MOST_BENDS):
-            if (cost := float(arriving.costs[k][place])) < best:
+            if (cost := float(arriving.costs[k][index])) < best:
                 best, bends = cost, k
             if best <= min(rows.bound, columns.bound) + BEND:
                 break
-            fresh = rows.bend(fresh[1]), columns.bend(fresh[0])
-        return self._way((rows, columns), bends, goal, 0 if flat else 1) if bends >= 0 else []
+            improved = rows.bend(improved[1]), columns.bend(improved[0])
+        return self._corners((rows, columns), bends, goal, 0 if flat else 1) if bends >= 0 else []
 
-    def _way(self, sides: tuple[_Sweeps, _Sweeps], bends: int, goal: Node, arrival: int) -> list[Point]:
+    def _corners(self, sides: tuple[_Sweeps, _Sweeps], bends: int, goal: Node, arrival: int) -> list[Point]:
         row, column, side = *goal, arrival
         points = [(float(self.xs[column]), float(self.ys[row]))]
         for k in range(bends, -1, -1):
@@ -119,7 +119,7 @@ class Grid:
 
 
 class _Sweeps:
-    """The sweeps along the rows of a grid, or along its columns. Arrays are (places along, lines)."""
+    """The sweeps along the rows of a grid, or along its columns. Arrays are (nodes along, lines)."""
 
     def __init__(self, edges: Floats, turn: Truths, left: Floats) -> None:
         self._along = np.zeros((edges.shape[0] + 1, edges.shape[1]))
@@ -142,16 +142,16 @@ class _Sweeps:
         np.minimum(costs, forwards, out=costs)
         self._begins.append(begins)
         self.costs.append(costs)
-        fresh = np.where(costs < self._best, costs, np.inf)
+        improved = np.where(costs < self._best, costs, np.inf)
         np.minimum(self._best, costs, out=self._best)
-        self.bound = float(np.min(fresh + self._left))
-        return fresh
+        self.bound = float(np.min(improved + self._left))
+        return improved
 
     def bend(self, across: Floats) -> Floats:
         """Sweep after a bend from nodes with these costs in the other direction."""
         return self.sweep(across.T + self._turning)
 
-    def origin(self, k: int, line: int, place: int) -> int:
-        """The place on a line at which the route with ``k`` bends to ``place`` has entered this line."""
+    def origin(self, k: int, line: int, node: int) -> int:
+        """The node of a line at which the route with ``k`` bends to ``node`` has entered this line."""
         along = self._along[:, line]
-        return int(np.argmin(self._begins[k][:, line] + np.abs(along - along[place])))
+        return int(np.argmin(self._begins[k][:, line] + np.abs(along - along[node])))

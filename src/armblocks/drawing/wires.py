@@ -79,14 +79,14 @@ def bent(source: WireEnd, bends: Sequence[float], target: WireEnd) -> tuple[Poin
 
 def corners(points: Sequence[Point]) -> tuple[Point, ...]:
     """The points without repetitions and without those on a straight line between their neighbours."""
-    kept: list[Point] = []
+    result: list[Point] = []
     for point in points:
-        if kept and point == kept[-1]:
+        if result and point == result[-1]:
             continue
-        if len(kept) > 1:
-            (ax, ay), (bx, by) = kept[-2], kept[-1]
+        if len(result) > 1:
+            (ax, ay), (bx, by) = result[-2], result[-1]
             if (ax == bx == point[0]) or (ay == by == point[1]):
-                kept[-1] = point
+                result[-1] = point
                 continue
-        kept.append(point)
-    return tuple(kept)
+        result.append(point)
+    return tuple(result)

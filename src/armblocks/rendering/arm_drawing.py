@@ -1,5 +1,4 @@
-"""Drawings of an arm: one pose, or several poses of a motion with the tool's path (the paper's Figures 10,
-11)."""
+"""Drawings of an arm: one pose, or poses of a motion with the tool's path (the paper's Figures 10 and 11)."""
 
 from __future__ import annotations
 
@@ -65,9 +64,9 @@ class Stage:
             floor = math.floor(float(low[2]) / (spacing / 2)) * (spacing / 2)
         x0, y0 = ((math.floor(float(v) / spacing) - 8) * spacing for v in low[:2])
         x1, y1 = ((math.ceil(float(v) / spacing) + 8) * spacing for v in high[:2])
-        under = np.array([(x, y, floor) for x in (low[0], high[0]) for y in (low[1], high[1])])
+        floor_corners = np.array([(x, y, floor) for x in (low[0], high[0]) for y in (low[1], high[1])])
         # The corners of the floor may touch the edge of the panel, the arm must not.
-        camera = Camera.framing(np.concatenate([points, under]), width, height, margin=margin)
+        camera = Camera.framing(np.concatenate([points, floor_corners]), width, height, margin=margin)
         return cls(
             bodies=bodies,
             pedestal=_pedestal(robot, foot, floor),
@@ -96,14 +95,14 @@ def moments_picture(
     ``time`` (N,) s, ``poses`` (N, L+2, 4, 4): base, links and tool in the world.
     """
     instants: _Array = np.linspace(float(time[0]), float(time[-1]), moments)
-    picked = [int(np.argmin(np.abs(time - instant))) for instant in instants.tolist()]
+    samples = [int(np.argmin(np.abs(time - instant))) for instant in instants.tolist()]
     path = poses[:, -1, :3, 3]
     gap = 12.0
     width = (FIGURE_WIDTH - gap * (columns - 1)) / columns
     width = math.floor(width)
     height, caption = round(width * 0.84), 34.0
-    stage = Stage.framing(robot, poses[picked], path, width, height, margin=16.0)
-    ghost = stage.render(stage.meshes(poses[picked[0]]))
+    stage = Stage.framing(robot, poses[samples], path, width, height, margin=16.0)
+    ghost = stage.render(stage.meshes(poses[samples[0]]))
     floor = _floor(stage)
     rows = math.ceil(moments / columns)
     picture = Picture(
@@ -112,11 +111,11 @@ def moments_picture(
         title=f"{robot.name} at {moments} moments",
         description=(
             f"The arm {robot.name} at "
-            + ", ".join(f"{axis_number(float(time[k]))} s" for k in picked)
-            + f"; the tool goes from {_position(path[picked[0]])} to {_position(path[picked[-1]])}."
+            + ", ".join(f"{axis_number(float(time[k]))} s" for k in samples)
+            + f"; the tool goes from {_position(path[samples[0]])} to {_position(path[samples[-1]])}."
         ),
     )
-    for number, k in enumerate(picked):
+    for number, k in enumerate(samples):
         left = (number % columns) * (width + gap)
         top = (number // columns) * (height + caption + gap)
         panel = Picture(width=width, height=height + caption, title="")
@@ -132,7 +131,7 @@ def moments_picture(
         )
         picture.place(panel, left, top)
     note = f"Floor grid {axis_number(stage.grid[0])} m, floor at z = {axis_number(stage.floor, 3)} m"
-    if len(picked) > 1:
+    if len(samples) > 1:
         note += "; pale: the pose at the start"
     picture.add(Text(2, picture.height - 6, note, size=SMALL_SIZE, tone=Tone.MUTED))
     return picture
@@ -265,9 +264,9 @@ def _thinned(points: _Array, tolerance: float = 0.6) -> _Array:
     """Points that are at least ``tolerance`` px apart along the line, including the first and the last."""
     if len(points) < 3:
         return points
-    walked = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    keep = np.unique(np.searchsorted(walked, np.arange(0.0, walked[-1], 4 * tolerance)))
-    return points[np.unique(np.concatenate([[0], keep, [len(points) - 1]]))]
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    indices = np.unique(np.searchsorted(length, np.arange(0.0, length[-1], 4 * tolerance)))
+    return points[np.unique(np.concatenate([[0], indices, [len(points) - 1]]))]
 
 
 def _pedestal(robot: Robot, foot: float, floor: float) -> tuple[TriangleMesh, ...]:

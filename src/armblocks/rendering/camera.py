@@ -18,8 +18,10 @@ ELEVATION = 20.0
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Camera:
-    """A camera: rows of ``axes`` are right, up and towards the viewer in the world frame; ``eye`` is in m; px
-    = scale X / depth + shift."""
+    """A pinhole camera: px = scale X / depth + shift.
+
+    Rows of ``axes`` are right, up and towards the viewer in the world frame; ``eye`` is in m.
+    """
 
     axes: _Array
     eye: _Array
@@ -63,8 +65,7 @@ class Camera:
         return cls(axes=axes, eye=eye, scale=scale, shift=shift)
 
     def project(self, points: _Array) -> tuple[_Array, _Array, _Array]:
-        """Position in px to the right and downwards, and 1/depth (1/m, larger is nearer), of points (...,
-        3)."""
+        """Positions to the right and downwards (px), and 1/depth (1/m, large is near), of points (..., 3)."""
         local = (points - self.eye) @ self.axes.T
         nearness = -1.0 / local[..., 2]
         return (

@@ -58,8 +58,8 @@ class Rendering:
         row = np.floor(y * self.scale).astype(np.intp) - self.top
         rows, columns = self.nearness.shape
         inside = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
-        found = self.nearness[np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1)]
-        return np.where(inside, found, 0.0)
+        nearness = self.nearness[np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1)]
+        return np.where(inside, nearness, 0.0)
 
 
 def render(
@@ -83,9 +83,9 @@ def render(
     columns, rows = (right - left) * SUPERSAMPLES, (bottom - top) * SUPERSAMPLES
     x, y = (x - left) * SUPERSAMPLES, (y - top) * SUPERSAMPLES
     doubled_area = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) - (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0])
-    seen = doubled_area < -1e-9  # y runs downwards: anticlockwise is negative
-    x, y, nearness, doubled_area = x[seen], y[seen], nearness[seen], doubled_area[seen]
-    normals, material = normals[seen], material[seen]
+    front = doubled_area < -1e-9  # y runs downwards: anticlockwise is negative
+    x, y, nearness, doubled_area = x[front], y[front], nearness[front], doubled_area[front]
+    normals, material = normals[front], material[front]
 
     # Pass 2: fragments, and the nearest of each pixel.
     triangle, column, row = _fragments(x, y, columns, rows)
@@ -130,8 +130,7 @@ def _block_means(planes: _Array, n: int) -> _Array:
 
 
 def _extent(values: _Array, limit: int) -> tuple[int, int]:
-    """The visible range of pixels along one side of the panel: the first, and one after the last; at least
-    one."""
+    """The visible pixels along one side of the panel: the first, and one after the last; at least one."""
     low = min(max(int(np.floor(values.min())) - 1, 0), limit - 1)
     return low, max(min(int(np.ceil(values.max())) + 1, limit), low + 1)
 
@@ -210,11 +209,11 @@ def _fragments(x: _Array, y: _Array, columns: int, rows: int) -> tuple[_Index, _
         xi, yi, xj, yj = x[triangle, i], y[triangle, i], x[triangle, j], y[triangle, j]
         crossed = ((yi <= centre) & (centre < yj)) | ((yj <= centre) & (centre < yi))
         with np.errstate(divide="ignore", invalid="ignore"):
-            at = xi + (xj - xi) * (centre - yi) / (yj - yi)
-        left = np.where(crossed, np.minimum(left, at), left)
-        right = np.where(crossed, np.maximum(right, at), right)
-    some = right >= left
-    triangle, row, left, right = triangle[some], row[some], left[some], right[some]
+            crossing = xi + (xj - xi) * (centre - yi) / (yj - yi)
+        left = np.where(crossed, np.minimum(left, crossing), left)
+        right = np.where(crossed, np.maximum(right, crossing), right)
+    not_empty = right >= left
+    triangle, row, left, right = triangle[not_empty], row[not_empty], left[not_empty], right[not_empty]
     first = np.clip(np.ceil(left - 0.5), 0, columns).astype(np.intp)
     last = np.clip(np.ceil(right - 0.5) - 1, -1, columns - 1).astype(np.intp)
     span, column = _ranges(first, np.maximum(last - first + 1, 0))
@@ -222,8 +221,7 @@ def _fragments(x: _Array, y: _Array, columns: int, rows: int) -> tuple[_Index, _
 
 
 def _ranges(first: _Index, counts: _Index) -> tuple[_Index, _Index]:
-    """For the concatenated ranges ``first[k] .. first[k] + counts[k] - 1``: the range index and the
-    number."""
+    """Range index and number of each entry of the ranges ``first[k] .. first[k] + counts[k] - 1``."""
     owner = np.repeat(np.arange(len(first)), counts)
     begin = np.cumsum(counts) - counts
     return owner, np.arange(len(owner)) - begin[owner] + first[owner]
@@ -265,12 +263,12 @@ def _outlines(nearness: _Array, facing: _Array) -> _Array:
         (factor[:-1], nearness[:-1], nearness[1:], facing[:, :-1], facing[:, 1:]),
         (factor[:, :-1], nearness[:, :-1], nearness[:, 1:], facing[:, :, :-1], facing[:, :, 1:]),
     )
-    for target, here, there, facing_here, facing_there in views:
-        both = (here > 0) & (there > 0)
-        jump = both & (np.abs(there - here) > 0.006 * here)
-        aligned = facing_here[0] * facing_there[0]
-        aligned += facing_here[1] * facing_there[1]
-        aligned += facing_here[2] * facing_there[2]
+    for target, near, other, facing_near, facing_other in views:
+        both = (near > 0) & (other > 0)
+        jump = both & (np.abs(other - near) > 0.006 * near)
+        aligned = facing_near[0] * facing_other[0]
+        aligned += facing_near[1] * facing_other[1]
+        aligned += facing_near[2] * facing_other[2]
         target[both & (aligned < 0.55)] *= 0.72
         target[jump] *= 0.6
     return factor

@@ -28,7 +28,7 @@ from armblocks.studio.protocol.messages.sheet_edits import (
 )
 from armblocks.studio.protocol.messages.sheets import SheetChange
 from armblocks.studio.sheet.document import Document
-from armblocks.studio.sheet.lines import SheetLines, other_lines
+from armblocks.studio.sheet.lines import SheetLines, changed_lines
 from armblocks.studio.sheet.shown import sheet, sheet_change
 
 HERE = Place(x=0, y=0)
@@ -201,7 +201,7 @@ def test_random_edits_of_two_pages_overwrite_no_unseen_change_and_converge(seed:
             if author != page.name and version > page.version:
                 assert not clash(touched, theirs), "an edit that the page had not seen was overwritten"
         done.append((document.version, page.name, touched))
-        changed = other_lines(lines.of(before), lines.of(document.diagram))
+        changed = changed_lines(lines.of(before), lines.of(document.diagram))
         for listener in pages:
             listener.coming.append((document.version, sheet_change(before, document.diagram, changed)))
     for page in pages:

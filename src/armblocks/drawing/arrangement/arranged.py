@@ -13,40 +13,41 @@ from armblocks.drawing.arrangement.rows import heights
 from armblocks.drawing.block_boxes import NAME_ROOM, Box, flipped_box
 
 _GAP = 42.0
+"""Width of the gap between two columns without vertical lines, px."""
 _LANE = 11.0
-"""Width (px) of the gap between two columns without upright lines, and of one such line."""
+"""Additional width of the gap for each vertical line in it, px."""
 _PART_GAP = 44.0
 _MANY_NODES = 120
-"""Nodes of a part from which on its order is sought once."""
+"""A part with more nodes is ordered only once, without exchanged lines at sums."""
 _MOST_WIDTH = 900.0
-"""px that a row of single blocks may be wide."""
+"""Maximum width of a row of unconnected blocks, px."""
 
 
 def arranged_boxes(diagram: Diagram, sized: Mapping[str, Box]) -> dict[str, Box]:
-    """The boxes of a sheet at their automatic places; ``sized``: at any place, with sizes."""
+    """The boxes of a sheet at their automatic positions; ``sized``: boxes with sizes, at any position."""
     network = Network.of(diagram, sized)
     placed: dict[str, Box] = {}
-    y, single = 0.0, list[int]()
+    y, unconnected = 0.0, list[int]()
     for members in network.components():
         if len(members) == 1 and not network.part(members).links:
-            single += members
+            unconnected += members
             continue
         part = _part(network.part(members))
         for box in part:
             placed[box.name] = box.at(box.x, box.y + y)
         y += max(box.y + box.height for box in part) + NAME_ROOM + _PART_GAP
-    x = below = 0.0
-    for box in (network.boxes[k] for k in single):
+    x = row_height = 0.0
+    for box in (network.boxes[k] for k in unconnected):
         width = max(box.width, box.name_width)
         if x and x + width > _MOST_WIDTH:
-            x, y, below = 0.0, y + below, 0.0
+            x, y, row_height = 0.0, y + row_height, 0.0
         placed[box.name] = box.at(round(x + (width - box.width) / 2), y)
-        x, below = x + width + _GAP, max(below, box.height + NAME_ROOM + _GAP / 2)
+        x, row_height = x + width + _GAP, max(row_height, box.height + NAME_ROOM + _GAP / 2)
     return {name: placed[name] for name in diagram.blocks}
 
 
 def _part(network: Network) -> list[Box]:
-    """The boxes of a connected part, from (0, 0)."""
+    """The boxes of a connected part, whose upper left corner is (0, 0)."""
     flow = signal_flow(network)
     boxes = [flipped_box(box) if k in flow.mirrored else box for k, box in enumerate(network.boxes)]
     network = Network(network.names, tuple(boxes), network.links)
@@ -68,7 +69,10 @@ def _part(network: Network) -> list[Box]:
 
 
 def _best_order(network: Network, flow: Flow) -> tuple[Columns, list[list[int]]]:
-    """Columns and their order; of round sums with three inputs with the better of two orders of the lines."""
+    """The columns and the order of their nodes.
+
+    At a round sum with three inputs, the lines from above and below are exchanged if that costs less.
+    """
     columns = in_columns(network, flow)
     cost, order = ordered(columns)
     if len(columns.column) > _MANY_NODES:
@@ -77,15 +81,15 @@ def _best_order(network: Network, flow: Flow) -> tuple[Columns, list[list[int]]]
     sums = [k for k, box in enumerate(network.boxes) if network.is_round(k) and len(box.inputs) == 3]
     for node in [k for k in sums if sum(link.target == k for link in network.links) == 3]:
         other = in_columns(network, flow, exchanged | {node})
-        found, other_order = ordered(other)
-        if found < cost - 1e-9:
+        other_cost, other_order = ordered(other)
+        if other_cost < cost - 1e-9:
             exchanged |= {node}
-            columns, cost, order = other, found, other_order
+            columns, cost, order = other, other_cost, other_order
     return columns, order
 
 
 def _lanes(columns: Columns, tops: Sequence[float], gap: int) -> int:
-    """How many upright lines stand side by side in the gap to the right of a column."""
+    """The maximum number of vertical lines side by side in the gap to the right of a column."""
     spans: dict[int, tuple[float, float]] = {}
     for piece in columns.pieces:
         if piece.gap != gap or not (piece.a.level and piece.b.level):

@@ -1,7 +1,8 @@
 """The columns of the blocks, and the lines between neighbouring columns.
 
-A line over several columns gets a knot in each that it passes, so that rows keep room for it. A line that
-runs backwards turns round at a knot in the column of its source, and at one in the column of its target.
+A line over several columns gets a dummy node in each column that it passes, which reserves space for the
+line. A backward line reverses its direction at a dummy node in the column of its source, and again at one in
+the column of its target.
 """
 
 from __future__ import annotations
@@ -15,9 +16,10 @@ from armblocks.drawing.arrangement.links import Link, Network
 
 _PASSES = 4
 _MOST_PATHS = 40
-_AT_SINK = 1000.0
+_SINK_BONUS = 1000.0
+"""Value of a path that ends at a sink, in blocks."""
 _FURTHER_TERM = 1.4
-"""By how many blocks a path is longer that enters a sum by its first port."""
+"""Reduction of the value of a path that does not enter a sum by its first port, in blocks."""
 _ABOVE, _BELOW = -0.3, 0.3
 """Heights of the ports of a round sum relative to its middle, as a share of its height."""
 
@@ -52,13 +54,13 @@ class Piece:
 
     @property
     def turns(self) -> bool:
-        """Whether the line turns round, because both ends are in one column."""
+        """Whether the line reverses its direction: both ends are in one column."""
         return self.a.right == self.b.right
 
 
 @dataclass(frozen=True)
 class Columns:
-    """Nodes in columns: first the blocks, then the knots of long lines."""
+    """Nodes in columns: first the blocks, then the dummy nodes of long lines."""
 
     column: list[int]
     pieces: list[Piece]
@@ -66,12 +68,12 @@ class Columns:
     paths: tuple[tuple[int, ...], ...]
     """The blocks of the main path, from its source to its sink, and then of further paths."""
     path: dict[int, int] = field(default_factory=dict[int, int])
-    """The number of the path of each node on one."""
+    """The number of the path of each node that is on a path."""
     nets: list[int] = field(default_factory=list[int])
-    """The net of each knot."""
-    turned: frozenset[int] = frozenset()
+    """The net of each dummy node."""
+    two_input_sums: frozenset[int] = frozenset()
     """Round sums with two inputs."""
-    back: frozenset[int] = frozenset()
+    mirrored: frozenset[int] = frozenset()
     """Mirrored blocks."""
 
 
@@ -81,16 +83,16 @@ def in_columns(network: Network, flow: Flow, exchanged: frozenset[int] = frozens
     ``exchanged``: round sums whose upper and lower lines are exchanged.
     """
     column = _column_numbers(network, flow)
-    return _Threading(network, flow, column, _paths(network, flow), exchanged).columns()
+    return _LineSplitter(network, flow, column, _paths(network, flow), exchanged).columns()
 
 
 def _constraints(network: Network, flow: Flow) -> list[tuple[int, int, int]]:
-    """Pairs of blocks, and by how many columns the second stands at least to the right of the first."""
-    found: dict[tuple[int, int], int] = {}
-    around = _around_one(network, flow)
+    """Pairs of blocks, and the minimum number of columns from the first to the second, to the right."""
+    distances: dict[tuple[int, int], int] = {}
+    local = _local_feedback(network, flow)
     for k, link in enumerate(network.links):
         source, target = link.source, link.target
-        if source in around or target in around:
+        if source in local or target in local:
             continue
         if target in flow.mirrored:
             pair, least = (target, source), int(source in flow.mirrored)
@@ -100,12 +102,12 @@ def _constraints(network: Network, flow: Flow) -> list[tuple[int, int, int]]:
             continue
         else:
             pair, least = (source, target), 1
-        found[pair] = max(found.get(pair, 0), least)
-    return [(a, b, least) for (a, b), least in found.items()]
+        distances[pair] = max(distances.get(pair, 0), least)
+    return [(a, b, least) for (a, b), least in distances.items()]
 
 
-def _around_one(network: Network, flow: Flow) -> dict[int, int]:
-    """Mirrored blocks that feed back the output of a single block, and that block."""
+def _local_feedback(network: Network, flow: Flow) -> dict[int, int]:
+    """Maps each mirrored block that feeds one block's output back to that block's input to that block."""
     sources: dict[int, set[int]] = {}
     targets: dict[int, set[int]] = {}
     for link in network.links:
@@ -119,7 +121,7 @@ def _around_one(network: Network, flow: Flow) -> dict[int, int]:
 
 
 def _column_numbers(network: Network, flow: Flow) -> list[int]:
-    """The longest path from a source; then every block as near to its neighbours as its links allow."""
+    """The column of each block: by the longest path from a source, then moved close to its neighbours."""
     count = len(network.names)
     rules = _constraints(network, flow)
     left: list[list[tuple[int, int]]] = [[] for _ in range(count)]
@@ -138,45 +140,47 @@ def _column_numbers(network: Network, flow: Flow) -> list[int]:
         for node in order:
             if len(left[node]) > len(right[node]):
                 column[node] = max(column[a] + least for a, least in left[node])
-    for node, partner in _around_one(network, flow).items():
+    for node, partner in _local_feedback(network, flow).items():
         column[node] = column[partner]
     first = min(column, default=0)
     return [k - first for k in column]
 
 
 def _paths(network: Network, flow: Flow) -> tuple[tuple[int, ...], ...]:
-    """The main path, then the best path through the blocks that are left, and so on."""
+    """The main path, then repeatedly the best path through the remaining blocks."""
     links = [
         link
         for k, link in enumerate(network.links)
         if k not in flow.cut and not {link.source, link.target} & flow.mirrored
     ]
-    left = set(range(len(network.names))) - flow.mirrored
-    found: list[tuple[int, ...]] = []
-    while len(found) < _MOST_PATHS:
-        links = [link for link in links if link.source in left and link.target in left]
-        path = _best_path(network, links, left, at_end=0.0 if found else _AT_SINK)
-        if len(path) < 2 and found:
+    remaining = set(range(len(network.names))) - flow.mirrored
+    paths: list[tuple[int, ...]] = []
+    while len(paths) < _MOST_PATHS:
+        links = [link for link in links if link.source in remaining and link.target in remaining]
+        path = _best_path(network, links, remaining, sink_bonus=0.0 if paths else _SINK_BONUS)
+        if len(path) < 2 and paths:
             break
-        found.append(path)
-        left -= set(path)
-    return tuple(found)
+        paths.append(path)
+        remaining -= set(path)
+    return tuple(paths)
 
 
-def _best_path(network: Network, links: Sequence[Link], left: set[int], *, at_end: float) -> tuple[int, ...]:
-    """The longest path along the flow, through the first ports where it can choose.
+def _best_path(
+    network: Network, links: Sequence[Link], blocks: set[int], *, sink_bonus: float
+) -> tuple[int, ...]:
+    """The longest path through ``blocks`` along the flow; of several branches, that through first ports.
 
-    ``at_end``: by how many blocks a path is longer that leads to a sink.
+    ``sink_bonus``: value of a path that ends at a sink, in blocks.
     """
     count = len(network.names)
     leaving: list[list[Link]] = [[] for _ in range(count)]
     for link in links:
         leaving[link.source].append(link)
-    outward = {link.source for link in network.links}
+    feeding = {link.source for link in network.links}
     best: list[tuple[float, Link | None]] = [(0.0, None)] * count
     for node in reversed(forward_order(count, links)):
-        if node not in outward:
-            best[node] = (at_end, None)
+        if node not in feeding:
+            best[node] = (sink_bonus, None)
         for link in leaving[node]:
             bonus = 0.4 * (link.input == 0) + 0.2 * (link.output == 0)
             if link.input and network.is_sum(link.target):
@@ -186,7 +190,7 @@ def _best_path(network: Network, links: Sequence[Link], left: set[int], *, at_en
                 best[node] = (value, link)
     path: list[int] = []
     entered = {link.target for link in links}
-    starts = [k for k in sorted(left) if k not in entered]
+    starts = [k for k in sorted(blocks) if k not in entered]
     node = max(starts, key=lambda k: (best[k][0], -k), default=None)
     while node is not None:
         path.append(node)
@@ -195,8 +199,8 @@ def _best_path(network: Network, links: Sequence[Link], left: set[int], *, at_en
     return tuple(path)
 
 
-class _Threading:
-    """Lays the lines through the columns."""
+class _LineSplitter:
+    """Divides the lines into pieces between neighbouring columns, with dummy nodes in the columns."""
 
     def __init__(
         self,
@@ -222,8 +226,8 @@ class _Threading:
         for link in self._network.links:
             nets.setdefault((link.source, link.output), []).append(link)
         for number, ((source, output), links) in enumerate(sorted(nets.items())):
-            self._thread(number, source, output, sorted(links, key=lambda a: (a.target, a.input)))
-        turned = [
+            self._split_net(number, source, output, sorted(links, key=lambda a: (a.target, a.input)))
+        two_input_sums = [
             k
             for k, box in enumerate(self._network.boxes)
             if self._network.is_round(k) and len(box.inputs) == 2
@@ -235,75 +239,83 @@ class _Threading:
             self._paths,
             self._path,
             self._nets,
-            frozenset(turned),
+            frozenset(two_input_sums),
             self._flow.mirrored,
         )
 
-    def _thread(self, net: int, source: int, output: int, links: Sequence[Link]) -> None:
+    def _split_net(self, net: int, source: int, output: int, links: Sequence[Link]) -> None:
         column, mirrored = self._column, self._flow.mirrored
-        here = column[source]
+        source_column = column[source]
         start = self._end(source, source not in mirrored, output, inputs=False)
         backward: dict[int, End] = {}
-        """The line to the left, by column: its knots."""
+        """The dummy nodes of the line to the left, by column."""
 
-        def knot(at: int) -> End:
+        def dummy(at: int) -> End:
             column.append(at)
             self._nets.append(net)
             return End(len(column) - 1, True, 0.0, 0.0)
 
         def ahead(gap: int, target: int) -> End:
-            """Where a line enters a gap from its left. Lines to several targets have separate knots."""
+            """The left end of the piece in a gap. Lines to several targets have separate dummy nodes."""
             end = start
-            for at in range(here + 1, gap + 1):
-                before, end = end, knot(at)
+            for at in range(source_column + 1, gap + 1):
+                before, end = end, dummy(at)
                 if (source, target) in self._steps:
                     self._path[end.node] = self._steps[source, target]
                 self._join(net, at - 1, before, _on(end, right=False))
             return end
 
         def back(at: int) -> End:
-            """The knot of the line to the left in a column."""
+            """The dummy node of the line to the left in a column."""
             if at not in backward:
-                if source in mirrored and at == here:
+                if source in mirrored and at == source_column:
                     backward[at] = start
                     return start
-                if at == here:
-                    backward[at] = knot(at)
+                if at == source_column:
+                    backward[at] = dummy(at)
                     self._join(net, at, start, backward[at])
                 else:
                     after = back(at + 1)
-                    backward[at] = knot(at)
+                    backward[at] = dummy(at)
                     self._join(net, at, backward[at], _on(after, right=False))
             return backward[at]
 
         for link in links:
-            target, there = link.target, column[link.target]
+            target, target_column = link.target, column[link.target]
             if target in mirrored:
                 end = self._end(target, True, link.input)
-                if there == here and source not in mirrored:
-                    self._join(net, here, start, end)
+                if target_column == source_column and source not in mirrored:
+                    self._join(net, source_column, start, end)
                 else:
-                    self._join(net, there, end, _on(back(there + 1), right=False))
-            elif source not in mirrored and there > here:
-                self._join(net, there - 1, ahead(there - 1, target), self._end(target, False, link.input))
+                    self._join(net, target_column, end, _on(back(target_column + 1), right=False))
+            elif source not in mirrored and target_column > source_column:
+                self._join(
+                    net,
+                    target_column - 1,
+                    ahead(target_column - 1, target),
+                    self._end(target, False, link.input),
+                )
             else:
                 self._join(
-                    net, there - 1, _on(back(there), right=False), self._end(target, False, link.input)
+                    net,
+                    target_column - 1,
+                    _on(back(target_column), right=False),
+                    self._end(target, False, link.input),
                 )
 
     def _join(self, net: int, gap: int, a: End, b: End) -> None:
-        """Add a line; one that does not turn round begins at its left end."""
+        """Add a piece of a line; a piece between two columns begins at its left end."""
         self._pieces.append(Piece(net, gap, a, b))
 
-    def _end(self, block: int, right: bool, port: int, *, inputs: bool = True) -> End:
+    def _end(self, block: int, right: bool, number: int, *, inputs: bool = True) -> End:
         box = self._network.boxes[block]
-        spot = (box.inputs if inputs else box.outputs)[port]
+        port = (box.inputs if inputs else box.outputs)[number]
         if inputs and block in self._sides:
-            share = self._sides[block][port]
+            share = self._sides[block][number]
             return End(block, right, share, box.height / 2, level=share == 0.0)
-        if spot.dy:
+        if port.dy:
             return End(block, right, -0.48, 0.0, level=False)
-        height = spot.y - box.y
+        height = port.y - box.y
         return End(block, right, 0.9 * (height / box.height - 0.5), height)
 
 
@@ -314,9 +326,9 @@ def _on(end: End, *, right: bool) -> End:
 def _sum_ports(
     network: Network, flow: Flow, paths: Sequence[Sequence[int]], column: Sequence[int]
 ) -> dict[int, dict[int, float]]:
-    """The heights at which lines meet round sums: one from behind, feedback from below, others from above.
+    """Heights of the inputs of round sums: one from behind, feedback from below, others from above.
 
-    Of two lines that come back to one sum, that over more columns comes from above.
+    Of two feedback lines to one sum, the line over more columns comes from above.
     """
     entering: dict[int, list[tuple[int, Link]]] = {}
     for k, link in enumerate(network.links):
@@ -324,16 +336,16 @@ def _sum_ports(
             entering.setdefault(link.target, []).append((k, link))
     before = {after: node for path in paths for node, after in pairwise(path)}
     main = set(paths[0])
-    found: dict[int, dict[int, float]] = {}
+    port_shares: dict[int, dict[int, float]] = {}
     for node, links in entering.items():
         back = node in flow.mirrored
 
-        def comes_back(k: int, link: Link, back: bool = back) -> bool:
+        def is_feedback(k: int, link: Link, back: bool = back) -> bool:
             return not back and (k in flow.cut or link.source in flow.mirrored)
 
         links.sort(
             key=lambda entry: (
-                comes_back(*entry),
+                is_feedback(*entry),
                 before.get(entry[1].target) != entry[1].source,
                 back and entry[1].source not in flow.mirrored,
                 abs(column[entry[1].source] - column[node]) if not back else -column[entry[1].source],
@@ -344,20 +356,20 @@ def _sum_ports(
         )
         shares = {links[0][1].input: 0.0}
         rest = sorted(links[1:], key=lambda entry: _length(network, entry[1], column))
-        taken: set[float] = set()
+        used_shares: set[float] = set()
         for k, link in rest:
-            below = comes_back(k, link)
+            below = is_feedback(k, link)
             share = _BELOW if below else _ABOVE
-            if share in taken:
+            if share in used_shares:
                 share = -share
-            taken.add(share)
+            used_shares.add(share)
             shares[link.input] = share
-        found[node] = shares
-    return found
+        port_shares[node] = shares
+    return port_shares
 
 
 def _length(network: Network, link: Link, column: Sequence[int]) -> tuple[int, int]:
-    """Over how many columns a line comes back, also through a mirrored block; ties by port."""
+    """Number of columns that a feedback line spans, also through a mirrored block; then the port."""
     far = column[link.source]
     for other in network.links:
         if other.target == link.source:

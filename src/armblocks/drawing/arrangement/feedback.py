@@ -1,7 +1,7 @@
 """The signal flow of a diagram: the links that run backwards, and the blocks that are mirrored.
 
-A block is in the feedback path if all its paths lead to links that run backwards, and if its inputs come
-from the loop that is closed there. It is mirrored: its inputs are on the right.
+A block is in the feedback path if all its output paths lead to backward links and if its inputs come from the
+loop that these links close. Such a block is mirrored: its inputs are on the right.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ class Flow:
 
 
 def signal_flow(network: Network) -> Flow:
-    """Where the loops of a network are cut, and which blocks are mirrored."""
+    """The links at which the loops of a network are cut, and the blocks that are mirrored."""
     cut = cut_links(network)
     return Flow(cut, _Feedback(network, cut).blocks())
 
@@ -74,35 +74,35 @@ class _Feedback:
         }
         while True:
             goals = self._goals(chosen)
-            kept = {node for node in chosen if self._belongs(node, goals)}
-            if kept == chosen:
-                kept = chosen - self._beside_the_path(chosen)
-            if kept == chosen:
+            remaining = {node for node in chosen if self._belongs(node, goals)}
+            if remaining == chosen:
+                remaining = chosen - self._parallel_models(chosen)
+            if remaining == chosen:
                 return frozenset(chosen)
-            chosen = kept
+            chosen = remaining
 
     def _ends(self) -> list[int]:
         """The blocks to which the forward path leads: sinks, else integrators at the end of the path."""
-        sinks = [node for node, found in enumerate(self._leaving) if not found]
+        sinks = [node for node, links in enumerate(self._leaving) if not links]
         if sinks:
             return sinks
-        last = [node for node, found in enumerate(self._leaving) if all(k in self._cut for k in found)]
+        last = [node for node, links in enumerate(self._leaving) if all(k in self._cut for k in links)]
         memory = self._network.memory()
         return [node for node in last if memory[node]] or last
 
     def _goals(self, chosen: set[int]) -> dict[int, frozenset[int]]:
-        """For every chosen block the targets of the backward links that its paths lead to.
+        """For every chosen block, the targets of the backward links to which its paths lead.
 
         -1: a block that is not chosen.
         """
         goals: dict[int, frozenset[int]] = {}
         for node in reversed(self._order):
             if node in chosen:
-                found: set[int] = set()
+                targets: set[int] = set()
                 for k in self._leaving[node]:
                     target = self._links[k].target
-                    found |= {target} if k in self._cut else goals.get(target, {-1})
-                goals[node] = frozenset(found)
+                    targets |= {target} if k in self._cut else goals.get(target, {-1})
+                goals[node] = frozenset(targets)
         return goals
 
     def _belongs(self, node: int, goals: dict[int, frozenset[int]]) -> bool:
@@ -115,17 +115,17 @@ class _Feedback:
                 return False
             if source in goals:
                 continue
-            around_one = len(self._entering[node]) == 1 and goals[node] == frozenset([source])
-            if around_one and all(link in self._cut for link in self._leaving[node]):
+            is_local = len(self._entering[node]) == 1 and goals[node] == frozenset([source])
+            if is_local and all(link in self._cut for link in self._leaving[node]):
                 continue
             if not all(self._ahead[goal] >> source & 1 for goal in goals[node]):
                 return False
         return True
 
-    def _beside_the_path(self, chosen: set[int]) -> set[int]:
-        """Models parallel to the forward path, and the blocks that compare them with it."""
+    def _parallel_models(self, chosen: set[int]) -> set[int]:
+        """Models parallel to the forward path, and the blocks that compare their outputs with the path."""
         memory = self._network.memory()
-        found: set[int] = set()
+        parallel: set[int] = set()
         for node in sorted(chosen):
             sources = [self._links[k].source for k in self._entering[node]]
             outside = [source for source in sources if source not in chosen]
@@ -136,5 +136,5 @@ class _Feedback:
                     source = self._links[self._entering[source][0]].source
                 modelled = any(memory[k] for k in chain)
                 if modelled and any(self._ahead[source] >> other & 1 for other in outside):
-                    found |= {node, *chain}
-        return found
+                    parallel |= {node, *chain}
+        return parallel

@@ -1,4 +1,4 @@
-"""The connections of a diagram as links between numbered blocks, and which of them a person would cut."""
+"""The connections of a diagram as links between numbered blocks, with the price of cutting each of them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _INTO_FURTHER_TERM = 1.5
 _FED_BACK = 1.0
 """Price of a cut in front of a further input of a sum: with a plus, and with a minus."""
 _OUT_OF_MEMORY = 0.5
-"""Factor where the link leaves a block with memory: states are what is fed back."""
+"""Factor of the price of a link that leaves a block with a state, because states are usually fed back."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Link:
     target: int
     input: int
     price: float
-    """What it costs to cut this link, relative to other links of the same loop."""
+    """Price of cutting this link, relative to other links of the same loop."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,7 @@ class Network:
 
     @classmethod
     def of(cls, diagram: Diagram, sized: Mapping[str, Box]) -> Network:
-        """The network of a sheet; ``sized``: its blocks with sizes and ports, at any place."""
+        """The network of a sheet; ``sized``: its blocks with sizes and ports, at any position."""
         names = tuple(sorted(diagram.blocks))
         number = {name: k for k, name in enumerate(names)}
         inputs = {name: {p.name: k for k, p in enumerate(sized[name].inputs)} for name in names}
@@ -97,10 +97,10 @@ class Network:
         for link in self.links:
             a, b = sorted((find(link.source), find(link.target)))
             leader[b] = a
-        found: dict[int, list[int]] = {}
+        components: dict[int, list[int]] = {}
         for k in range(len(leader)):
-            found.setdefault(find(k), []).append(k)
-        return sorted(found.values(), key=lambda members: (-len(members), members))
+            components.setdefault(find(k), []).append(k)
+        return sorted(components.values(), key=lambda members: (-len(members), members))
 
     def is_round(self, k: int) -> bool:
         """Whether a block is a round sum, whose inputs are on the sides from which their lines come."""
@@ -108,16 +108,16 @@ class Network:
         return len(box.inputs) in (2, 3) and is_circle(box)
 
     def may_be_mirrored(self, k: int) -> bool:
-        """Whether a source may stand to the right of the block that it feeds."""
+        """Whether a source may be placed to the right of the block that it feeds."""
         return not isinstance(self.boxes[k].block, Inport)
 
     def is_state(self, k: int) -> bool:
-        """Whether a block has memory and is no filter or controller."""
+        """Whether a block has memory and is not a filter or controller."""
         block = self.boxes[k].block
         return has_memory(block) and not _is_filter(block)
 
     def is_constant(self, k: int) -> bool:
-        """Whether a block is a constant, which is no beginning of a signal path."""
+        """Whether a block is a constant, which does not start a signal path."""
         return isinstance(self.boxes[k].block, kinds.Constant)
 
     def is_sum(self, k: int) -> bool:
@@ -140,7 +140,7 @@ def is_circle(box: Box) -> bool:
 
 
 def has_memory(block: Block) -> bool:
-    """Whether a block has states, delays or such blocks inside."""
+    """Whether a block, or a block inside it, has states or delays."""
     if isinstance(block, DiagramBlock):
         return any(has_memory(inner) for inner in block.diagram.blocks.values())
     kind = type(block)

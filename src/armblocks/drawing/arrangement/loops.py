@@ -1,6 +1,6 @@
 """The links of a diagram that run against the signal flow.
 
-Every loop is cut at the links that a person would draw backwards: in front of the minus of a sum, behind an
+Every loop is cut at the links that are conventionally drawn backwards: into the minus of a sum, or out of an
 integrator.
 """
 
@@ -12,28 +12,29 @@ from armblocks.drawing.arrangement.links import Link, Network
 
 _BEGINNING = 2.0
 _MIRRORED_STATE = 1.5
-"""Price of a block that only links that run backwards feed, and of a plant that feeds only such links."""
+"""Price of a block that only backward links feed, and of a plant that feeds only backward links."""
 _ENTRY = 0.2
 """Price of a block before the one at which signals enter a loop from outside."""
 _PASSES = 8
 _FEW = 40
+"""A search starts from every block of a loop with at most this number of blocks."""
 _MANY = 150
-"""Blocks of a loop from which on fewer passes are made."""
+"""A loop with more blocks is improved in fewer passes."""
 
 
 def cut_links(network: Network) -> frozenset[int]:
-    """The numbers of the links that run backwards; the others have no loops."""
+    """The numbers of the backward links; the other links form no loop."""
     links, count = network.links, len(network.names)
-    place = [0] * count
+    rank = [0] * count
     for members in _strong_components(count, links):
         if len(members) > 1:
             for k, member in enumerate(_cheapest_order(members, network)):
-                place[member] = k
+                rank[member] = k
     loops = {member: k for k, members in enumerate(_strong_components(count, links)) for member in members}
     cut = {
         k
         for k, link in enumerate(links)
-        if loops[link.source] == loops[link.target] and place[link.source] >= place[link.target]
+        if loops[link.source] == loops[link.target] and rank[link.source] >= rank[link.target]
     }
     # A link is cut only if it closes a loop of links that are not cut.
     for k in sorted(cut, key=lambda k: (-links[k].price, k)):
@@ -50,7 +51,7 @@ def _strong_components(count: int, links: Sequence[Link]) -> list[list[int]]:
     after: list[list[int]] = [[] for _ in range(count)]
     for link in links:
         after[link.source].append(link.target)
-    found: list[list[int]] = []
+    components: list[list[int]] = []
     index, low, open_, path = [-1] * count, [0] * count, [False] * count, list[int]()
     number = 0
     for root in range(count):
@@ -76,15 +77,15 @@ def _strong_components(count: int, links: Sequence[Link]) -> list[list[int]]:
                 while not members or members[-1] != node:
                     members.append(path.pop())
                     open_[members[-1]] = False
-                found.append(sorted(members))
-    return found
+                components.append(sorted(members))
+    return components
 
 
 def _cheapest_order(members: Sequence[int], network: Network) -> list[int]:
-    """The blocks of a loop in the order in which the links that run backwards are cheap to cut.
+    """The blocks of a loop in the order with the lowest price of backward links.
 
-    The order of a depth-first search, improved by moving single blocks to their best places; of a small loop
-    the best of the searches from every block.
+    The order is that of a depth-first search, improved by moving single blocks. For a small loop it is the
+    best result of searches from every block.
     """
     links = network.links
     inside = set(members)
@@ -127,74 +128,74 @@ def _cheapest_order(members: Sequence[int], network: Network) -> list[int]:
 
 
 def _protect_inputs(price: Mapping[int, dict[int, float]], network: Network) -> None:
-    """Make it dearer to cut in front of a function than behind it."""
+    """Make the price of a cut before a function higher than that of a cut after it."""
     sources: dict[int, list[int]] = {member: [] for member in price}
     for source, prices in price.items():
         for target in prices:
             sources[target].append(source)
-    for member, found in sources.items():
-        if len(found) == 1 == len(network.boxes[member].inputs) and not network.is_state(member):
+    for member, feeding in sources.items():
+        if len(feeding) == 1 == len(network.boxes[member].inputs) and not network.is_state(member):
             behind = sum(price[member].values()) + _ENTRY
-            price[found[0]][member] = max(price[found[0]][member], behind)
+            price[feeding[0]][member] = max(price[feeding[0]][member], behind)
 
 
 def _cost(
     order: Sequence[int], price: Mapping[int, Mapping[int, float]], network: Network, inward: frozenset[int]
 ) -> float:
-    """The price of the links that run backwards, and of blocks of which nothing but these begins or ends.
+    """The price of the backward links, and of blocks with no other input or no other output.
 
-    ``inward``: the blocks that signals from outside enter.
+    ``inward``: the blocks with an input from outside the loop.
     """
-    place = {member: k for k, member in enumerate(order)}
+    rank = {member: k for k, member in enumerate(order)}
     fed: set[int] = set(inward)
     feeding: set[int] = set()
     cost = 0.0
     for source, prices in price.items():
         for target, value in prices.items():
-            if place[target] < place[source]:
+            if rank[target] < rank[source]:
                 cost += value
             elif value > _ENTRY:
                 fed.add(target)
                 feeding.add(source)
-    outside = {link.source for link in network.links if link.target not in place}
+    outside = {link.source for link in network.links if link.target not in rank}
     cost += _BEGINNING * sum(member not in fed for member in order)
     states = {member for member in order if network.is_state(member)}
     return cost + _MIRRORED_STATE * len(states - feeding - outside)
 
 
 def _depth_first(roots: Sequence[int], after: Mapping[int, Sequence[int]]) -> list[int]:
-    """Reverse postorder."""
-    seen: set[int] = set()
+    """The blocks in the reverse postorder of a depth-first search."""
+    visited: set[int] = set()
     order: list[int] = []
     for root in roots:
-        if root in seen:
+        if root in visited:
             continue
-        seen.add(root)
+        visited.add(root)
         stack = [(root, iter(after[root]))]
         while stack:
             node, targets = stack[-1]
-            target = next((t for t in targets if t not in seen), None)
+            target = next((t for t in targets if t not in visited), None)
             if target is None:
                 stack.pop()
                 order.append(node)
             else:
-                seen.add(target)
+                visited.add(target)
                 stack.append((target, iter(after[target])))
-        # Blocks of later roots stand before those of earlier ones, unless links decide.
+        # Blocks of later roots precede those of earlier roots, unless a link requires the opposite order.
     return order[::-1]
 
 
 def _moved(order: list[int], member: int, after: dict[int, float], before: dict[int, float]) -> bool:
-    """Move one block to the place where its backward links are cheapest; says whether it is another."""
-    here = order.index(member)
+    """Move one block to the index where its backward links are cheapest; return whether it has moved."""
+    old_index = order.index(member)
     others = [other for other in order if other != member]
     cost = sum(before.values())  # at the beginning, all links into the block run backwards
     costs = [cost]
     for other in others:
         cost += after.get(other, 0.0) - before.get(other, 0.0)
         costs.append(cost)
-    best = min(range(len(costs)), key=lambda k: (round(costs[k], 6), abs(k - here)))
-    if costs[best] > costs[here] - 1e-6:
+    best = min(range(len(costs)), key=lambda k: (round(costs[k], 6), abs(k - old_index)))
+    if costs[best] > costs[old_index] - 1e-6:
         return False
     order[:] = [*others[:best], member, *others[best:]]
     return True
@@ -204,13 +205,13 @@ def _reaches(start: int, goal: int, count: int, links: Sequence[Link]) -> bool:
     after: list[list[int]] = [[] for _ in range(count)]
     for link in links:
         after[link.source].append(link.target)
-    seen, stack = {start}, [start]
+    visited, stack = {start}, [start]
     while stack:
         node = stack.pop()
         if node == goal:
             return True
         for target in after[node]:
-            if target not in seen:
-                seen.add(target)
+            if target not in visited:
+                visited.add(target)
                 stack.append(target)
     return False

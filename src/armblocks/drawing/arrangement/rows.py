@@ -1,8 +1,8 @@
-"""Heights of the nodes: the main path in one row, lines straight, everything else as near as it can be.
+"""Heights of the nodes: the main path in one row, straight lines, and short distances elsewhere.
 
 Nodes that are joined by straight lines move together, as in Brandes and Köpf, *Fast and simple horizontal
-coordinate assignment*, 2002. The rows are placed one by one, the main path first, each where its lines are
-shortest between the rows that are placed already.
+coordinate assignment*, 2002. The rows are placed one by one, the main path first. Each row is placed where
+its lines are shortest, between the rows that already have a height.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from itertools import pairwise
 from armblocks.drawing.arrangement.columns import Columns, End, Piece
 
 BLOCK_GAP = 24.0
-"""px between a block and what stands below its name."""
+"""Distance between the name of a block and the next block below, px."""
 _LINE_GAP = 14.0
 _SUM_GAP = 48.0
-"""px between the middle of a round sum and the line that comes from above or below."""
+"""Distance between the middle of a round sum and the level of a line from above or below, px."""
 _ROUNDS = 12
 
 
@@ -45,7 +45,7 @@ class _Rows:
         self._members: list[list[int]] = [[node] for node in range(count)]
         self._weight = [0.0] * count
         self._size, self._name = size, name
-        self._turned = columns.turned
+        self._two_input_sums = columns.two_input_sums
         self._straight: dict[tuple[int, bool], int] = {}
         """The node at the other end of a straight line, by node and side."""
         self._align()
@@ -54,33 +54,33 @@ class _Rows:
         self._below: dict[int, dict[int, float]] = {row: {} for row in rows}
         for column in order:
             for upper, lower in pairwise(column):
-                least = self._least(upper, lower) + self._offset[upper] - self._offset[lower]
+                least = self._minimum_distance(upper, lower) + self._offset[upper] - self._offset[lower]
                 a, b = self._leader[upper], self._leader[lower]
                 self._above[b][a] = max(self._above[b].get(a, least), least)
                 self._below[a][b] = self._above[b][a]
         self._lines: dict[int, list[tuple[int, float, float]]] = {row: [] for row in rows}
-        """For every row: another row, how much lower than it this row wants to be, and how much."""
+        """For every row: a connected row, the distance below it for a straight line, and a weight."""
         for piece in self._pieces:
-            self._want(piece)
+            self._add_line(piece)
         self._y: dict[int, float] = {}
 
     # -- rows of straight lines ------------------------------------------------------------------------------
 
     def _align(self) -> None:
-        taken: set[tuple[int, bool]] = set()
-        kept: dict[int, list[tuple[int, int]]] = {}
+        aligned: set[tuple[int, bool]] = set()
+        straight_pairs: dict[int, list[tuple[int, int]]] = {}
         for piece in sorted((p for p in self._pieces if not p.turns), key=self._rank):
             left, right = (piece.a, piece.b) if piece.a.right else (piece.b, piece.a)
             if not (left.level and right.level):
                 continue
-            if (left.node, True) in taken or (right.node, False) in taken:
+            if (left.node, True) in aligned or (right.node, False) in aligned:
                 continue
             pair = self._position[left.node], self._position[right.node]
-            straight = kept.setdefault(piece.gap, [])
+            straight = straight_pairs.setdefault(piece.gap, [])
             if any((pair[0] - a) * (pair[1] - b) < 0 for a, b in straight):
                 continue
             straight.append(pair)
-            taken |= {(left.node, True), (right.node, False)}
+            aligned |= {(left.node, True), (right.node, False)}
             self._straight[right.node, False], self._straight[left.node, True] = left.node, right.node
             self._unite(left.node, right.node, left.port - right.port, self._strength(piece))
 
@@ -96,19 +96,19 @@ class _Rows:
 
     def _strength(self, piece: Piece) -> float:
         ends = piece.a.node, piece.b.node
-        knots = sum(node >= self._blocks for node in ends)
+        dummies = sum(node >= self._blocks for node in ends)
         paths = {self._path.get(node) for node in ends}
         if len(paths) == 1 and (path := paths.pop()) is not None:
             return max(100.0 - path, 10.0)
-        return (3.0, 2.0, 8.0)[knots]
+        return (3.0, 2.0, 8.0)[dummies]
 
     def _rank(self, piece: Piece) -> tuple[float, ...]:
         left, right = (piece.a, piece.b) if piece.a.right else (piece.b, piece.a)
         steps = abs(self._position[left.node] - self._position[right.node])
         return -self._strength(piece), steps, piece.gap, left.node, right.node, left.port, right.port
 
-    def _least(self, upper: int, lower: int) -> float:
-        """The distance of the upper edges of two neighbours in a column."""
+    def _minimum_distance(self, upper: int, lower: int) -> float:
+        """The minimum distance of the upper edges of two neighbours in a column."""
         if upper < self._blocks:
             gap = BLOCK_GAP if lower < self._blocks else _LINE_GAP
             return self._size[upper] + self._name + gap
@@ -119,7 +119,7 @@ class _Rows:
 
     # -- placing ---------------------------------------------------------------------------------------------
 
-    def _want(self, piece: Piece) -> None:
+    def _add_line(self, piece: Piece) -> None:
         shift = piece.a.port - piece.b.port + self._offset[piece.a.node] - self._offset[piece.b.node]
         for end, other, way in ((piece.a, piece.b, -1.0), (piece.b, piece.a, 1.0)):
             if not end.level:  # from above or below
@@ -132,26 +132,26 @@ class _Rows:
         self._lines[a].append((b, -shift, weight))
 
     def _from_below(self, end: End, other: End) -> bool:
-        """Whether a line meets a round sum from below; a sum with two inputs is turned to its line."""
+        """Whether a line meets a round sum from below; a sum with two inputs adapts its ports."""
         straight = self._straight.get((end.node, end.right))
-        if end.node in self._turned and end.right != other.right and straight is not None:
+        if end.node in self._two_input_sums and end.right != other.right and straight is not None:
             return self._position[other.node] > self._position[straight]
         return end.share > 0
 
     def place(self) -> None:
         """Place all rows, then move each between its neighbours to where its lines are shortest."""
         rank = {row: (-self._weight[row], -len(self._members[row]), row) for row in self._lines}
-        waiting = set(self._lines)
+        unplaced = set(self._lines)
         queue: list[tuple[tuple[float, int, int], int]] = []
-        while waiting:
-            while queue and queue[0][1] not in waiting:
+        while unplaced:
+            while queue and queue[0][1] not in unplaced:
                 heapq.heappop(queue)
-            row = heapq.heappop(queue)[1] if queue else min(waiting, key=lambda row: rank[row])
-            waiting.discard(row)
+            row = heapq.heappop(queue)[1] if queue else min(unplaced, key=lambda row: rank[row])
+            unplaced.discard(row)
             low, high = self._bound(row, self._above, 1.0), self._bound(row, self._below, -1.0)
-            self._y[row] = min(max(self._wish(row), low), high)
+            self._y[row] = min(max(self._median_height(row), low), high)
             for other, _, _ in self._lines[row]:
-                if other in waiting:
+                if other in unplaced:
                     heapq.heappush(queue, (rank[other], other))
         order = sorted(self._lines, key=lambda row: (self._y[row], row))
         for k in range(_ROUNDS):
@@ -159,44 +159,44 @@ class _Rows:
             for row in order if k % 2 else order[::-1]:
                 low = max((self._y[a] + d for a, d in self._above[row].items()), default=float("-inf"))
                 high = min((self._y[b] - d for b, d in self._below[row].items()), default=float("inf"))
-                y = min(max(self._wish(row), low), high)
+                y = min(max(self._median_height(row), low), high)
                 if abs(y - self._y[row]) > 0.5:
                     self._y[row] = y
                     moved = True
             if not moved:
                 break
 
-    def _wish(self, row: int) -> float:
+    def _median_height(self, row: int) -> float:
         """The weighted median of the heights at which single lines of a row are straight."""
-        wishes = sorted(
+        heights = sorted(
             (self._y[other] + shift, weight) for other, shift, weight in self._lines[row] if other in self._y
         )
-        if not wishes:
+        if not heights:
             return self._y.get(row, 0.0)
-        half, total = sum(weight for _, weight in wishes) / 2, 0.0
-        for k, (y, weight) in enumerate(wishes):
+        half, total = sum(weight for _, weight in heights) / 2, 0.0
+        for k, (y, weight) in enumerate(heights):
             total += weight
             if total > half + 1e-9:
                 return y
             if total > half - 1e-9:
-                following = wishes[min(k + 1, len(wishes) - 1)][0]
+                following = heights[min(k + 1, len(heights) - 1)][0]
                 return min(max(self._y.get(row, (y + following) / 2), y), following)
-        return wishes[-1][0]
+        return heights[-1][0]
 
     def _bound(self, row: int, beside: dict[int, dict[int, float]], way: float) -> float:
-        """The nearest height that the placed rows on one side allow, over rows that are not placed yet."""
-        # Longest paths through rows without a place, in the order of a depth-first search.
+        """The bound of a row's height by the placed rows on one side, also through rows without a height."""
+        # Longest paths through rows without a height, in the order of a depth-first search.
         order: list[int] = []
-        seen = {row}
+        visited = {row}
         stack = [(row, iter(beside[row]))]
         while stack:
             node, others = stack[-1]
-            other = next((o for o in others if o not in seen and o not in self._y), None)
+            other = next((o for o in others if o not in visited and o not in self._y), None)
             if other is None:
                 stack.pop()
                 order.append(node)
             else:
-                seen.add(other)
+                visited.add(other)
                 stack.append((other, iter(beside[other])))
         distance = {row: 0.0}
         bound = -way * float("inf")

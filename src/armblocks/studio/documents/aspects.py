@@ -19,35 +19,35 @@ def changed_aspects(before: Diagram, after: Diagram, path: Aspect = ()) -> set[A
     """Return the aspects in which two diagrams differ; identical objects are skipped."""
     if before is after:
         return set()
-    found: set[Aspect] = set()
+    aspects: set[Aspect] = set()
     for name in before.blocks.keys() | after.blocks.keys():
         old, new = before.blocks.get(name), after.blocks.get(name)
         if old is not new:
-            found |= _of_block((*path, name), old, new)
+            aspects |= _block_aspects((*path, name), old, new)
         if before.layout.get(name) != after.layout.get(name):
-            found.add((*path, name, "place"))
+            aspects.add((*path, name, "place"))
     if before.connections is not after.connections:
         for wire in set(before.connections) ^ set(after.connections):
-            found.add((*path, wire.target.block, f"{wire.target.port} <- wire"))
+            aspects.add((*path, wire.target.block, f"{wire.target.port} <- wire"))
     for wire in before.bends.keys() | after.bends.keys():
         if before.bends.get(wire) != after.bends.get(wire):
-            found.add((*path, wire.target.block, f"{wire.target.port} <- bends"))
+            aspects.add((*path, wire.target.block, f"{wire.target.port} <- bends"))
     for name in before.commented.keys() | after.commented.keys():
         if before.commented.get(name) != after.commented.get(name):
-            found.add((*path, name, "comment"))
+            aspects.add((*path, name, "comment"))
     for ref in before.signal_names.keys() | after.signal_names.keys():
         if before.signal_names.get(ref) != after.signal_names.get(ref):
-            found.add((*path, ref.block, f"{ref.port} -> name"))
+            aspects.add((*path, ref.block, f"{ref.port} -> name"))
     for note in before.notes.keys() | after.notes.keys():
         if before.notes.get(note) != after.notes.get(note):
-            found.add((*path, "/", note))
+            aspects.add((*path, "/", note))
     for name in before.mask_values.keys() | after.mask_values.keys():
         if before.mask_values.get(name) != after.mask_values.get(name):
-            found.add((*path, "/", f"mask parameter {name}"))
-    for of_whole in ("name", "description", "settings", "extras", "mask"):
-        if getattr(before, of_whole) != getattr(after, of_whole):
-            found.add((*path, "/", of_whole))
-    return found
+            aspects.add((*path, "/", f"mask parameter {name}"))
+    for field in ("name", "description", "settings", "extras", "mask"):
+        if getattr(before, field) != getattr(after, field):
+            aspects.add((*path, "/", field))
+    return aspects
 
 
 def clash(mine: Iterable[Aspect], theirs: Set[Aspect]) -> bool:
@@ -58,19 +58,19 @@ def clash(mine: Iterable[Aspect], theirs: Set[Aspect]) -> bool:
     return _covers(mine, theirs) or _covers(theirs, mine)
 
 
-def _covers(some: Set[Aspect], others: Set[Aspect]) -> bool:
-    whole = {aspect[:-1] for aspect in some if aspect[-1] == ""}
+def _covers(aspects: Set[Aspect], others: Set[Aspect]) -> bool:
+    whole = {aspect[:-1] for aspect in aspects if aspect[-1] == ""}
     return any(other[:k] in whole for other in others for k in range(1, len(other) + 1)) if whole else False
 
 
-def _of_block(path: Aspect, old: Block | None, new: Block | None) -> set[Aspect]:
+def _block_aspects(path: Aspect, old: Block | None, new: Block | None) -> set[Aspect]:
     if old is None or new is None or type(old) is not type(new):
         return {(*path, "")}
-    found: set[Aspect] = set()
+    aspects: set[Aspect] = set()
     for rule in new.parameters():
-        was, now = old.parameter_value(rule.name), new.parameter_value(rule.name)
-        if isinstance(was, Diagram) and isinstance(now, Diagram):
-            found |= changed_aspects(was, now, path)
-        elif was != now:
-            found.add((*path, rule.name))
-    return found
+        old_value, new_value = old.parameter_value(rule.name), new.parameter_value(rule.name)
+        if isinstance(old_value, Diagram) and isinstance(new_value, Diagram):
+            aspects |= changed_aspects(old_value, new_value, path)
+        elif old_value != new_value:
+            aspects.add((*path, rule.name))
+    return aspects

@@ -63,10 +63,10 @@ class Edited(History[Value], ABC):
                 self._check_kind(request.edit)
                 title, after, gesture = self.outcome(request)
                 if others and clash(self.aspects(self.value, after), others):
-                    raise self._overtaken("your change conflicts with a change from another page")
+                    raise self._conflict("your change conflicts with a change from another page")
                 self.replace(title, after, gesture)
             elif others:
-                raise self._overtaken(f"the {self.noun} was changed in another page meanwhile")
+                raise self._conflict(f"the {self.noun} was changed in another page meanwhile")
             elif request.does == "undo":
                 self.undo()
             else:
@@ -100,10 +100,10 @@ class Edited(History[Value], ABC):
         if request.base is None or request.base == self.version:
             return set()
         if not self._versions[0].number <= request.base <= self.version:
-            raise self._overtaken(f"the page shows a version of the {self.noun} that is too old")
-        known = [version for version in self._versions if version.number >= request.base]
+            raise self._conflict(f"the page shows a version of the {self.noun} that is too old")
+        versions = [version for version in self._versions if version.number >= request.base]
         changed: set[Aspect] = set()
-        for before, after in pairwise(known):
+        for before, after in pairwise(versions):
             if after.author != request.author:
                 changed |= self.aspects(before.value, after.value)
         return changed
@@ -112,7 +112,7 @@ class Edited(History[Value], ABC):
         super()._become(value)
         self._versions.append(Version(self.version, self._author, value))
 
-    def _overtaken(self, what: str) -> InputError:
+    def _conflict(self, what: str) -> InputError:
         return InputError(
             what,
             where=f"the {self.noun}",

@@ -22,8 +22,8 @@ from armblocks.errors import FormatError, InputError, UnknownNameError
 from armblocks.studio.documents.file_journal import SNAPSHOT_EVERY, FileJournal, JournaledFile
 from armblocks.studio.documents.file_kind import EditedT, FileKind
 from armblocks.studio.documents.journal import SYNC_SECONDS
-from armblocks.studio.documents.left_behind import LeftBehind
 from armblocks.studio.documents.project_folder import Disk, Fingerprint, ProjectFolder
+from armblocks.studio.documents.recoverable_files import RecoverableFiles
 from armblocks.studio.documents.state_folder import StateFolder
 from armblocks.studio.protocol.messages import documents as document_messages
 
@@ -91,7 +91,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
         self._open: dict[str, OpenedT] = {}
         self._same: dict[str, str] = {}
         """Keys that pages of an earlier server use for documents that are now open under another key."""
-        self.left = LeftBehind(folder, state_folder.journals, kind)
+        self.left = RecoverableFiles(folder, state_folder.journals, kind)
         self._notify: Callable[[OpenedT], Awaitable[None]] | None = None
 
     @abstractmethod

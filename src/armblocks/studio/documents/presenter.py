@@ -1,6 +1,7 @@
 """The interface for opening and displaying one kind of document.
 
-:class:`~armblocks.studio.documents.desk.DocumentDesk` handles the requests, in the same way for every kind.
+:class:`~armblocks.studio.documents.requests.DocumentRequests` handles the requests of all kinds in the
+same way.
 """
 
 from __future__ import annotations

@@ -18,9 +18,9 @@ from armblocks.blocks import BLOCKS
 from armblocks.drawing.diagram_file import drawing_bytes
 from armblocks.errors import ArmblocksError, InertiaWarning
 from armblocks.robot import Robot
-from armblocks.studio.documents.desk import DocumentDesk
 from armblocks.studio.documents.project_data import ProjectData
 from armblocks.studio.documents.project_folder import ProjectFolder
+from armblocks.studio.documents.requests import DocumentRequests
 from armblocks.studio.documents.state_folder import StateFolder
 from armblocks.studio.documents.trusted_files import TrustedFiles
 from armblocks.studio.protocol.answers import Answers
@@ -28,13 +28,13 @@ from armblocks.studio.protocol.envelope import Envelope, Reply
 from armblocks.studio.protocol.message import Fault
 from armblocks.studio.protocol.messages.studio import FileList, Files, Ping, Welcome
 from armblocks.studio.protocol.page import NoRequestError, Page, Pages
-from armblocks.studio.robots.desk import RobotDesk
 from armblocks.studio.robots.open_robots import OpenRobots
 from armblocks.studio.robots.presenter import RobotPresenter
+from armblocks.studio.robots.requests import RobotRequests
 from armblocks.studio.runs.checks import Checks
-from armblocks.studio.runs.desk import RunDesk
+from armblocks.studio.runs.diagram_runs import DiagramRuns
 from armblocks.studio.runs.settings import setting_rules, solver_choices
-from armblocks.studio.sheet.data_desk import DataDesk
+from armblocks.studio.sheet.data_requests import DataRequests
 from armblocks.studio.sheet.lines import LinesOfSheets
 from armblocks.studio.sheet.nesting import with_robot
 from armblocks.studio.sheet.open_documents import OpenDocuments
@@ -63,24 +63,24 @@ class Hub:
 
     def __init__(self, folder: ProjectFolder) -> None:
         self._folder = folder
-        self._kept = StateFolder(folder.root)
+        self._state = StateFolder(folder.root)
         self._pages = Pages()
-        data = ProjectData(folder, TrustedFiles(self._kept))
+        data = ProjectData(folder, TrustedFiles(self._state))
         checks = Checks(data, self._resolve_robot)
-        self._diagrams = OpenDocuments(folder, self._kept, self._resolve_robot, data)
-        self.runs = RunDesk(self._pages, self._diagrams, checks.job)
+        self._diagrams = OpenDocuments(folder, self._state, self._resolve_robot, data)
+        self.runs = DiagramRuns(self._pages, self._diagrams, checks.job)
         lines = LinesOfSheets()
-        robots = RobotPresenter(OpenRobots(folder, self._kept), folder, self._robot_saved)
+        robots = RobotPresenter(OpenRobots(folder, self._state), folder, self._robot_saved)
         self._shown = DiagramPresenter(self._diagrams, self._pages, self.runs, lines, checks.of)
-        self.documents = DocumentDesk(folder, self._pages, {"diagram": self._shown, "robot": robots})
+        self.documents = DocumentRequests(folder, self._pages, {"diagram": self._shown, "robot": robots})
         self.answers = Answers()
         self.answers.on(Ping, self._ping)
         self.answers.on(Files, self._files)
         for part in (
             self.documents,
             SheetQueries(folder, self.documents, self._diagrams, self._resolve_robot, lines),
-            DataDesk(data, self._files_changed),
-            RobotDesk(folder, self.documents, robots, self._diagrams),
+            DataRequests(data, self._files_changed),
+            RobotRequests(folder, self.documents, robots, self._diagrams),
             self.runs,
         ):
             part.register(self.answers)
@@ -88,7 +88,7 @@ class Hub:
 
     def prepare(self) -> None:
         """Start to watch the files."""
-        self._folder.sweep(self._kept.recent())
+        self._folder.sweep(self._state.recent())
         self._watching = self.documents.watch()
 
     def close(self) -> None:
@@ -153,7 +153,7 @@ class Hub:
         return FileList(files=self._folder.files(), recent=self._recent())
 
     def _recent(self) -> list[str]:
-        return [path for path in self._kept.recent() if self._is_there(path)]
+        return [path for path in self._state.recent() if self._is_there(path)]
 
     def _is_there(self, path: str) -> bool:
         with contextlib.suppress(ArmblocksError):
@@ -183,8 +183,8 @@ class Hub:
 
     def _files_changed(self) -> None:
         """Check all open diagrams again after a change of a table or of the trust in a Python file."""
-        for found in self._diagrams:
-            self._shown.changed(found)
+        for open_file in self._diagrams:
+            self._shown.changed(open_file)
 
     async def _robot_saved(self, robot: Robot) -> None:
         """Update the diagrams that use a robot whose file was saved, as one undo step each."""

@@ -74,10 +74,10 @@ def pasted(
     """
     where = f"diagram '{diagram.name}'"
     copied, (dx, dy) = placed(copied), shift
-    taken = {folded(name): name for name in diagram.blocks}
+    used_names = {folded(name): name for name in diagram.blocks}
     for name in copied.blocks:
-        check_free(names.get(name, name), taken, where)
-        taken[folded(names.get(name, name))] = names.get(name, name)
+        check_free(names.get(name, name), used_names, where)
+        used_names[folded(names.get(name, name))] = names.get(name, name)
     notes = {names.get(name, name): note for name, note in copied.notes.items()}
     if any(name in diagram.notes for name in notes):
         raise DiagramError(
@@ -96,8 +96,8 @@ def pasted(
         for name, place in copied.layout.items()
     }
     bends = {
-        wires[wire]: moved_bends(led, leaves_sideways(wire, copied), shift)
-        for wire, led in copied.bends.items()
+        wires[wire]: moved_bends(values, leaves_horizontally(wire, copied), shift)
+        for wire, values in copied.bends.items()
     }
     shifted = {name: dataclasses.replace(note, x=note.x + dx, y=note.y + dy) for name, note in notes.items()}
     blocks = {
@@ -123,22 +123,22 @@ def _unused_names(
     diagram: Diagram, copied: Diagram, blocks: Collection[str], moved: Callable[[PortRef], PortRef]
 ) -> dict[PortRef, str]:
     """The names of the copied signals, numbered where a block or another signal of the sheet has the name."""
-    taken = {folded(name) for name in (*diagram.blocks, *blocks, *diagram.signal_names.values())}
-    found: dict[PortRef, str] = {}
-    for ref, wish in copied.signal_names.items():
-        name, number = wish, 2
-        while folded(name) in taken:
-            name, number = f"{wish} {number}", number + 1
-        taken.add(folded(name))
-        found[moved(ref)] = name
-    return found
+    used_names = {folded(name) for name in (*diagram.blocks, *blocks, *diagram.signal_names.values())}
+    renamed: dict[PortRef, str] = {}
+    for ref, copied_name in copied.signal_names.items():
+        name, number = copied_name, 2
+        while folded(name) in used_names:
+            name, number = f"{copied_name} {number}", number + 1
+        used_names.add(folded(name))
+        renamed[moved(ref)] = name
+    return renamed
 
 
-def leaves_sideways(wire: Connection, diagram: Diagram) -> bool:
+def leaves_horizontally(wire: Connection, diagram: Diagram) -> bool:
     """Whether a wire leaves its block horizontally."""
     block, place = diagram.blocks[wire.source.block], diagram.layout[wire.source.block]
-    spots = standing_box(wire.source.block, block, place).outputs
-    return any(spot.name == wire.source.port and spot.dx != 0 for spot in spots)
+    ports = standing_box(wire.source.block, block, place).outputs
+    return any(port.name == wire.source.port and port.dx != 0 for port in ports)
 
 
 def _with_known_names(block: Block, diagram: Diagram) -> Block:

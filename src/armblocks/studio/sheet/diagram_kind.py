@@ -46,7 +46,7 @@ class DiagramKind(FileKind[Diagram, Document]):
 
     def from_file(self, data: bytes, place: Path) -> Diagram:
         """Read a diagram and place every block; it may be linked to libraries of the project."""
-        read = formats.diagram_from_bytes(
+        diagram = formats.diagram_from_bytes(
             data,
             place.name,
             BLOCKS,
@@ -56,7 +56,7 @@ class DiagramKind(FileKind[Diagram, Document]):
             read_library=self._folder.read_library,
             read_data=self._data,
         )
-        return placed(read)
+        return placed(diagram)
 
     def to_file(self, value: Diagram, place: Path) -> bytes:
         """The canonical document of the diagram; paths of project robots are relative to its folder."""
@@ -72,7 +72,7 @@ class DiagramKind(FileKind[Diagram, Document]):
 
         The text does not contain the sheets of library blocks; their layout is that of the opened file.
         """
-        read = formats.diagram_from_bytes(
+        diagram = formats.diagram_from_bytes(
             text.encode(),
             where,
             BLOCKS,
@@ -82,7 +82,7 @@ class DiagramKind(FileKind[Diagram, Document]):
             read_library=self._folder.read_library,
             read_data=self._data,
         )
-        return placed(read)
+        return placed(diagram)
 
     def to_text(self, value: Diagram) -> str:
         """The canonical document of the diagram."""

@@ -57,7 +57,7 @@ class Document(Edited[Diagram]):
         """
         self.saved = value
         if value.name != name:
-            self.rewrite(lambda given: replace(given, name=name))
+            self.rewrite(lambda diagram: replace(diagram, name=name))
 
     def outcome(self, request: Change) -> Outcome[Diagram]:
         """Return the title of the step and the diagram after it."""

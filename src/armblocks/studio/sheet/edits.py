@@ -62,7 +62,7 @@ from armblocks.studio.protocol.messages.sheet_edits import (
     SheetNote,
     Wire,
 )
-from armblocks.studio.sheet.clipping import ReadDiagram, leaves_sideways, pasted, reader
+from armblocks.studio.sheet.clipping import ReadDiagram, leaves_horizontally, pasted, reader
 from armblocks.studio.sheet.grounding import grounded
 from armblocks.studio.sheet.mask_edits import with_mask
 from armblocks.studio.sheet.nesting import check_free, grouped, unlinked, with_block
@@ -78,7 +78,7 @@ MOST_BLOCKS = 20_000
 
 @dataclasses.dataclass(frozen=True)
 class EditContext:
-    """What edits need besides the diagram: search for robots, reading of copied blocks and of data files."""
+    """The functions that edits need: search for robots, reading of copied blocks and of data files."""
 
     resolve_robot: ResolveRobot
     read_diagram: ReadDiagram
@@ -111,11 +111,11 @@ def _add(edit: AddBlocks, diagram: Diagram, context: EditContext) -> Diagram:
     where = f"diagram '{diagram.name}'"
     blocks, layout = dict(diagram.blocks), dict(diagram.layout)
     _check_room(diagram, len(edit.blocks))
-    taken = {folded(name): name for name in blocks}
+    used_names = {folded(name): name for name in blocks}
     for new in edit.blocks:
-        check_free(new.name, taken, where)
-        taken[folded(new.name)] = new.name
-        blocks[new.name] = _made(new, diagram.mask_values, context)
+        check_free(new.name, used_names, where)
+        used_names[folded(new.name)] = new.name
+        blocks[new.name] = _new_block(new, diagram.mask_values, context)
         layout[new.name] = _placement(new.place)
     added = dataclasses.replace(diagram, blocks=blocks, layout=layout)
     if edit.instead:
@@ -131,17 +131,17 @@ def _paste(edit: PasteBlocks, diagram: Diagram, context: EditContext) -> Diagram
     return pasted(diagram, copied, edit.names, shift)
 
 
-def _check_room(diagram: Diagram, more: int) -> None:
-    if len(diagram.blocks) + more > MOST_BLOCKS:
+def _check_room(diagram: Diagram, count: int) -> None:
+    if len(diagram.blocks) + count > MOST_BLOCKS:
         raise DiagramError(
-            f"the sheet would have {len(diagram.blocks) + more} blocks",
+            f"the sheet would have {len(diagram.blocks) + count} blocks",
             where=f"diagram '{diagram.name}'",
             allowed=f"at most {MOST_BLOCKS}",
             fix="group some of them into subsystems",
         )
 
 
-def _made(new: NewBlock, scope: Scope, context: EditContext) -> Block:
+def _new_block(new: NewBlock, scope: Scope, context: EditContext) -> Block:
     resolve_robot, where = context.resolve_robot, f"block '{new.name}'"
     kind = BLOCKS[new.type]
     rules = {rule.name: rule for rule in kind.parameters()}
@@ -154,38 +154,42 @@ def _made(new: NewBlock, scope: Scope, context: EditContext) -> Block:
         if rule.required and name not in values:
             default = DEFAULT_ROBOT if rule.kind is ParameterKind.ROBOT else None
             values[name] = parameter_value(rule, default, where, resolve_robot)
-    made = kind(**values)
+    block = kind(**values)
     # The sheet of a new subsystem must be drawable as well.
-    return dataclasses.replace(made, diagram=placed(made.diagram)) if isinstance(made, DiagramBlock) else made
+    return (
+        dataclasses.replace(block, diagram=placed(block.diagram))
+        if isinstance(block, DiagramBlock)
+        else block
+    )
 
 
-def _removed(edit: RemoveBlocks) -> str:
+def _removal_title(edit: RemoveBlocks) -> str:
     if edit.blocks:
         return f"delete {_listed(edit.blocks)}"
     return f"delete {_counted(edit.wires, 'wire') if edit.wires else _counted(edit.notes, 'note')}"
 
 
-@EDITS.on(RemoveBlocks, _removed)
+@EDITS.on(RemoveBlocks, _removal_title)
 def _remove(edit: RemoveBlocks, diagram: Diagram, _: EditContext) -> Diagram:
     return _without(edit, diagram)
 
 
 def _without(edit: RemoveBlocks, diagram: Diagram) -> Diagram:
-    gone = {_known(name, diagram) for name in edit.blocks}
+    removed = {_known(name, diagram) for name in edit.blocks}
     cut = {connection(wire) for wire in edit.wires}
     for wire in cut:
         _present(wire, diagram)
     return dataclasses.replace(
         diagram,
-        blocks={name: block for name, block in diagram.blocks.items() if name not in gone},
-        layout={name: place for name, place in diagram.layout.items() if name not in gone},
+        blocks={name: block for name, block in diagram.blocks.items() if name not in removed},
+        layout={name: place for name, place in diagram.layout.items() if name not in removed},
         notes={name: note for name, note in diagram.notes.items() if name not in edit.notes},
         connections=tuple(
             wire
             for wire in diagram.connections
-            if wire not in cut and wire.source.block not in gone and wire.target.block not in gone
+            if wire not in cut and wire.source.block not in removed and wire.target.block not in removed
         ),
-        logged=tuple(ref for ref in diagram.logged if ref.block not in gone),
+        logged=tuple(ref for ref in diagram.logged if ref.block not in removed),
     )
 
 
@@ -216,18 +220,18 @@ def _connect(edit: Connect, diagram: Diagram, _: EditContext) -> Diagram:
 def _connected(wires: Sequence[Wire], diagram: Diagram, *, replace: bool) -> Diagram:
     connections = {wire.target: wire for wire in diagram.connections}
     for wire in wires:
-        made = connection(wire)
-        _check_port(made.source, diagram, output=True)
-        _check_port(made.target, diagram, output=False)
-        present = connections.get(made.target)
+        added = connection(wire)
+        _check_port(added.source, diagram, output=True)
+        _check_port(added.target, diagram, output=False)
+        present = connections.get(added.target)
         if present is not None and not replace:
             raise DiagramError(
-                f"input '{made.target}' is already driven by '{present.source}'",
+                f"input '{added.target}' is already driven by '{present.source}'",
                 where=f"diagram '{diagram.name}'",
                 allowed="one wire for each input",
                 fix="delete that wire first, or join the signals with a Sum or a Mux",
             )
-        connections[made.target] = made
+        connections[added.target] = added
     if not wires:
         return diagram
     connected = dataclasses.replace(diagram, connections=tuple(connections.values()))
@@ -259,14 +263,14 @@ def _check_port(ref: PortRef, diagram: Diagram, *, output: bool) -> None:
         raise UnknownNameError(f"{side} port", ref.port, ports, where=f"block '{ref.block}' ({block.title})")
 
 
-def _moved(edit: MoveBlocks) -> str:
+def _move_title(edit: MoveBlocks) -> str:
     if edit.instead and edit.places:
         into = len(edit.wires) > len(edit.instead)
         return f"{'insert' if into else 'disconnect'} {_listed(list(edit.places))}"
     return f"move {_listed(list(edit.places)) if edit.places else _counted(edit.notes, 'note')}"
 
 
-@EDITS.on(MoveBlocks, _moved)
+@EDITS.on(MoveBlocks, _move_title)
 def _move(edit: MoveBlocks, diagram: Diagram, _: EditContext) -> Diagram:
     layout = dict(diagram.layout)
     shifts: dict[str, tuple[float, float]] = {}
@@ -279,7 +283,7 @@ def _move(edit: MoveBlocks, diagram: Diagram, _: EditContext) -> Diagram:
     for wire, values in diagram.bends.items():
         shift = shifts.get(wire.source.block)
         if shift is not None and shift == shifts.get(wire.target.block):
-            bends[wire] = moved_bends(values, leaves_sideways(wire, diagram), shift)
+            bends[wire] = moved_bends(values, leaves_horizontally(wire, diagram), shift)
     moved = _noted(edit.notes, dataclasses.replace(diagram, layout=layout, bends=bends), known=True)
     return _connected(edit.wires, _without(RemoveBlocks(wires=edit.instead), moved), replace=False)
 
@@ -333,8 +337,8 @@ def _placement(place: Place) -> Placement:
 @EDITS.on(Rename, lambda edit: f"rename {edit.block}")
 def _rename(edit: Rename, diagram: Diagram, _: EditContext) -> Diagram:
     _known(edit.block, diagram)
-    taken = {folded(name): name for name in diagram.blocks if name != edit.block}
-    check_free(edit.name, taken, f"diagram '{diagram.name}'")
+    used_names = {folded(name): name for name in diagram.blocks if name != edit.block}
+    check_free(edit.name, used_names, f"diagram '{diagram.name}'")
 
     def renamed(name: str) -> str:
         return edit.name if name == edit.block else name
@@ -451,5 +455,5 @@ def _listed(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else _counted(names, "block")
 
 
-def _counted(things: Sized, thing: str) -> str:
-    return f"{len(things)} {thing}{'' if len(things) == 1 else 's'}"
+def _counted(items: Sized, noun: str) -> str:
+    return f"{len(items)} {noun}{'' if len(items) == 1 else 's'}"

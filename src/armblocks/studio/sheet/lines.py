@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from armblocks.diagram import Connection, Diagram
 from armblocks.drawing.diagram_drawing import obstacle, wire_label, wire_nets
 from armblocks.drawing.diagram_layout import boxes
-from armblocks.drawing.wire_names import name_place
+from armblocks.drawing.wire_names import name_position
 from armblocks.drawing.wire_routing import Routing
 from armblocks.drawing.wires import moved_bends
 from armblocks.studio.protocol.messages.sheets import WireLines
@@ -25,8 +25,8 @@ class SheetLines:
 
     def of(self, sheet: Diagram) -> Lines:
         """Return the lines of a sheet, by output."""
-        for known, lines in self._latest:
-            if known is sheet:
+        for cached, lines in self._latest:
+            if cached is sheet:
                 return lines
         lines = self.dragged(sheet, {}, sheet.connections, sheet.bends, None)
         self._latest = [*self._latest[-1:], (sheet, lines)]
@@ -51,8 +51,8 @@ class SheetLines:
         for wire, values in bends.items():
             shift = shifts.get(wire.source.block)
             if shift is not None and shift == shifts.get(wire.target.block):
-                spots = placed[wire.source.block].outputs
-                flat = any(spot.name == wire.source.port and spot.dx != 0 for spot in spots)
+                ports = placed[wire.source.block].outputs
+                flat = any(port.name == wire.source.port and port.dx != 0 for port in ports)
                 moved[wire] = moved_bends(values, flat, shift)
         nets, wires = wire_nets(connections, moved, placed)
         obstacles = {name: obstacle(box) for name, box in placed.items() if name != passed}
@@ -63,7 +63,7 @@ class SheetLines:
                 dots=list(routed[str(source)].dots),
                 label=wire_label(sheet, source),
                 name=sheet.signal_names.get(source, ""),
-                name_at=name_place(
+                name_at=name_position(
                     sheet.signal_names.get(source, ""), routed[str(source)].paths, obstacles.values()
                 ),
             )
@@ -79,11 +79,11 @@ class LinesOfSheets:
 
     def on(self, document: str, path: tuple[str, ...]) -> SheetLines:
         """Return the lines of the sheet at a path of a document."""
-        found = self._sheets.pop((document, path), None) or SheetLines()
-        self._sheets[document, path] = found
+        lines = self._sheets.pop((document, path), None) or SheetLines()
+        self._sheets[document, path] = lines
         if len(self._sheets) > _MOST_SHEETS:
             del self._sheets[next(iter(self._sheets))]
-        return found
+        return lines
 
 
 def is_possible(wire: Connection, sheet: Diagram) -> bool:
@@ -97,7 +97,7 @@ def is_possible(wire: Connection, sheet: Diagram) -> bool:
     )
 
 
-def other_lines(before: Lines, after: Lines) -> dict[str, WireLines | None]:
+def changed_lines(before: Lines, after: Lines) -> dict[str, WireLines | None]:
     """Return the changed lines; ``None`` for outputs without wires."""
     changed: dict[str, WireLines | None] = {
         source: lines for source, lines in after.items() if before.get(source) != lines

@@ -17,15 +17,15 @@ from armblocks.studio.protocol.messages.sheet_edits import MaskParameter, SetMas
 from armblocks.studio.sheet.nesting import with_block
 from armblocks.studio.sheet.parameter_values import ResolveRobot, parameter_json, parameter_value
 
-_TRUTH = {"true": True, "1": True, "false": False, "0": False}
+_BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
 
 
 def mask_of(diagram: Diagram) -> SetMask:
     """Return the mask of a diagram as the edit that declares it."""
-    return SetMask(name=diagram.name, parameters=[_stated(rule) for rule in diagram.mask])
+    return SetMask(name=diagram.name, parameters=[_mask_parameter(rule) for rule in diagram.mask])
 
 
-def _stated(rule: Parameter) -> MaskParameter:
+def _mask_parameter(rule: Parameter) -> MaskParameter:
     return MaskParameter(
         name=rule.name,
         was=rule.name,
@@ -97,8 +97,10 @@ def _masked(edit: SetMask, diagram: Diagram, resolve_robot: ResolveRobot) -> Dia
             continue
         if (value := diagram.mask_values[stated.was]) != before.default:
             values[rule.name] = rule.check(value, f"{where}, '{rule.name}'")
-    gone = [name for name in old if name not in names]
-    blocks = {name: _respelled(name, block, names, gone) for name, block in diagram.blocks.items()}
+    removed = [name for name in old if name not in names]
+    blocks = {
+        name: _with_renamed_parameters(name, block, names, removed) for name, block in diagram.blocks.items()
+    }
     return dataclasses.replace(
         diagram, name=edit.name or diagram.name, mask=mask, mask_values=values, blocks=blocks
     )
@@ -128,24 +130,24 @@ def _typed(stated: MaskParameter, where: str) -> Any:
     typed = stated.default
     if stated.kind != "boolean" or not isinstance(typed, str):
         return typed
-    if typed.strip().lower() not in _TRUTH:
+    if typed.strip().lower() not in _BOOLEANS:
         raise InputError(
             f"the value is '{typed[:40]}'",
             where=f"{where}, parameter '{stated.name}'",
             allowed="true or false",
             fix="choose one of the two",
         )
-    return _TRUTH[typed.strip().lower()]
+    return _BOOLEANS[typed.strip().lower()]
 
 
-def _respelled(name: str, block: Block, names: Mapping[str, str], gone: list[str]) -> Block:
+def _with_renamed_parameters(name: str, block: Block, names: Mapping[str, str], removed: list[str]) -> Block:
     """Return the block with the new parameter names in its formulas."""
     formulas: list[tuple[str, str]] = []
     for parameter, text in block.formulas:
-        lost = parameters_read(text, gone)
-        if lost:
+        missing = parameters_read(text, removed)
+        if missing:
             raise DiagramError(
-                f"the mask parameter '{min(lost)}' is removed, and the formula '{text[:60]}' reads it",
+                f"the mask parameter '{min(missing)}' is removed, and the formula '{text[:60]}' reads it",
                 where=f"block '{name}' ({block.title}), parameter '{parameter}'",
                 allowed="removing a parameter that no formula reads",
                 fix="change that formula first, or keep the parameter",
@@ -157,4 +159,4 @@ def _respelled(name: str, block: Block, names: Mapping[str, str], gone: list[str
 
 def renamed_in(formula: str, names: Mapping[str, str]) -> str:
     """Return the formula with all names replaced at the same time, so that names can be exchanged."""
-    return re.sub(r"(?<![\w.])[^\W\d]\w*", lambda found: names.get(found[0], found[0]), formula)
+    return re.sub(r"(?<![\w.])[^\W\d]\w*", lambda match: names.get(match[0], match[0]), formula)

@@ -100,7 +100,9 @@ def with_block(diagram: Diagram, name: str, block: Block) -> Diagram:
         ),
         logged=tuple(ref for ref in diagram.logged if ref.block != name or ref.port in out),
         signal_names={
-            ref: given for ref, given in diagram.signal_names.items() if ref.block != name or ref.port in out
+            ref: signal
+            for ref, signal in diagram.signal_names.items()
+            if ref.block != name or ref.port in out
         },
     )
 
@@ -131,10 +133,10 @@ def _same_file(one: Robot, other: Robot) -> bool:
     return bool(one.source) and Path(one.source).resolve() == Path(other.source).resolve()
 
 
-def check_free(name: str, taken: Mapping[str, str], where: str) -> None:
-    """Raise ``DiagramError`` for an invalid or used block name; ``taken``: used names by case-folded name."""
+def check_free(name: str, used_names: Mapping[str, str], where: str) -> None:
+    """Raise ``DiagramError`` for an invalid or used block name; ``used_names``: by case-folded name."""
     check_block_name(name, where)
-    other = taken.get(folded(name))
+    other = used_names.get(folded(name))
     if other is not None:
         raise DiagramError(
             f"a block is already named '{other}'",
@@ -156,15 +158,15 @@ def grouped(names: Sequence[str], name: str, diagram: Diagram) -> Diagram:
     if not group:
         raise DiagramError("no blocks were chosen", where=where, allowed="one or more", fix="select some")
     check_free(name, {folded(other): other for other in diagram.blocks if other not in group}, where)
-    entering = sorted(
+    inputs = sorted(
         {w.source for w in diagram.connections if w.target.block in group and w.source.block not in group}
     )
-    leaving = sorted(
+    outputs = sorted(
         {w.source for w in diagram.connections if w.source.block in group and w.target.block not in group}
     )
     free = _FreeNames((*group, *diagram.signal_names.values()))
-    ins = {source: free.name(source) for source in entering}
-    outs = {source: free.name(source) for source in leaving}
+    ins = {source: free.name(source) for source in inputs}
+    outs = {source: free.name(source) for source in outputs}
     inner_wires = [
         wire if wire.source.block in group else Connection(PortRef(ins[wire.source], "y"), wire.target)
         for wire in diagram.connections
@@ -182,7 +184,7 @@ def grouped(names: Sequence[str], name: str, diagram: Diagram) -> Diagram:
         bends=diagram.bends,
         logged=tuple(ref for ref in diagram.logged if ref.block in group),
         commented={entry: comment for entry, comment in diagram.commented.items() if entry in group},
-        signal_names={ref: given for ref, given in diagram.signal_names.items() if ref.block in group},
+        signal_names={ref: signal for ref, signal in diagram.signal_names.items() if ref.block in group},
     )
     outer_wires = [
         wire if wire.source.block not in group else Connection(PortRef(name, outs[wire.source]), wire.target)
@@ -202,8 +204,8 @@ def grouped(names: Sequence[str], name: str, diagram: Diagram) -> Diagram:
         layout={k: p for k, p in diagram.layout.items() if k not in group} | {name: middle},
         logged=tuple(ref for ref in diagram.logged if ref.block not in group),
         signal_names={
-            PortRef(name, outs[ref]) if ref in outs else ref: given
-            for ref, given in diagram.signal_names.items()
+            PortRef(name, outs[ref]) if ref in outs else ref: signal
+            for ref, signal in diagram.signal_names.items()
             if ref in outs or ref.block not in group
         },
         commented={entry: comment for entry, comment in diagram.commented.items() if entry not in group},
@@ -213,7 +215,7 @@ def grouped(names: Sequence[str], name: str, diagram: Diagram) -> Diagram:
 def _inner_layout(
     diagram: Diagram, group: Sequence[str], ins: Sequence[str], outs: Sequence[str]
 ) -> dict[str, Placement]:
-    """The blocks at their former positions, with the In and Out blocks in a column on either side."""
+    """The positions of the blocks, which are unchanged, and of columns of In and Out blocks beside them."""
     places = {name: diagram.layout[name] for name in group}
     left = min(place.x for place in places.values()) - _MARGIN
     right = max(place.x for place in places.values()) + _MARGIN + 60.0
@@ -227,13 +229,13 @@ def _inner_layout(
 class _FreeNames:
     """Unique names for the In and Out blocks of a group."""
 
-    def __init__(self, taken: Sequence[str]) -> None:
-        self._taken = {folded(name) for name in taken}
+    def __init__(self, used_names: Sequence[str]) -> None:
+        self._used = {folded(name) for name in used_names}
 
     def name(self, source: PortRef) -> str:
-        wish = source.block if source.port == "y" else source.port
+        title = source.block if source.port == "y" else source.port
         number = 1
-        while folded(found := wish if number == 1 else f"{wish} {number}") in self._taken:
+        while folded(name := title if number == 1 else f"{title} {number}") in self._used:
             number += 1
-        self._taken.add(folded(found))
-        return found
+        self._used.add(folded(name))
+        return name

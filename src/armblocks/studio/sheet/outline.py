@@ -35,17 +35,17 @@ def find(diagram: Diagram, text: str) -> list[Found]:
     for path, name, block in _blocks(diagram, ()):
         rank, matches = 0, list[str]()
         for word in words:
-            one, match = _rank(name, block, word)
-            rank = max(rank, one)
+            word_rank, match = _rank(name, block, word)
+            rank = max(rank, word_rank)
             matches += [match] if match else []
-        if words and rank < _NOT:
+        if words and rank < _NO_MATCH:
             found = Found(inside=list(path), name=name, title=block.title, match=", ".join(matches))
             ranked.append((rank, len(path), found))
     ranked.sort(key=lambda entry: entry[:2])
     return [found for _, _, found in ranked[:MOST_FOUND]]
 
 
-_NOT = 9
+_NO_MATCH = 9
 """Rank of a block that does not match."""
 
 
@@ -62,7 +62,7 @@ def _rank(name: str, block: Block, word: str) -> tuple[int, str]:
         text_of_rule = f"{rule.name} = {_text(parameter_json(block.parameter_value(rule.name)))}"
         if word in text_of_rule.lower():
             return 3, text_of_rule if len(text_of_rule) <= MOST_TEXT else f"{text_of_rule[: MOST_TEXT - 1]}…"
-    return _NOT, ""
+    return _NO_MATCH, ""
 
 
 def _text(value: object) -> str:

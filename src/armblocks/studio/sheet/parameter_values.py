@@ -35,8 +35,8 @@ def parameter_value(
     """Return the checked value of a parameter that a page sends; ``None`` selects the default.
 
     A text that contains mask parameters of the diagram, ``scope``, is stored as a formula. ``data`` reads
-    tables and functions of files. Raises ``InputError`` with the place ``where`` (a block) and the parameter
-    name.
+    tables and functions of files. Raises ``InputError`` with the location ``where`` (a block) and the
+    parameter name.
     """
     place = f"{where}, parameter '{rule.name}'"
     if typed is None and not rule.required:
@@ -77,9 +77,9 @@ def number_value(text: str, where: str) -> float | list[Any]:
 
 def _matrix(text: str, where: str) -> Any:
     """Evaluate a text for a parameter that is always a matrix: ``[1 2]`` is a row, ``[1; 2]`` a column."""
-    bare = text.strip()
-    inner = bare[1:-1]
-    if not (bare.startswith("[") and bare.endswith("]")) or "[" in inner:
+    stripped = text.strip()
+    inner = stripped[1:-1]
+    if not (stripped.startswith("[") and stripped.endswith("]")) or "[" in inner:
         value = number_value(text, where)
         return value if isinstance(value, list) else [[value]]
     rows = [number_value(f"[{row}]", where) for row in inner.split(";")]
@@ -111,7 +111,7 @@ def parameter_json(value: Any) -> Any:
 
 
 def _table_json(table: TimeTable) -> dict[str, Any]:
-    """A table as pages see it: its size, and the file and columns that :func:`parameter_value` takes."""
+    """The data of a table for pages: size, and the file and columns that :func:`parameter_value` takes."""
     count, width = table.shape
     values = f"{width - 1} column{'' if width == 2 else 's'} of values"
     return {

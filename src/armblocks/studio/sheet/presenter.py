@@ -18,17 +18,17 @@ from armblocks.studio.protocol.messages.sheets import (
     WireKind,
 )
 from armblocks.studio.protocol.page import Page, Pages
-from armblocks.studio.sheet.lines import LinesOfSheets, other_lines
+from armblocks.studio.sheet.lines import LinesOfSheets, changed_lines
 from armblocks.studio.sheet.nesting import inside, linked_part
 from armblocks.studio.sheet.open_documents import OpenDocument, OpenDocuments
 from armblocks.studio.sheet.shown import sheet, sheet_change
 
-STILL_SECONDS = 0.15
+CHECK_DELAY_SECONDS = 0.15
 """Delay of the background check after the last edit, s."""
 
 
 class RunsOfDiagrams(Protocol):
-    """The functions of the run desk that the presenter uses."""
+    """The methods of ``DiagramRuns`` that the presenter uses."""
 
     def of(self, document: str) -> str | None:
         """The key of the run of a diagram, or ``None``."""
@@ -95,7 +95,7 @@ class DiagramPresenter(Presenter[OpenDocument]):
         diagram = open_file.document.diagram
         old, new, lines = inside(before, place), inside(diagram, place), self._lines.on(open_file.key, place)
         return DiagramChange(
-            sheet=sheet_change(old, new, other_lines(lines.of(old), lines.of(new))),
+            sheet=sheet_change(old, new, changed_lines(lines.of(old), lines.of(new))),
             settings=dataclasses.asdict(diagram.settings),
         )
 
@@ -112,7 +112,7 @@ class DiagramPresenter(Presenter[OpenDocument]):
         open_file.checking = asyncio.get_running_loop().create_task(self._check(open_file))
 
     async def _check(self, open_file: OpenDocument) -> None:
-        await asyncio.sleep(STILL_SECONDS)
+        await asyncio.sleep(CHECK_DELAY_SECONDS)
         diagram, version_now = open_file.document.diagram, open_file.document.version
         findings, wires = await self._check_diagram(diagram)
         if open_file.document.version == version_now:

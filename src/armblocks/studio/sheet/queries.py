@@ -10,8 +10,8 @@ from armblocks.diagram import Diagram, ParameterFormula
 from armblocks.diagram.mask import formula_value
 from armblocks.diagram.parameter import Value
 from armblocks.errors import UnknownNameError
-from armblocks.studio.documents.desk import DocumentDesk
 from armblocks.studio.documents.project_folder import ProjectFolder
+from armblocks.studio.documents.requests import DocumentRequests
 from armblocks.studio.protocol.answers import Answers
 from armblocks.studio.protocol.messages import sheets as sheet_messages
 from armblocks.studio.protocol.messages.sheet_edits import SetMask
@@ -33,7 +33,7 @@ class SheetQueries:
     def __init__(
         self,
         folder: ProjectFolder,
-        documents: DocumentDesk,
+        documents: DocumentRequests,
         diagrams: OpenDocuments,
         resolve_robot: ResolveRobot,
         lines: LinesOfSheets,
@@ -45,7 +45,7 @@ class SheetQueries:
         self._lines = lines
 
     def register(self, answers: Answers) -> None:
-        """Register the handlers of these requests."""
+        """Register the handlers of the requests about sheets."""
         answers.on(sheet_messages.Look, self._look)
         answers.on(sheet_messages.RouteWires, self._route)
         answers.on(sheet_messages.AskOutline, self._outline)
@@ -68,10 +68,10 @@ class SheetQueries:
         lines = self._lines.on(request.document, tuple(request.inside))
         connections, bends = sheet.connections, sheet.bends
         if request.wires is not None:
-            shown = {connection(wire): wire.bends for wire in request.wires}
-            connections, bends = tuple(wire for wire in shown if is_possible(wire, sheet)), shown
+            wires = {connection(wire): wire.bends for wire in request.wires}
+            connections, bends = tuple(wire for wire in wires if is_possible(wire, sheet)), wires
         before = lines.of(sheet)
-        places = {name: (spot.x, spot.y) for name, spot in request.places.items()}
+        places = {name: (corner.x, corner.y) for name, corner in request.places.items()}
         after = lines.dragged(sheet, places, connections, bends, request.passed)
         return {source: shown for source, shown in after.items() if before.get(source) != shown}
 

@@ -23,10 +23,10 @@ from armblocks.studio.protocol.messages.sheet_edits import Place, SheetNote, Wir
 from armblocks.studio.protocol.messages.sheets import (
     BlockType,
     ParameterRule,
-    PortSpot,
     Sheet,
     SheetBlock,
     SheetChange,
+    SheetPort,
     WireLines,
 )
 from armblocks.studio.sheet.edits import DEFAULT_ROBOT
@@ -53,11 +53,12 @@ def sheet_change(
 ) -> SheetChange:
     """Return the difference between two sheets; blocks that are the same objects are skipped."""
     blocks: dict[str, SheetBlock | None] = {name: None for name in before.blocks if name not in after.blocks}
-    shown, shows = drawn_blocks(before), drawn_blocks(after)
-    turned, turns = sum_sides(before), sum_sides(after)
+    drawn_before, drawn_after = drawn_blocks(before), drawn_blocks(after)
+    sides_before, sides_after = sum_sides(before), sum_sides(after)
     for name, block in after.blocks.items():
-        same = before.blocks.get(name) is block and (shown[name] is shows[name] or shown[name] == shows[name])
-        same = same and turned.get(name) == turns.get(name)
+        same = before.blocks.get(name) is block
+        same = same and (drawn_before[name] is drawn_after[name] or drawn_before[name] == drawn_after[name])
+        same = same and sides_before.get(name) == sides_after.get(name)
         same = same and before.commented.get(name) == after.commented.get(name)
         if not same or before.layout.get(name) != after.layout.get(name):
             blocks[name] = _sheet_block(name, block, after)
@@ -94,7 +95,7 @@ def _block_type(kind: type[Block]) -> BlockType:
         height=box.height,
         face=_face(box),
         inputs=[port.name for port in block.input_ports()],
-        input_y=[spot.y for spot in box.inputs],
+        input_y=[port.y for port in box.inputs],
         outputs=[port.name for port in block.output_ports()],
         parameters=[
             _rule(rule, block) for rule in kind.parameters() if rule.kind is not ParameterKind.DIAGRAM
@@ -127,13 +128,13 @@ def _default(kind: type[Block]) -> Block:
 def _sheet_block(name: str, block: Block, diagram: Diagram) -> SheetBlock:
     place = diagram.layout[name]
     shown = drawn_blocks(diagram)[name]
-    standing = dataclasses.replace(place, x=0.0, y=0.0)
+    at_origin = dataclasses.replace(place, x=0.0, y=0.0)
     comment = cast("Literal['out', 'through', '']", diagram.commented.get(name, ""))
-    drawn = _drawn(shown, standing, sum_sides(diagram).get(name), comment)
-    own: dict[str, Any] = {"name": name, "place": Place(**dataclasses.asdict(place))}
+    drawn = _drawn(shown, at_origin, sum_sides(diagram).get(name), comment)
+    changes: dict[str, Any] = {"name": name, "place": Place(**dataclasses.asdict(place))}
     if shown is not block or _names_files(type(block)):
-        own["parameters"] = _parameters(block)  # equal tables may come from different files
-    return drawn.model_copy(update=own)
+        changes["parameters"] = _parameters(block)  # equal tables may come from different files
+    return drawn.model_copy(update=changes)
 
 
 @lru_cache(maxsize=1024)
@@ -159,8 +160,8 @@ def _drawn(
         height=box.height,
         face=_face(box, comment),
         comment=comment,
-        inputs=_spots(box, into, inputs=True),
-        outputs=_spots(box, out, inputs=False),
+        inputs=_sheet_ports(box, into, inputs=True),
+        outputs=_sheet_ports(box, out, inputs=False),
         opens=isinstance(block, DiagramBlock),
         name_at=cast("Any", box.shown_name_side),
         formulas=dict(block.formulas),
@@ -187,22 +188,22 @@ def _face(box: Box, comment: str = "") -> str:
     return svg_marks(Picture(width=box.width, height=box.height, title="", marks=marks))
 
 
-def _spots(box: Box, labels: tuple[str, ...], *, inputs: bool) -> list[PortSpot]:
+def _sheet_ports(box: Box, labels: tuple[str, ...], *, inputs: bool) -> list[SheetPort]:
     ports = box.block.input_ports() if inputs else box.block.output_ports()
-    spots = {spot.name: spot for spot in (box.inputs if inputs else box.outputs)}
+    drawn = {port.name: port for port in (box.inputs if inputs else box.outputs)}
     shown = labels if len(labels) == len(ports) else ("",) * len(ports)
     if face_size(box.block)[0] is Outline.CIRCLE:
         shown = ("",) * len(ports)
     return [
-        PortSpot(
+        SheetPort(
             name=port.name,
             doc=port.doc,
             label=label,
             unit=port.unit,
-            x=spots[port.name].x,
-            y=spots[port.name].y,
-            dx=spots[port.name].dx,
-            dy=spots[port.name].dy,
+            x=drawn[port.name].x,
+            y=drawn[port.name].y,
+            dx=drawn[port.name].dx,
+            dy=drawn[port.name].dy,
         )
         for port, label in zip(ports, shown)
     ]

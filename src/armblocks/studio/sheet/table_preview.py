@@ -1,4 +1,4 @@
-"""What a page shows of a file with a table before a block uses it."""
+"""The preview of a table file, which a page shows before a block uses the file."""
 
 from __future__ import annotations
 

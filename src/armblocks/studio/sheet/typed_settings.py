@@ -24,8 +24,8 @@ def with_settings(options: SimulationOptions, values: Mapping[str, SettingValue]
     for name in values:
         if name not in known:
             raise UnknownNameError("setting", name, known)
-    read: dict[str, Any] = {name: _read(name, value) for name, value in values.items()}
-    changed = dataclasses.replace(options, **read)
+    parsed: dict[str, Any] = {name: _parsed(name, value) for name, value in values.items()}
+    changed = dataclasses.replace(options, **parsed)
     check_options(changed, "the settings")
     tableau = None if changed.solver.casefold() == "auto" else find_tableau(changed.solver)
     if tableau is not None and tableau.adaptive and changed.step is not None:
@@ -43,9 +43,9 @@ def setting_faults(options: SimulationOptions, values: Mapping[str, SettingValue
     faults: dict[str, str] = {}
     for name, value in values.items():
         try:
-            _read(name, value)
+            _parsed(name, value)
         except ArmblocksError as error:
-            faults[name] = _words(error)
+            faults[name] = _error_text(error)
     if faults:
         return faults
     try:
@@ -53,11 +53,11 @@ def setting_faults(options: SimulationOptions, values: Mapping[str, SettingValue
     except ArmblocksError as error:
         # The error text begins with the name of the setting.
         name = next((name for name in values if error.what.startswith(name)), "solver")
-        return {name: _words(error)}
+        return {name: _error_text(error)}
     return {}
 
 
-def _read(name: str, value: SettingValue) -> SettingValue:
+def _parsed(name: str, value: SettingValue) -> SettingValue:
     if not isinstance(value, str) or name == "solver":
         return value
     number = number_value(value, name)
@@ -68,5 +68,5 @@ def _read(name: str, value: SettingValue) -> SettingValue:
     return number
 
 
-def _words(error: ArmblocksError) -> str:
+def _error_text(error: ArmblocksError) -> str:
     return f"{error.what}. Allowed: {error.allowed}" if error.allowed else error.what

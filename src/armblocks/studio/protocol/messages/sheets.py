@@ -11,7 +11,7 @@ from armblocks.studio.protocol.messages.documents import Content, ContentChange
 from armblocks.studio.protocol.messages.sheet_edits import Place, Px, SetMask, SheetNote, Wire
 
 
-class PortSpot(Message):
+class SheetPort(Message):
     """A port on the edge of its block: position from the block's corner in px, and direction of its wire."""
 
     name: str
@@ -64,8 +64,8 @@ class SheetBlock(Message):
     width: float
     height: float
     face: str
-    inputs: list[PortSpot]
-    outputs: list[PortSpot]
+    inputs: list[SheetPort]
+    outputs: list[SheetPort]
     opens: bool
     """Whether the block contains a diagram."""
     name_at: Literal["below", "above", "left", "right", "corner", "hidden"]
@@ -198,7 +198,7 @@ class Look(Request[None]):
     inside: list[str]
 
 
-class Spot(Message):
+class BlockCorner(Message):
     """The top left corner of a block, px."""
 
     x: Px
@@ -215,7 +215,7 @@ class RouteWires(Request[dict[str, WireLines]]):
     kind: Literal["route"] = "route"
     document: str
     inside: list[str] = Field(default_factory=list[str])
-    places: dict[str, Spot]
+    places: dict[str, BlockCorner]
     wires: list[Wire] | None = None
     passed: str | None = None
 

@@ -14,7 +14,7 @@ from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.protocol.messages import documents as document_messages
 
 
-class LeftBehind:
+class RecoverableFiles:
     """The recoverable documents of one kind in one project folder, by key."""
 
     def __init__(self, folder: ProjectFolder, journals: Path, kind: FileKind[Any, Any]) -> None:
@@ -27,8 +27,8 @@ class LeftBehind:
             if in_use(path):  # another running server uses it
                 continue
             try:
-                found = journaled_file(path, kind)
-                self._read[found.key] = found
+                journaled = journaled_file(path, kind)
+                self._read[journaled.key] = journaled
             except (ArmblocksError, OSError):
                 self._unread[path.stem] = path
 
@@ -37,8 +37,8 @@ class LeftBehind:
 
     def offers(self) -> list[document_messages.Recovery]:
         """Descriptions of the unsaved documents, for pages."""
-        found = [self._offer(entry) for entry in self._read.values() if entry.document.dirty]
-        return [*found, *(self._unread_offer(key, path) for key, path in self._unread.items())]
+        offers = [self._offer(entry) for entry in self._read.values() if entry.document.dirty]
+        return [*offers, *(self._unread_offer(key, path) for key, path in self._unread.items())]
 
     def take(self, key: str) -> JournaledFile[Any]:
         """Return a recovered document and remove it from the recoverable ones.
@@ -46,16 +46,16 @@ class LeftBehind:
         A journal that could not be read is read again: a missing file may exist by now. Raises
         ``UnknownNameError`` for an unknown key, ``ArmblocksError`` if the journal still cannot be read.
         """
-        self._known(key)
+        self._check_key(key)
         if key in self._unread:
-            found = journaled_file(self._unread[key], self._kind)
+            journaled = journaled_file(self._unread[key], self._kind)
             del self._unread[key]
-            return found
+            return journaled
         return self._read.pop(key)
 
     def discard(self, key: str) -> None:
         """Delete a journal; raises ``UnknownNameError``."""
-        self._known(key)
+        self._check_key(key)
         path = self._read[key].journal_path if key in self._read else self._unread[key]
         path.unlink(missing_ok=True)
         self._read.pop(key, None)
@@ -68,23 +68,23 @@ class LeftBehind:
                 with contextlib.suppress(OSError):
                     entry.journal_path.unlink(missing_ok=True)
 
-    def _known(self, key: str) -> None:
+    def _check_key(self, key: str) -> None:
         if key not in self:
             raise UnknownNameError(f"{self._kind.name} to recover", key, [*self._read, *self._unread])
 
-    def _offer(self, found: JournaledFile[Any]) -> document_messages.Recovery:
-        disk = self._folder.compared(found.path, found.on_disk)[0] if found.path else "same"
+    def _offer(self, journaled: JournaledFile[Any]) -> document_messages.Recovery:
+        disk = self._folder.compared(journaled.path, journaled.on_disk)[0] if journaled.path else "same"
         return document_messages.Recovery(
             kind=self._kind.name,
-            document=found.key,
-            title=found.document.value.name,
-            path=found.path,
-            began=found.began,
-            last=found.last,
-            edits=found.edits,
-            parts=self._kind.parts(found.document.value),
+            document=journaled.key,
+            title=journaled.document.value.name,
+            path=journaled.path,
+            began=journaled.began,
+            last=journaled.last,
+            edits=journaled.edits,
+            parts=self._kind.parts(journaled.document.value),
             disk=disk,
-            missing=found.missing,
+            missing=journaled.missing,
         )
 
     def _unread_offer(self, key: str, path: Path) -> document_messages.Recovery:

@@ -23,7 +23,7 @@ PAGE_SECONDS = 1.5
 """Delay of the first worker process after a page was opened, so that the page can draw first, s."""
 
 
-class RunDesk:
+class DiagramRuns:
     """Starts runs, passes commands to them, and sends their messages to all pages that show the diagram."""
 
     def __init__(

@@ -10,8 +10,8 @@ from armblocks import formats
 from armblocks.errors import InputError
 from armblocks.rendering.arm_drawing import arm_picture_svg
 from armblocks.robot import Robot
-from armblocks.studio.documents.desk import DocumentDesk
 from armblocks.studio.documents.project_folder import ProjectFolder
+from armblocks.studio.documents.requests import DocumentRequests
 from armblocks.studio.protocol.answers import Answers
 from armblocks.studio.protocol.messages import robots as robot_messages
 from armblocks.studio.protocol.page import Page
@@ -26,13 +26,13 @@ from armblocks.studio.sheet.open_documents import OpenDocuments
 _PICTURE_SIZE = (760.0, 560.0)
 
 
-class RobotDesk:
+class RobotRequests:
     """Handles the requests about robots."""
 
     def __init__(
         self,
         folder: ProjectFolder,
-        documents: DocumentDesk,
+        documents: DocumentRequests,
         presenter: RobotPresenter,
         diagrams: OpenDocuments,
     ) -> None:

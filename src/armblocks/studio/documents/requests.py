@@ -19,7 +19,7 @@ from armblocks.studio.protocol.messages import documents as document_messages
 from armblocks.studio.protocol.page import Page, Pages
 
 
-class DocumentDesk:
+class DocumentRequests:
     """Handles the requests about documents and notifies all pages that show a changed document."""
 
     def __init__(

@@ -18,7 +18,7 @@ from armblocks.studio.documents.project_data import SOURCE_SUFFIXES, ProjectData
 from armblocks.studio.documents.trusted_files import digest_of
 from armblocks.studio.protocol.answers import Answers
 from armblocks.studio.protocol.message import Fault
-from armblocks.studio.protocol.messages import data_files as say
+from armblocks.studio.protocol.messages import data_files as data_messages
 from armblocks.studio.protocol.page import Page
 from armblocks.studio.sheet.table_preview import table_preview
 
@@ -29,8 +29,11 @@ _INVISIBLE = re.compile(
 """Control characters and those that change the direction of text or have no width."""
 
 
-class DataDesk:
-    """Handles these requests. ``recheck`` starts the check of all open diagrams after a change of a file."""
+class DataRequests:
+    """Handles the requests about data files.
+
+    ``recheck``: starts the check of all open diagrams after a change of a file.
+    """
 
     def __init__(self, data: ProjectData, recheck: Callable[[], None]) -> None:
         self._data = data
@@ -38,30 +41,32 @@ class DataDesk:
         self._recheck = recheck
 
     def register(self, answers: Answers) -> None:
-        """Register the handlers of these requests."""
-        answers.on(say.DataFileList, self._files)
-        answers.on(say.PreviewTable, self._preview)
-        answers.on(say.KeepFile, self._keep)
-        answers.on(say.ReadSource, self._source)
-        answers.on(say.TrustSource, self._trust)
+        """Register the handlers of the requests about data files."""
+        answers.on(data_messages.DataFileList, self._files)
+        answers.on(data_messages.PreviewTable, self._preview)
+        answers.on(data_messages.KeepFile, self._keep)
+        answers.on(data_messages.ReadSource, self._source)
+        answers.on(data_messages.TrustSource, self._trust)
 
-    async def _files(self, _: Page, request: say.DataFileList) -> list[say.DataFile]:
+    async def _files(self, _: Page, request: data_messages.DataFileList) -> list[data_messages.DataFile]:
         suffixes = TABLE_SUFFIXES if request.holds == "table" else SOURCE_SUFFIXES
         return await asyncio.to_thread(self._listed, suffixes)
 
-    def _listed(self, suffixes: tuple[str, ...]) -> list[say.DataFile]:
-        found: list[say.DataFile] = []
+    def _listed(self, suffixes: tuple[str, ...]) -> list[data_messages.DataFile]:
+        found: list[data_messages.DataFile] = []
         for path in self._folder.files(suffixes):
             try:
-                found.append(say.DataFile(path=path, size=self._folder.path(path, suffixes).stat().st_size))
+                found.append(
+                    data_messages.DataFile(path=path, size=self._folder.path(path, suffixes).stat().st_size)
+                )
             except (ArmblocksError, OSError):  # a link that leads outside, or a file that was removed
                 continue
         return found
 
-    async def _preview(self, _: Page, request: say.PreviewTable) -> say.TablePreview:
+    async def _preview(self, _: Page, request: data_messages.PreviewTable) -> data_messages.TablePreview:
         path = self._folder.path(request.file, TABLE_SUFFIXES)
 
-        def read() -> say.TablePreview:
+        def read() -> data_messages.TablePreview:
             try:
                 file = self._data.columns(path)
             except ArmblocksError as error:
@@ -70,7 +75,7 @@ class DataDesk:
 
         return await asyncio.to_thread(read)
 
-    async def _keep(self, _: Page, request: say.KeepFile) -> say.KeptFile:
+    async def _keep(self, _: Page, request: data_messages.KeepFile) -> data_messages.KeptFile:
         data = dropped_bytes(request.content, request.name[:80])
         name = PurePath(request.name).name
         path = self._folder.path(name, TABLE_SUFFIXES)
@@ -88,13 +93,13 @@ class DataDesk:
         stored = await asyncio.to_thread(keep)
         if stored:
             self._recheck()
-        return say.KeptFile(path=name, stored=stored)
+        return data_messages.KeptFile(path=name, stored=stored)
 
-    async def _source(self, _: Page, request: say.ReadSource) -> say.FunctionSource:
+    async def _source(self, _: Page, request: data_messages.ReadSource) -> data_messages.FunctionSource:
         path = self._folder.path(request.file, SOURCE_SUFFIXES)
         source = self._data.source(path)
         fault: Fault | None = None
-        functions: list[say.SourceFunction] = []
+        functions: list[data_messages.SourceFunction] = []
         try:
             text = decode_source(source)  # as Python reads it, by the encoding that the file declares
         except (SyntaxError, UnicodeDecodeError) as error:
@@ -103,19 +108,19 @@ class DataDesk:
             ) from None
         try:
             functions = [
-                say.SourceFunction(
-                    name=one.name,
-                    arguments=[_argument(entry) for entry in one.arguments],
-                    line=one.line,
-                    doc=one.doc,
+                data_messages.SourceFunction(
+                    name=function.name,
+                    arguments=[_argument(entry) for entry in function.arguments],
+                    line=function.line,
+                    doc=function.doc,
                 )
-                for one in functions_of(source, request.file).values()
+                for function in functions_of(source, request.file).values()
             ]
         except FormatError as error:
             fault = Fault(what=error.what, where=error.where, allowed=error.allowed, fix=error.fix)
-        shown, hidden = _INVISIBLE.subn(lambda found: f"\\u{ord(found[0]):04x}", text)
+        shown, hidden = _INVISIBLE.subn(lambda match: f"\\u{ord(match[0]):04x}", text)
         digest = digest_of(source)
-        return say.FunctionSource(
+        return data_messages.FunctionSource(
             text=shown,
             digest=digest,
             trusted=(self._data.shown(path), digest) in self._data.trusted,
@@ -124,7 +129,7 @@ class DataDesk:
             fault=fault,
         )
 
-    async def _trust(self, _: Page, request: say.TrustSource) -> None:
+    async def _trust(self, _: Page, request: data_messages.TrustSource) -> None:
         path = self._folder.path(request.file, SOURCE_SUFFIXES)
         shown = self._data.shown(path)
         if request.trusted and digest_of(self._data.source(path)) != request.digest:
@@ -139,7 +144,7 @@ class DataDesk:
 
 
 def _argument(argument: Parameter) -> str:
-    """An argument as the page shows it; one with a default is not an input."""
+    """The text of an argument for the page; an argument with a default is not an input."""
     stars = {Parameter.VAR_POSITIONAL: "*", Parameter.VAR_KEYWORD: "**"}.get(argument.kind, "")
     return f"{stars}{argument.name}{'' if argument.default is Parameter.empty else '=…'}"
 
@@ -152,5 +157,5 @@ def _has_content(path: Path, data: bytes) -> bool:
 
 
 def _relative(error: ArmblocksError, shown: str) -> FormatError:
-    """The error with the path in the project in place of the absolute one."""
+    """The error with the path in the project instead of the absolute path."""
     return FormatError(error.what, where=shown, allowed=error.allowed, fix=error.fix)
