@@ -79,7 +79,7 @@ def effort(request: pytest.FixtureRequest) -> Iterator[None]:
     compile as users do.
     """
     requested = os.environ.get("ARMBLOCKS_EFFORT", "little")
-    full = any(request.path.is_relative_to(TESTS / place) for place in FULL_EFFORT)
+    full = any(request.path.is_relative_to(TESTS / folder) for folder in FULL_EFFORT)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("ARMBLOCKS_EFFORT", "full" if full else requested)
         yield

@@ -70,10 +70,10 @@ SPECIAL = [
 
 @pytest.mark.parametrize(("name", "arguments", "value"), [*CORRECT, *SPECIAL])
 def test_values_are_the_nearest_doubles(name: str, arguments: tuple[float, ...], value: float) -> None:
-    found = FUNCTIONS[name](*arguments)
-    assert (found == value and math.copysign(1.0, found) == math.copysign(1.0, value)) or (
-        math.isnan(found) and math.isnan(value)
-    ), found
+    actual = FUNCTIONS[name](*arguments)
+    assert (actual == value and math.copysign(1.0, actual) == math.copysign(1.0, value)) or (
+        math.isnan(actual) and math.isnan(value)
+    ), actual
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)

@@ -133,10 +133,10 @@ def test_a_similarity_transformation_keeps_poles_and_gains(seed: int, dt: float)
 
 
 def test_a_canonical_form_returns_its_transfer_function() -> None:
-    found = transfer([2.0, 3.0], [1.0, 4.0, 6.0, 5.0]).transfer_function()
-    assert np.allclose(found.numerator, [2.0, 3.0], rtol=1e-9)
-    assert np.allclose(found.denominator, [1.0, 4.0, 6.0, 5.0], rtol=1e-9)
-    assert repr(found).splitlines() == ["       2 s + 3", "---------------------", "s^3 + 4 s^2 + 6 s + 5"]
+    function = transfer([2.0, 3.0], [1.0, 4.0, 6.0, 5.0]).transfer_function()
+    assert np.allclose(function.numerator, [2.0, 3.0], rtol=1e-9)
+    assert np.allclose(function.denominator, [1.0, 4.0, 6.0, 5.0], rtol=1e-9)
+    assert repr(function).splitlines() == ["       2 s + 3", "---------------------", "s^3 + 4 s^2 + 6 s + 5"]
 
 
 def test_a_system_without_states_is_a_stable_gain() -> None:
@@ -148,9 +148,9 @@ def test_a_system_without_states_is_a_stable_gain() -> None:
 
 
 def test_cancelling_poles_and_zeros_are_removed() -> None:
-    found = transfer([1.0, 1.0], [1.0, 3.0, 2.0]).transfer_function()
-    assert matched(found.poles, [-2.0])
-    assert len(found.zeros) == 0
+    function = transfer([1.0, 1.0], [1.0, 3.0, 2.0]).transfer_function()
+    assert matched(function.poles, [-2.0])
+    assert len(function.zeros) == 0
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -189,30 +189,32 @@ def test_margins_agree_with_python_control(name: str) -> None:
     import control
 
     loop = LOOPS[name]
-    found = loop.margins()
+    margins = loop.margins()
     peer = control.stability_margins(loop.to_control(), returnall=True)
     # python-control reports a phase crossover at infinite frequency, where the gain is only rounding error.
     gains = [value for value in np.asarray(peer[0]) if 0.0 < value < 1e9]
-    assert matched([gain for _, gain in found.gain_crossings], gains, 1e-6)
-    assert matched([angle for _, angle in found.phase_crossings], peer[1], 1e-6)
-    assert found.stable == bool(control.feedback(loop.to_control(), 1).poles().real.max() < 0)
+    assert matched([gain for _, gain in margins.gain_crossings], gains, 1e-6)
+    assert matched([angle for _, angle in margins.phase_crossings], peer[1], 1e-6)
+    assert margins.stable == bool(control.feedback(loop.to_control(), 1).poles().real.max() < 0)
 
 
 def test_a_loop_scaled_by_its_gain_margin_is_marginally_stable() -> None:
     loop = LOOPS["third order"]
-    found = loop.margins()
-    assert found.gain == pytest.approx(2.0, rel=1e-9)  # 8 / 4, at sqrt(3)
-    assert found.gain_frequency == pytest.approx(math.sqrt(3.0), rel=1e-9)
-    scaled = LinearSystem(loop.A, found.gain * loop.B, loop.C, found.gain * loop.D)
+    margins = loop.margins()
+    assert margins.gain == pytest.approx(2.0, rel=1e-9)  # 8 / 4, at sqrt(3)
+    assert margins.gain_frequency == pytest.approx(math.sqrt(3.0), rel=1e-9)
+    scaled = LinearSystem(loop.A, margins.gain * loop.B, loop.C, margins.gain * loop.D)
     assert scaled.feedback().poles().real.max() == pytest.approx(0.0, abs=1e-8)
 
 
 def test_the_delay_margin_moves_the_open_loop_to_minus_one() -> None:
     loop = LOOPS["integrating"]
-    found = loop.margins()
-    value = loop.at(1j * found.delay_frequency)[0, 0] * np.exp(-1j * found.delay_frequency * found.delay)
+    margins = loop.margins()
+    value = loop.at(1j * margins.delay_frequency)[0, 0] * np.exp(
+        -1j * margins.delay_frequency * margins.delay
+    )
     assert value == pytest.approx(-1.0, abs=1e-8)
-    assert abs(1.0 + loop.at(1j * found.modulus_frequency)[0, 0]) == pytest.approx(found.modulus)
+    assert abs(1.0 + loop.at(1j * margins.modulus_frequency)[0, 0]) == pytest.approx(margins.modulus)
 
 
 # Time responses.
@@ -222,8 +224,8 @@ def test_a_step_response_equals_its_closed_form() -> None:
     wn, zeta = 3.0, 0.3
     response = transfer([wn**2], [1.0, 2 * zeta * wn, wn**2]).step_response(6.0)
     t, wd = response.time, wn * math.sqrt(1 - zeta**2)
-    wanted = 1 - np.exp(-zeta * wn * t) * (np.cos(wd * t) + zeta * wn / wd * np.sin(wd * t))
-    assert np.allclose(response.values[:, 0, 0], wanted, atol=1e-11)
+    expected = 1 - np.exp(-zeta * wn * t) * (np.cos(wd * t) + zeta * wn / wd * np.sin(wd * t))
+    assert np.allclose(response.values[:, 0, 0], expected, atol=1e-11)
     measures = response.measures()
     assert measures.overshoot == pytest.approx(
         100 * math.exp(-math.pi * zeta / math.sqrt(1 - zeta**2)), rel=1e-3
@@ -285,8 +287,8 @@ def test_uncontrollable_states_are_removed_from_the_minimal_system() -> None:
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_staircase_basis_is_orthogonal_and_spans_the_controllable_subspace(seed: int) -> None:
     system = random_system(seed, 6, 1, 1)
-    basis, reached = staircase(system.A, system.B)
-    assert reached == 6
+    basis, dimension = staircase(system.A, system.B)
+    assert dimension == 6
     assert np.allclose(basis.T @ basis, np.eye(6), atol=1e-13)
 
 
@@ -401,18 +403,18 @@ def test_files_keep_the_matrices_bit_for_bit(tmp_path: Path, suffix: str) -> Non
     system = random_system(1, dt=0.1)
     path = tmp_path / f"plant.{suffix}"
     system.save(path)
-    found: Any
+    content: Any
     if suffix == "json":
-        found = json.loads(path.read_text())
-        assert found["states"] == list(system.states)
+        content = json.loads(path.read_text())
+        assert content["states"] == list(system.states)
     elif suffix == "npz":
-        found = np.load(path)
-        assert json.loads(str(found["description"]))["dt"] == 0.1
+        content = np.load(path)
+        assert json.loads(str(content["description"]))["dt"] == 0.1
     else:
-        found = loadmat(path)
-        assert found["Ts"].item() == 0.1
+        content = loadmat(path)
+        assert content["Ts"].item() == 0.1
     for letter in "ABCD":
-        assert np.array_equal(np.asarray(found[letter]), getattr(system, letter))
+        assert np.array_equal(np.asarray(content[letter]), getattr(system, letter))
     with pytest.raises(UnknownNameError, match=r"there is no file format named '\.txt'"):
         system.save(tmp_path / "plant.txt")
 

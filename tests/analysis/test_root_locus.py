@@ -28,8 +28,8 @@ def test_roots_are_those_of_the_closed_loop_polynomial() -> None:
 
 def test_branches_are_followed_without_jumps() -> None:
     locus = root_locus(chain())
-    seen = np.abs(locus.roots) < 4.0
-    steps = np.abs(np.diff(locus.roots, axis=0)) * seen[1:]
+    visible = np.abs(locus.roots) < 4.0
+    steps = np.abs(np.diff(locus.roots, axis=0)) * visible[1:]
     # Two branches meet at -0.42 and leave at right angles: the roots move fast only there.
     assert steps.max() < 0.2
     crossing = np.argmax(locus.roots.real.max(axis=1) > 0.0)
@@ -49,8 +49,8 @@ def test_a_locus_of_several_channels_is_refused() -> None:
 def test_phase_is_continuous_and_starts_at_minus_90_for_an_integrator() -> None:
     w = np.geomspace(1e-3, 1e3, 400)
     _, phase = gain_and_phase(chain(), w)
-    wanted = -90.0 - np.degrees(np.arctan(w)) - np.degrees(np.arctan(w / 2.0))
-    assert np.allclose(phase[:, 0, 0], wanted, atol=1e-9)
+    expected = -90.0 - np.degrees(np.arctan(w)) - np.degrees(np.arctan(w / 2.0))
+    assert np.allclose(phase[:, 0, 0], expected, atol=1e-9)
 
 
 def test_the_phase_falls_by_180_degrees_at_an_undamped_pole() -> None:

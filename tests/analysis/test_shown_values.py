@@ -145,15 +145,15 @@ def test_a_loop_through_minus_one_is_shown_with_margins_of_zero() -> None:
         A, T = similar(lag, np.random.default_rng(seed))
         B = np.linalg.solve(T, [[0.0], [0.0], [8.0]])
         C = np.array([[1.0, 0.0, 0.0]]) @ T
-        found = shown_margins(LinearSystem(A, B, C, [[0.0]]))
-        assert (found.gain_decibels, found.phase, found.delay, found.modulus) == (0.0, 0.0, 0.0, 0.0)
-        assert found.gain_frequency == pytest.approx(math.sqrt(3.0))
-        assert not found.stable
-        found = shown_margins(LinearSystem(A, B * (1.0 - 1e-9), C, [[0.0]]))
-        assert found.gain - 1.0 == pytest.approx(1e-9, rel=1e-3)
-        assert 0.0 < found.phase < 1e-6
-        assert found.modulus > 1e-10
-        assert found.stable
+        margins = shown_margins(LinearSystem(A, B, C, [[0.0]]))
+        assert (margins.gain_decibels, margins.phase, margins.delay, margins.modulus) == (0.0, 0.0, 0.0, 0.0)
+        assert margins.gain_frequency == pytest.approx(math.sqrt(3.0))
+        assert not margins.stable
+        margins = shown_margins(LinearSystem(A, B * (1.0 - 1e-9), C, [[0.0]]))
+        assert margins.gain - 1.0 == pytest.approx(1e-9, rel=1e-3)
+        assert 0.0 < margins.phase < 1e-6
+        assert margins.modulus > 1e-10
+        assert margins.stable
     double = LinearSystem([[0.0, 1.0], [0.0, 0.0]], [[0.0], [1.0]], [[1.0, 0.0]], [[0.0]])
     assert shown_margins(double).phase == 0.0
 

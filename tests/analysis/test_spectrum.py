@@ -19,23 +19,23 @@ SCIPY_NAMES = {"flat top": "flattop", "rectangular": "boxcar"}
 @pytest.mark.parametrize("window", WINDOWS)
 def test_a_line_has_the_amplitude_of_its_sine_under_every_window(window: str) -> None:
     wave = 3.0 * np.sin(2 * np.pi * 10.0 * TIME + 0.3)
-    found = signal_spectrum(TIME, wave, window=window)
-    line = np.argmin(abs(found.frequency - 10.0))
-    assert found.values[line, 0] == pytest.approx(3.0, rel=1e-12)
-    assert np.argmax(found.values[:, 0]) == line
+    spectrum = signal_spectrum(TIME, wave, window=window)
+    line = np.argmin(abs(spectrum.frequency - 10.0))
+    assert spectrum.values[line, 0] == pytest.approx(3.0, rel=1e-12)
+    assert np.argmax(spectrum.values[:, 0]) == line
 
 
 def test_a_constant_and_a_wave_at_the_nyquist_frequency_have_their_amplitudes() -> None:
     wave = 2.0 + 0.5 * np.cos(np.pi * RATE * TIME)
-    found = signal_spectrum(TIME, wave, window="rectangular", remove_mean=False)
-    assert found.values[[0, -1], 0] == pytest.approx([2.0, 0.5], rel=1e-12)
-    assert np.max(found.values[1:-1]) < 1e-12
+    spectrum = signal_spectrum(TIME, wave, window="rectangular", remove_mean=False)
+    assert spectrum.values[[0, -1], 0] == pytest.approx([2.0, 0.5], rel=1e-12)
+    assert np.max(spectrum.values[1:-1]) < 1e-12
 
 
 def test_a_power_density_integrates_to_the_mean_square() -> None:
-    found = signal_spectrum(TIME, NOISE, quantity="power density", window="rectangular", remove_mean=False)
-    width = found.frequency[1]
-    assert found.values.sum() * width == pytest.approx(np.mean(NOISE[:-1] ** 2), rel=1e-12)
+    spectrum = signal_spectrum(TIME, NOISE, quantity="power density", window="rectangular", remove_mean=False)
+    width = spectrum.frequency[1]
+    assert spectrum.values.sum() * width == pytest.approx(np.mean(NOISE[:-1] ** 2), rel=1e-12)
 
 
 @pytest.mark.parametrize("quantity", QUANTITIES)
@@ -43,18 +43,18 @@ def test_a_power_density_integrates_to_the_mean_square() -> None:
 @pytest.mark.parametrize("averages", [1, 7])
 def test_scipy_gives_the_same_densities(quantity: str, window: str, averages: int) -> None:
     # SciPy's flat-top window has the same published coefficients: both agree to rounding errors.
-    found = signal_spectrum(TIME, NOISE, quantity=quantity, window=window, averages=averages)
-    assert found.length == 2 * COUNT // (averages + 1)
+    actual = signal_spectrum(TIME, NOISE, quantity=quantity, window=window, averages=averages)
+    assert actual.length == 2 * COUNT // (averages + 1)
     frequency, expected = SIGNAL.welch(
         NOISE[:-1],
         RATE,
         SCIPY_NAMES.get(window, window),
-        nperseg=found.length,
+        nperseg=actual.length,
         detrend="constant",
         scaling="density" if quantity == "power density" else "spectrum",
     )
-    assert found.frequency == pytest.approx(frequency)
-    values = found.values[:, 0]
+    assert actual.frequency == pytest.approx(frequency)
+    values = actual.values[:, 0]
     if quantity == "amplitude":  # SciPy's "spectrum" is the mean square of each line
         values = values**2 * np.where((frequency == 0) | (frequency == RATE / 2), 1.0, 0.5)
     assert values == pytest.approx(expected, rel=1e-9, abs=1e-25)
@@ -71,10 +71,10 @@ def test_event_times_and_repeated_times_do_not_change_the_spectrum() -> None:
 
 def test_samples_before_begin_are_ignored_and_several_signals_are_columns() -> None:
     waves = np.column_stack([np.sin(2 * np.pi * 16 * TIME), np.where(TIME < 2.0, 9.0, 0.0)])
-    found = signal_spectrum(TIME, waves, begin=2.0, remove_mean=False)
-    assert found.sample_rate == pytest.approx(RATE)
-    assert np.max(found.values[:, 0]) == pytest.approx(1.0)
-    assert np.max(found.values[:, 1]) < 1e-12
+    spectrum = signal_spectrum(TIME, waves, begin=2.0, remove_mean=False)
+    assert spectrum.sample_rate == pytest.approx(RATE)
+    assert np.max(spectrum.values[:, 0]) == pytest.approx(1.0)
+    assert np.max(spectrum.values[:, 1]) < 1e-12
 
 
 def test_unsuitable_signals_and_unknown_options_are_refused() -> None:

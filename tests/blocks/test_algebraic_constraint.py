@@ -116,8 +116,8 @@ ACTIONS = ((1.0, 10.0), (2.0, 20.0), (3.0, 30.0), (4.0, 40.0))
 
 
 def decided(conditions: tuple[int, ...]) -> tuple[float, ...]:
-    for wanted, action in zip(DECISIONS, ACTIONS):
-        if all(want in (-1.0, float(given)) for want, given in zip(wanted, conditions)):
+    for row, action in zip(DECISIONS, ACTIONS):
+        if all(want in (-1.0, float(condition)) for want, condition in zip(row, conditions)):
             return action
     raise AssertionError("the last row decides")
 
@@ -128,9 +128,9 @@ def test_the_first_matching_row_of_a_decision_table_is_taken(
     conditions: tuple[int, ...], settings: dict[str, Any]
 ) -> None:
     builder = ab.DiagramBuilder("table", settings=ab.SimulationOptions(stop_time=1.0))
-    given = [builder.add(f"c{k}", Constant(value=5.0 * value)) for k, value in enumerate(conditions)]
+    inputs = [builder.add(f"c{k}", Constant(value=5.0 * value)) for k, value in enumerate(conditions)]
     table = TruthTable(decisions=DECISIONS, actions=ACTIONS)
-    builder.add("table", table, builder.add("mux", Mux(inputs=3), *given))
+    builder.add("table", table, builder.add("mux", Mux(inputs=3), *inputs))
     result = ab.simulate(builder.build(), **settings)
     assert tuple(result["table"][-1]) == decided(conditions)
 
@@ -178,8 +178,8 @@ def test_a_rod_is_refused_at_index_3_and_2_and_simulated_at_index_1() -> None:
         assert len(str(refused.value)) < 400
     period = 2.3678419475762374493  # 4 K(1/2) / sqrt(9.81)
     whole = pendulum("u3^2 + u4^2 - u5 * (u1^2 + u2^2) - 9.81 * u2")
-    found = ab.simulate(whole, stop_time=period, rtol=1e-11, atol=1e-12)
+    result = ab.simulate(whole, stop_time=period, rtol=1e-11, atol=1e-12)
     # only the second derivative of the length is constrained: its error is the tolerance times the time
     # squared
-    assert found["x/x"][-1] == pytest.approx(1.0, abs=1e-9)
-    assert found["y/x"][-1] == pytest.approx(0.0, abs=1e-9)
+    assert result["x/x"][-1] == pytest.approx(1.0, abs=1e-9)
+    assert result["y/x"][-1] == pytest.approx(0.0, abs=1e-9)

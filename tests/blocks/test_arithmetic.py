@@ -93,8 +93,8 @@ def test_polar_and_cartesian_are_inverse() -> None:
 
 
 def test_an_angle_difference_lies_between_minus_pi_and_pi() -> None:
-    found = evaluate(AngleDifference(), [3.0, -3.0, np.pi, 0.2], [-3.0, 3.0, 0.0, 0.1])["y"]
-    assert found == pytest.approx([6 - 2 * np.pi, 2 * np.pi - 6, -np.pi, 0.1], rel=1e-13)
+    result = evaluate(AngleDifference(), [3.0, -3.0, np.pi, 0.2], [-3.0, 3.0, 0.0, 0.1])["y"]
+    assert result == pytest.approx([6 - 2 * np.pi, 2 * np.pi - 6, -np.pi, 0.1], rel=1e-13)
 
 
 @pytest.mark.parametrize(
@@ -129,11 +129,11 @@ def test_reductions() -> None:
 
 
 def test_extrema_give_the_index_of_the_first_of_equal_elements() -> None:
-    found = evaluate(Extremum(), [3.0, 1.0, 2.0, 1.0])
-    assert (float(found["y"]), float(found["index"])) == (1.0, 2.0)
-    found = evaluate(Extremum(function="max"), U)
-    assert found["y"] == U.max()
-    assert found["index"] == np.argmax(U.ravel(order="F")) + 1
+    result = evaluate(Extremum(), [3.0, 1.0, 2.0, 1.0])
+    assert (float(result["y"]), float(result["index"])) == (1.0, 2.0)
+    result = evaluate(Extremum(function="max"), U)
+    assert result["y"] == U.max()
+    assert result["index"] == np.argmax(U.ravel(order="F")) + 1
 
 
 def test_norms() -> None:

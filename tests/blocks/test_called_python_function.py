@@ -50,13 +50,13 @@ def loop(controller: Block, *, delay: bool = False) -> Diagram:
 
 def by_hand(count: int) -> np.ndarray:
     """The same loop, computed tick by tick with the closed form of y' = c - y / 2 between ticks."""
-    y, before, found = 0.0, 0.0, list[float]()
+    y, before, outputs = 0.0, 0.0, list[float]()
     for _ in range(count):
-        found.append(y)
-        now = bang(2.0 * y)
-        c, before = now + before, now
+        outputs.append(y)
+        output = bang(2.0 * y)
+        c, before = output + before, output
         y = 2 * c + (y - 2 * c) * np.exp(-T / 2)
-    return np.array(found)
+    return np.array(outputs)
 
 
 @RUNS

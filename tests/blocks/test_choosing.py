@@ -54,12 +54,12 @@ def test_assignment_replaces_elements() -> None:
     assert evaluate(Assignment(indices=[0, 1], counting="zero-based"), U, 7.0)["y"].tolist() == [7, 7, 30, 40]
 
 
-@pytest.mark.parametrize(("index", "place"), [(-5, 0), (0, 0), (0.99, 0), (1, 1), (3, 3), (9, 3)])
-def test_a_signal_selects_an_element_by_its_index(index: float, place: int) -> None:
-    assert evaluate(IndexVector(), index, U)["y"] == U[place]
-    assert evaluate(IndexVector(counting="one-based"), index + 1, U)["y"] == U[place]
+@pytest.mark.parametrize(("index", "element"), [(-5, 0), (0, 0), (0.99, 0), (1, 1), (3, 3), (9, 3)])
+def test_a_signal_selects_an_element_by_its_index(index: float, element: int) -> None:
+    assert evaluate(IndexVector(), index, U)["y"] == U[element]
+    assert evaluate(IndexVector(counting="one-based"), index + 1, U)["y"] == U[element]
     switch = MultiportSwitch(inputs=4, counting="zero-based")
-    assert evaluate(switch, index, *U)["y"] == U[place]
+    assert evaluate(switch, index, *U)["y"] == U[element]
 
 
 def test_scalar_inputs_of_switches_are_broadcast() -> None:
@@ -91,8 +91,8 @@ GATES = {
 @pytest.mark.parametrize("operator", GATES)
 def test_logical_operators(operator: str) -> None:
     for u in itertools.product([0.0, -2.5], repeat=3):
-        found = evaluate(LogicalOperator(operator=operator, inputs=3), *u)["y"]
-        assert found == float(GATES[operator](u))
+        result = evaluate(LogicalOperator(operator=operator, inputs=3), *u)["y"]
+        assert result == float(GATES[operator](u))
     assert evaluate(LogicalOperator(operator=operator, inputs=1), 3.0)["y"] == float(GATES[operator]([3.0]))
 
 

@@ -23,6 +23,6 @@ def test_complex_arithmetic_agrees_with_python() -> None:
 
 @pytest.mark.parametrize("z", [4 + 0j, -4 + 0j, complex(-4.0, -0.0), 9j, 0j, complex(0.0, -0.0)])
 def test_roots_on_the_axes_are_exact(z: complex) -> None:
-    found, expected = square_root(z), cmath.sqrt(z)
-    assert (found.real, found.imag) == (expected.real, expected.imag)
-    assert np.signbit(found.imag) == np.signbit(expected.imag)
+    root, expected = square_root(z), cmath.sqrt(z)
+    assert (root.real, root.imag) == (expected.real, expected.imag)
+    assert np.signbit(root.imag) == np.signbit(expected.imag)

@@ -47,12 +47,12 @@ def test_a_system_with_regular_E_agrees_with_the_state_space_block(solver: dict[
     E, A = random.normal(size=(3, 3)) + 3 * np.eye(3), random.normal(size=(3, 3)) - 3 * np.eye(3)
     B, C, D = random.normal(size=(3, 2)), random.normal(size=(2, 3)), random.normal(size=(2, 2))
     start, source = random.normal(size=3), SineWave(amplitude=[1.0, 2.0], frequency=[1.0, 3.0])
-    found = ab.simulate(
+    result = ab.simulate(
         diagram(DescriptorStateSpace(E=E, A=A, B=B, C=C, D=D, initial=start), source), **TOLERANCES, **solver
     )
     plain = StateSpace(A=np.linalg.solve(E, A), B=np.linalg.solve(E, B), C=C, D=D, initial=start)
     expected = ab.simulate(diagram(plain, source), **TOLERANCES, **solver)
-    assert found["block/y"] == pytest.approx(expected["block/y"], abs=1e-12)
+    assert result["block/y"] == pytest.approx(expected["block/y"], abs=1e-12)
 
 
 def test_the_poles_are_the_finite_generalised_eigenvalues() -> None:

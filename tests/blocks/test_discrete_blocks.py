@@ -43,13 +43,13 @@ def ticked(block: Block, source: Block | None = None, count: int = 40) -> np.nda
     system = trace_diagram(builder.build())
     p = system.parameter_values
     update = system.update.casadi_function()
-    z, found = system.initial_discrete(p)[0], list[np.ndarray]()
+    z, outputs = system.initial_discrete(p)[0], list[np.ndarray]()
     ones = np.ones(len(system.clocks))
     for k in range(count):
         (after,) = update.call([np.array(value, dtype=float) for value in (k * T, (), z, (), p, ones)])
         z = np.asarray(after).ravel()
-        found.append(system.discrete.unpack(z)["block/y"])
-    return np.array(found)
+        outputs.append(system.discrete.unpack(z)["block/y"])
+    return np.array(outputs)
 
 
 def test_a_hold_samples_its_input_at_the_tick() -> None:
@@ -101,12 +101,12 @@ def test_integrators_with_the_three_integration_rules() -> None:
 
 
 def test_a_limited_integrator_leaves_its_limit_without_delay() -> None:
-    found = ticked(DiscreteIntegrator(lower=-0.1, upper=0.2, sample_time=T))
+    outputs = ticked(DiscreteIntegrator(lower=-0.1, upper=0.2, sample_time=T))
     x = [0.0]
     for u in U[:-1]:
         x.append(min(max(x[-1] + T * u, -0.1), 0.2))
-    assert found == pytest.approx(x, rel=1e-13, abs=1e-15)
-    assert {0.2, -0.1} <= set(found)
+    assert outputs == pytest.approx(x, rel=1e-13, abs=1e-15)
+    assert {0.2, -0.1} <= set(outputs)
 
 
 def test_differences() -> None:
@@ -168,12 +168,12 @@ def test_a_pid_controller(anti_windup: str) -> None:
 
 
 def test_a_rate_limiter() -> None:
-    found = ticked(RateLimiter(rising=3.0, falling=-2.0, initial=0.1, sample_time=T))
+    actual = ticked(RateLimiter(rising=3.0, falling=-2.0, initial=0.1, sample_time=T))
     y, expected = 0.1, []
     for u in U:
         y = min(max(u, y - 2.0 * T), y + 3.0 * T)
         expected.append(y)
-    assert found == pytest.approx(expected, rel=1e-13)
+    assert actual == pytest.approx(expected, rel=1e-13)
 
 
 def test_a_limited_counter_restarts_at_zero() -> None:

@@ -44,9 +44,9 @@ U = np.array([0.3, -1.2, 2.5])
     ],
 )
 def test_formulas_equal_the_same_expression_in_python(formula: str, expected: float) -> None:
-    found = evaluate(Expression(formula=formula), U, t=0.7)["y"]
-    assert found.shape == ()
-    assert found == pytest.approx(expected, rel=1e-14, abs=1e-15)
+    actual = evaluate(Expression(formula=formula), U, t=0.7)["y"]
+    assert actual.shape == ()
+    assert actual == pytest.approx(expected, rel=1e-14, abs=1e-15)
 
 
 def test_vectors_are_processed_elementwise() -> None:

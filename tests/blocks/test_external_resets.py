@@ -44,17 +44,17 @@ SOLVERS = pytest.mark.parametrize(
 )
 
 
-def fires(kind: str, now: float, before: float | None) -> bool:
+def fires(kind: str, value: float, before: float | None) -> bool:
     """Return whether a reset fires, by the rules of Simulink's documentation."""
     first = before is None
     was = 0.0 if before is None else before
     return {
         "none": False,
-        "rising": not first and was <= 0 < now,
-        "falling": not first and was > 0 >= now,
-        "either": not first and (was > 0) != (now > 0),
-        "level": now != 0 or (not first and was != 0),
-        "level hold": now != 0,
+        "rising": not first and was <= 0 < value,
+        "falling": not first and was > 0 >= value,
+        "either": not first and (was > 0) != (value > 0),
+        "level": value != 0 or (not first and was != 0),
+        "level hold": value != 0,
     }[kind]
 
 
@@ -105,22 +105,22 @@ def test_a_discrete_integrator_is_reset_at_its_ticks(method: str) -> None:
         )
         for kind, source in cases
     ]
-    for (kind, source), found in zip(cases, ticked(*blocks)):
-        check_discrete_integrator(found, kind, source, method)
+    for (kind, source), outputs in zip(cases, ticked(*blocks)):
+        check_discrete_integrator(outputs, kind, source, method)
 
 
-def check_discrete_integrator(found: dict[str, np.ndarray], kind: str, source: str, method: str) -> None:
+def check_discrete_integrator(actual: dict[str, np.ndarray], kind: str, source: str, method: str) -> None:
     """Compare outputs with the recurrence, for a gain of 2 and limits."""
     lower, upper = -0.9, 0.8
     share = {"forward_euler": 0.0, "backward_euler": 1.0, "trapezoidal": 0.5}[method]
     x = 0.3
     for k in range(COUNT):
-        assert found["state"][k] == pytest.approx(x, abs=1e-13)
+        assert actual["state"][k] == pytest.approx(x, abs=1e-13)
         if fires(kind, TRIGGER[k], TRIGGER[k - 1] if k else None) or (k == 0 and source == "external"):
             x = 0.3 if source == "internal" else START[k]
         y = min(max(x + share * 2.0 * T * U[k], lower), upper)
-        assert found["y"][k] == pytest.approx(y, abs=1e-13)
-        assert found["saturated"][k] == (1.0 if y >= upper else -1.0 if y <= lower else 0.0)
+        assert actual["y"][k] == pytest.approx(y, abs=1e-13)
+        assert actual["saturated"][k] == (1.0 if y >= upper else -1.0 if y <= lower else 0.0)
         x = min(max(x + 2.0 * T * U[k], lower), upper)
 
 
@@ -137,11 +137,11 @@ def test_a_delay_is_reset_at_its_ticks() -> None:
         )
         for kind, source, length, enable in cases
     ]
-    for case, found in zip(cases, ticked(*blocks)):
-        check_delay(found["y"], *case)
+    for case, outputs in zip(cases, ticked(*blocks)):
+        check_delay(outputs["y"], *case)
 
 
-def check_delay(found: np.ndarray, kind: str, source: str, length: int, enable: bool) -> None:
+def check_delay(actual: np.ndarray, kind: str, source: str, length: int, enable: bool) -> None:
     """Compare outputs with the list of earlier inputs."""
     past, held, before, begun = [0.3] * length, 0.3, None, source == "internal"
     for k in range(COUNT):
@@ -150,7 +150,7 @@ def check_delay(found: np.ndarray, kind: str, source: str, length: int, enable: 
                 past = [START[k] if source == "external" else 0.3] * length
             held, begun, before = past[0], True, TRIGGER[k]
             past = [*past[1:], U[k]]
-        assert found[k] == pytest.approx(held, abs=1e-14)
+        assert actual[k] == pytest.approx(held, abs=1e-14)
 
 
 def test_a_resettable_delay_without_reset_agrees_with_the_delay_block() -> None:
@@ -158,8 +158,8 @@ def test_a_resettable_delay_without_reset_agrees_with_the_delay_block() -> None:
     block = ResettableDelay(
         length=3, external_reset="none", initial_condition_source="internal", initial=0.3, sample_time=T
     )
-    found, expected = ticked(block, plain)
-    np.testing.assert_array_equal(found["y"], expected["y"])
+    outputs, expected = ticked(block, plain)
+    np.testing.assert_array_equal(outputs["y"], expected["y"])
 
 
 def test_a_delay_of_vectors_is_reset_to_a_scalar() -> None:
@@ -238,12 +238,12 @@ def test_a_level_reset_holds_the_present_initial_value(kind: str, solver: dict[s
 def test_level_hold_keeps_the_initial_value_before_the_trigger_falls(solver: dict[str, Any]) -> None:
     """Where the initial value jumps as the trigger falls, level takes the new value, level hold the old."""
     pulse = PulseGenerator(period=10.0, width=10.0, amplitude=2.0)
-    for kind, kept in (("level", 0.0), ("level hold", 2.0)):
+    for kind, initial in (("level", 0.0), ("level hold", 2.0)):
         block = ResettableIntegrator(external_reset=kind, initial_condition_source="external")
         sources = {"u": Constant(value=1.0), "reset": pulse, "initial": pulse}
         result = ab.simulate(integral(block, sources), stop_time=3.0, sample_time=0.1, **solver)
         t = result.time
-        expected = np.where(t < 1.0 - 1e-9, 2.0, kept + t - 1.0)
+        expected = np.where(t < 1.0 - 1e-9, 2.0, initial + t - 1.0)
         assert result["y/y"] == pytest.approx(expected, abs=1e-9)
 
 

@@ -48,9 +48,9 @@ def test_values_and_integrals(method: str, outside: str, solver: str, step: floa
 
         def value(at: np.ndarray, column: np.ndarray = VALUES[:, k]) -> np.ndarray:
             row = np.clip(np.searchsorted(TIMES, at, side="right") - 1, 0, 4)
-            found = np.interp(at, TIMES, column) if method == "linear" else column[row]
+            values = np.interp(at, TIMES, column) if method == "linear" else column[row]
             inside = (at >= TIMES[0]) & (at < TIMES[-1])
-            return np.where(inside | (outside == "hold"), found, 0.0)
+            return np.where(inside | (outside == "hold"), values, 0.0)
 
         np.testing.assert_allclose(result["table/y"][:, k], value(t), atol=1e-12)
         # between adjacent values of `fine` the signal is linear in time

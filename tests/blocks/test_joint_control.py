@@ -51,8 +51,8 @@ def test_quantities_of_the_arm(puma560: Robot) -> None:
     assert energy["potential"] == pytest.approx(float(V), rel=1e-12)
     wrench, payload = RANDOM.normal(size=6), [2.0, 0.1, 0, 0.2, 0.1, 0.1, 0.1, 0, 0, 0]
     (tau,) = dynamics.trace_rne_loaded(puma560)(q, qd, qdd, wrench, payload)
-    found = evaluate(LoadedRne(robot=puma560), q, qd, qdd, wrench, payload)["tau"]
-    assert found == pytest.approx(tau, rel=1e-11, abs=1e-11)
+    result = evaluate(LoadedRne(robot=puma560), q, qd, qdd, wrench, payload)["tau"]
+    assert result == pytest.approx(tau, rel=1e-11, abs=1e-11)
 
 
 def test_pd_control_of_each_joint() -> None:
@@ -73,8 +73,8 @@ def test_computed_torque_gives_linear_error_dynamics(puma560: Robot) -> None:
 def test_feed_forward_on_the_reference_motion_gives_the_reference_acceleration(puma560: Robot) -> None:
     q, qd, qdd = RANDOM.uniform(-1, 1, (3, 6))
     tau = evaluate(FeedForward(robot=puma560), q, qd, qdd, q, qd)["tau"]
-    (found,) = dynamics.trace_accel(puma560)(q, qd, tau)
-    assert found == pytest.approx(qdd, rel=1e-9)
+    (result,) = dynamics.trace_accel(puma560)(q, qd, tau)
+    assert result == pytest.approx(qdd, rel=1e-9)
     off = evaluate(FeedForward(robot=puma560, Kp=7.0), q + 0.1, qd, qdd, q, qd)["tau"]
     on = evaluate(FeedForward(robot=puma560, Kp=7.0), q + 0.1, qd, qdd, q + 0.1, qd)["tau"]
     assert off - on == pytest.approx(np.full(6, 0.7), rel=1e-9)

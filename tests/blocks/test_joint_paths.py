@@ -33,10 +33,10 @@ def test_a_trapezoidal_profile(cruise: float) -> None:
         assert evaluate(block, t=t)["qd"].tolist() == [0, 0]
         assert evaluate(block, t=t)["qdd"].tolist() == [0, 0]
     for t in (0.3 * ramp, 2.0, tmax - 0.6 * ramp):
-        found = evaluate(block, t=t)
+        result = evaluate(block, t=t)
         if abs(t - ramp) > 1e-3 and abs(t - tmax + ramp) > 1e-3:
-            assert found["qd"] == pytest.approx(rate(block, "q", t), rel=1e-8)
-            assert found["qdd"] == pytest.approx(rate(block, "qd", t), rel=1e-7, abs=1e-9)
+            assert result["qd"] == pytest.approx(rate(block, "q", t), rel=1e-8)
+            assert result["qdd"] == pytest.approx(rate(block, "qd", t), rel=1e-7, abs=1e-9)
     assert evaluate(block, t=2.0)["qd"] == pytest.approx(cruise * (qf - q0) / tmax, rel=1e-14)
 
 
@@ -74,13 +74,13 @@ def test_a_straight_line_path_of_the_tool(profile: str) -> None:
     T0[:3, 3], T1[:3, 3] = RANDOM.normal(size=(2, 3))
     block = CTraj(tmax=6.0, profile=profile)
     for t in (0.0, 1.0, 2.5, 5.0, 6.0, 8.0):
-        found = evaluate(block, T0, T1, t=t)
-        s = found["s"]
+        actual = evaluate(block, T0, T1, t=t)
+        s = actual["s"]
         alone = Trapezoidal(tmax=6.0) if profile == "lspb" else JTraj(q0=[0.0], qf=[1.0], tmax=6.0)
         assert s == pytest.approx(np.ravel(evaluate(alone, t=t)["q"])[0], rel=1e-14)
         expected = Slerp([0, 1], turns)(float(np.clip(s, 0, 1))).as_matrix()
-        assert found["T"][:3, :3] == pytest.approx(expected, abs=1e-14)
-        assert found["T"][:3, 3] == pytest.approx(T0[:3, 3] + s * (T1[:3, 3] - T0[:3, 3]), rel=1e-14)
+        assert actual["T"][:3, :3] == pytest.approx(expected, abs=1e-14)
+        assert actual["T"][:3, 3] == pytest.approx(T0[:3, 3] + s * (T1[:3, 3] - T0[:3, 3]), rel=1e-14)
     assert evaluate(block, T0, T0, t=2.0)["T"] == pytest.approx(T0, abs=1e-14)
 
 

@@ -77,12 +77,12 @@ def test_a_large_table_of_several_axes_agrees_with_scipy(
         surface = LookupTable2D(positions1=axes[0], positions2=axes[1], **kind)
         np.testing.assert_allclose(evaluate(surface, *points)["y"], expected, rtol=1e-11, atol=1e-13)
     if method == "linear":
-        places = [
+        lookups = [
             evaluate(Prelookup(positions=x, zero_crossing=zero_crossing), u) for x, u in zip(axes, points)
         ]
-        pairs = [place[name] for place in places for name in ("k", "f")]
-        found = evaluate(InterpolationUsingPrelookup(table=table), *pairs)["y"]
-        np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-13)
+        pairs = [place[name] for place in lookups for name in ("k", "f")]
+        actual = evaluate(InterpolationUsingPrelookup(table=table), *pairs)["y"]
+        np.testing.assert_allclose(actual, expected, rtol=1e-11, atol=1e-13)
 
 
 @pytest.mark.parametrize("extrapolation", ["clip", "linear"])
@@ -90,16 +90,16 @@ def test_a_long_prelookup_extrapolates_or_clips_outside_its_range(extrapolation:
     k = np.clip(np.searchsorted(X, U, side="right") - 1, 0, COUNT - 2)
     f = (U - X[k]) / (X[k + 1] - X[k])
     f = np.clip(f, 0, 1) if extrapolation == "clip" else f
-    found = evaluate(Prelookup(positions=X, extrapolation=extrapolation), U)
-    np.testing.assert_array_equal(found["k"], k)
-    np.testing.assert_allclose(found["f"], f, rtol=1e-12, atol=1e-13)
+    actual = evaluate(Prelookup(positions=X, extrapolation=extrapolation), U)
+    np.testing.assert_array_equal(actual["k"], k)
+    np.testing.assert_allclose(actual["f"], f, rtol=1e-12, atol=1e-13)
 
 
 def test_direct_lookup_reads_entries_of_a_large_table() -> None:
     table = RANDOM.normal(size=(20, 30))
     rows, columns = [0.0, 19.9, -4.0, 7.5], [29.0, 3.2, 2.0, 99.0]
-    found = evaluate(DirectLookup(table=table), rows, columns)["y"]
-    assert found.tolist() == [table[0, 29], table[19, 3], table[0, 2], table[7, 29]]
+    actual = evaluate(DirectLookup(table=table), rows, columns)["y"]
+    assert actual.tolist() == [table[0, 29], table[19, 3], table[0, 2], table[7, 29]]
 
 
 @pytest.mark.parametrize("method", ["linear", "flat"])
@@ -138,8 +138,8 @@ def test_positions_of_a_long_table_are_checked_when_changed() -> None:
     diagram = ab.DiagramBuilder("tuned", settings=ab.SimulationOptions(stop_time=1.0))
     diagram.add("course", FromTable(times=X, values=Y))
     built = diagram.build()
-    moved = ab.simulate(built, parameters={"course.times": X + 0.5})
-    np.testing.assert_allclose(moved["course"], np.interp(moved.time, X + 0.5, Y), rtol=1e-12, atol=1e-13)
+    shifted = ab.simulate(built, parameters={"course.times": X + 0.5})
+    np.testing.assert_allclose(shifted["course"], np.interp(shifted.time, X + 0.5, Y), rtol=1e-12, atol=1e-13)
     with pytest.raises(DiagramError, match="each greater than"):
         ab.simulate(built, parameters={"course.times": -X})
 
@@ -175,9 +175,9 @@ def test_a_long_spline_agrees_with_scipy(beyond: str, zero_crossing: bool) -> No
         expected = spline(inside)
         if beyond == "linear":
             expected = expected + np.where(u < x[0], spline(x[0], 1), spline(x[-1], 1)) * (u - inside)
-        found = evaluate(LookupTable1D(positions=x, table=y, **kind), u)["y"]
-        np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-11)
-        np.testing.assert_array_equal(found[10:], y[at])
+        actual = evaluate(LookupTable1D(positions=x, table=y, **kind), u)["y"]
+        np.testing.assert_allclose(actual, expected, rtol=1e-10, atol=1e-11)
+        np.testing.assert_array_equal(actual[10:], y[at])
 
 
 def test_a_large_spline_surface_agrees_with_scipy() -> None:

@@ -41,9 +41,9 @@ def test_linear_interpolation_between_points() -> None:
 
 
 def test_linear_extrapolation_beyond_the_ends() -> None:
-    found = evaluate(LookupTable1D(positions=X, table=Y, extrapolation="linear"), [-2.0, 4.5])["y"]
+    result = evaluate(LookupTable1D(positions=X, table=Y, extrapolation="linear"), [-2.0, 4.5])["y"]
     first, last = (Y[1] - Y[0]) / (X[1] - X[0]), (Y[-1] - Y[-2]) / (X[-1] - X[-2])
-    assert found == pytest.approx([Y[0] - first, Y[-1] + last], rel=1e-13)
+    assert result == pytest.approx([Y[0] - first, Y[-1] + last], rel=1e-13)
 
 
 @pytest.mark.parametrize("n", [2, 3, 4, 5, 9])
@@ -94,21 +94,21 @@ def test_a_cubic_surface_is_a_spline_of_splines() -> None:
 
 def test_direct_lookup_truncates_and_clips_its_indices() -> None:
     table = RANDOM.normal(size=(2, 3))
-    found = evaluate(DirectLookup(table=table), [0.0, 1.9, -4.0], [2.0, 1.0, 99.0])["y"]
-    assert found.tolist() == [table[0, 2], table[1, 1], table[0, 2]]
+    result = evaluate(DirectLookup(table=table), [0.0, 1.9, -4.0], [2.0, 1.0, 99.0])["y"]
+    assert result.tolist() == [table[0, 2], table[1, 1], table[0, 2]]
 
 
 @pytest.mark.parametrize("extrapolation", ["clip", "linear"])
 def test_prelookup_and_interpolation_make_a_lookup_table(extrapolation: str) -> None:
     u = np.concatenate([INSIDE, OUTSIDE, X])
-    place = evaluate(Prelookup(positions=X, extrapolation=extrapolation), u)
-    assert set(np.unique(place["k"])) == {0, 1, 2, 3}
-    found = evaluate(InterpolationUsingPrelookup(table=Y), place["k"], place["f"])["y"]
+    cell = evaluate(Prelookup(positions=X, extrapolation=extrapolation), u)
+    assert set(np.unique(cell["k"])) == {0, 1, 2, 3}
+    actual = evaluate(InterpolationUsingPrelookup(table=Y), cell["k"], cell["f"])["y"]
     expected = evaluate(LookupTable1D(positions=X, table=Y, extrapolation=extrapolation), u)["y"]
-    assert found == pytest.approx(expected, rel=1e-14, abs=1e-15)
+    assert actual == pytest.approx(expected, rel=1e-14, abs=1e-15)
     surface = RANDOM.normal(size=(3, 2))
-    found = evaluate(InterpolationUsingPrelookup(table=surface), 1.0, 0.25, 0.0, 0.5)["y"]
-    assert found == pytest.approx([0.75, 0.25] @ surface[1:] @ [0.5, 0.5], rel=1e-14)
+    actual = evaluate(InterpolationUsingPrelookup(table=surface), 1.0, 0.25, 0.0, 0.5)["y"]
+    assert actual == pytest.approx([0.75, 0.25] @ surface[1:] @ [0.5, 0.5], rel=1e-14)
 
 
 def test_a_lookup_table_whose_points_are_signals() -> None:

@@ -75,10 +75,10 @@ def test_reshaping_diagonals_and_products() -> None:
 def test_matrices_are_concatenated() -> None:
     A, B = RANDOM.normal(size=(2, 3)), RANDOM.normal(size=(2, 1))
     assert np.array_equal(evaluate(MatrixConcatenate(), A, B)["y"], np.hstack([A, B]))
-    under = MatrixConcatenate(direction="vertical")
-    assert np.array_equal(evaluate(under, A, A + 1)["y"], np.vstack([A, A + 1]))
+    vertical = MatrixConcatenate(direction="vertical")
+    assert np.array_equal(evaluate(vertical, A, A + 1)["y"], np.vstack([A, A + 1]))
     assert evaluate(MatrixConcatenate(), [1.0, 2.0], [3.0, 4.0])["y"].tolist() == [[1, 3], [2, 4]]
-    assert evaluate(under, [1.0, 2.0], 3.0)["y"].tolist() == [1, 2, 3]
+    assert evaluate(vertical, [1.0, 2.0], 3.0)["y"].tolist() == [1, 2, 3]
 
 
 def test_matrices_of_unsuitable_shape_are_refused() -> None:

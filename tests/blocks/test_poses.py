@@ -67,8 +67,8 @@ def test_angles_at_the_singular_pitch_reproduce_the_pose(convention: str, off: f
     for sign in (1, -1):
         T = evaluate(Rpy2T(convention=convention), 0.7, sign * (np.pi / 2 - off), -1.2)["T"]
         back = evaluate(T2rpy(convention=convention), T)
-        again = evaluate(Rpy2T(convention=convention), back["roll"], back["pitch"], back["yaw"])["T"]
-        assert again == pytest.approx(T, abs=5e-15)
+        recomputed = evaluate(Rpy2T(convention=convention), back["roll"], back["pitch"], back["yaw"])["T"]
+        assert recomputed == pytest.approx(T, abs=5e-15)
         if off < 1e-15:
             assert back["roll"] == 0.0
 
@@ -81,8 +81,8 @@ def test_euler_angles() -> None:
             Rotation.from_euler("ZYZ", [phi, theta, psi]).as_matrix(), abs=1e-15
         )
         back = evaluate(T2eul(), T)
-        again = evaluate(Eul2T(), back["phi"], back["theta"], back["psi"])["T"]
-        assert again == pytest.approx(T, abs=5e-15)
+        recomputed = evaluate(Eul2T(), back["phi"], back["theta"], back["psi"])["T"]
+        assert recomputed == pytest.approx(T, abs=5e-15)
         if 0.1 < theta < 3:
             assert [back["phi"], back["theta"], back["psi"]] == pytest.approx([phi, theta, psi], abs=1e-14)
     assert evaluate(T2eul(), np.eye(4))["phi"] == 0.0
@@ -93,11 +93,11 @@ def test_quaternions() -> None:
     for turn in [*half_turns, Rotation.identity(), *Rotation.random(12, rng=RANDOM)]:
         T = np.eye(4)
         T[:3, :3] = turn.as_matrix()
-        found = evaluate(T2Quaternion(), T)["y"]
+        actual = evaluate(T2Quaternion(), T)["y"]
         expected = turn.as_quat(canonical=True, scalar_first=True)
-        assert found == pytest.approx(expected if found @ expected > 0 else -expected, abs=1e-15)
-        assert found[0] >= 0
-        assert evaluate(Quaternion2T(), 3.0 * found)["T"] == pytest.approx(T, abs=1e-15)
+        assert actual == pytest.approx(expected if actual @ expected > 0 else -expected, abs=1e-15)
+        assert actual[0] >= 0
+        assert evaluate(Quaternion2T(), 3.0 * actual)["T"] == pytest.approx(T, abs=1e-15)
 
 
 def test_quaternion_algebra() -> None:
@@ -156,8 +156,8 @@ def test_twists_are_transformed_by_the_adjoint() -> None:
         skew = evaluate(Skew(), V[3:])["S"]
         return np.vstack([np.column_stack([skew, V[:3]]), np.zeros(4)])
 
-    found = evaluate(TransformTwist(), T, V)["y"]
-    assert hat(found) == pytest.approx(T @ hat(V) @ np.linalg.inv(T), abs=1e-13)
+    result = evaluate(TransformTwist(), T, V)["y"]
+    assert hat(result) == pytest.approx(T @ hat(V) @ np.linalg.inv(T), abs=1e-13)
 
 
 def test_differential_motion_of_both_toolbox_releases() -> None:

@@ -95,9 +95,9 @@ def test_a_file_names_the_function_and_needs_trust(tmp_path: Path) -> None:
     expected = 2.0 * np.sin(np.sin(result.time)) + result.time
     np.testing.assert_allclose(result["f/y"], expected, atol=1e-14)
     # saved again: the same text and the same diagram
-    again = ab.save_diagram(diagram, tmp_path / "e.json")
-    assert '"function": "control.py:law"' in again.read_text()
-    assert ab.load_diagram(again, trust=True) == diagram
+    saved = ab.save_diagram(diagram, tmp_path / "e.json")
+    assert '"function": "control.py:law"' in saved.read_text()
+    assert ab.load_diagram(saved, trust=True) == diagram
 
 
 @pytest.mark.parametrize(

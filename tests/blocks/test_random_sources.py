@@ -30,13 +30,13 @@ A2 = ((0, 1, 0), (0, 0, 1), (-1370589, 0, 527612))
 
 def power(matrix: tuple[tuple[int, ...], ...], exponent: int, modulus: int) -> np.ndarray:
     """A matrix power modulo m, in integers of any size."""
-    found, square = np.eye(3, dtype=object), np.array(matrix, dtype=object)
+    result, square = np.eye(3, dtype=object), np.array(matrix, dtype=object)
     while exponent:
         if exponent & 1:
-            found = found.dot(square) % modulus
+            result = result.dot(square) % modulus
         square = square.dot(square) % modulus
         exponent >>= 1
-    return found
+    return result
 
 
 def reference(seed: int, element: int, count: int) -> list[float]:
@@ -46,12 +46,12 @@ def reference(seed: int, element: int, count: int) -> list[float]:
         list(power(matrix, jump, modulus).dot([12345] * 3) % modulus)
         for matrix, modulus in ((A1, M1), (A2, M2))
     )
-    found = list[float]()
+    numbers = list[float]()
     for _ in range(count):
         first = [*first[1:], (1403580 * first[1] - 810728 * first[0]) % M1]
         second = [*second[1:], (527612 * second[2] - 1370589 * second[0]) % M2]
-        found.append(((first[2] - second[2]) % M1 or M1) / (M1 + 1))
-    return found
+        numbers.append(((first[2] - second[2]) % M1 or M1) / (M1 + 1))
+    return numbers
 
 
 def drawn(block: Block, count: int, period: float = 0.001) -> np.ndarray:
@@ -81,9 +81,9 @@ def test_the_normal_quantile_agrees_with_scipy() -> None:
     quantile = Function("f", [p], [normal_quantile(p)])
     tails = 10.0 ** -np.linspace(0.5, 9.0, 60)
     points = np.concatenate([np.linspace(1e-3, 1.0 - 1e-3, 997), tails, 1.0 - tails[tails > 1e-6]])
-    found = np.array([float(quantile(point)) for point in points])
+    quantiles = np.array([float(quantile(point)) for point in points])
     # AS 241 has an error of 1e-16; SciPy's own rounding adds to it
-    np.testing.assert_allclose(found, special.ndtri(points), rtol=1e-14, atol=1e-15)
+    np.testing.assert_allclose(quantiles, special.ndtri(points), rtol=1e-14, atol=1e-15)
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2, 65535])
@@ -119,8 +119,8 @@ def test_the_seed_is_tunable() -> None:
     builder.add("noise", UniformRandomNumber(minimum=0.0, sample_time=0.001))
     compiled = compile_system(trace_diagram(builder.build()))
     options = SimulationOptions(stop_time=0.01, sample_time=0.001)
-    again = simulate(compiled, options, {"noise.seed": 12.0})
-    assert again["noise/y"].tolist() == reference(12, 0, 11)
+    repeated = simulate(compiled, options, {"noise.seed": 12.0})
+    assert repeated["noise/y"].tolist() == reference(12, 0, 11)
 
 
 @pytest.mark.parametrize("solver", ["rk45", "rk4"])

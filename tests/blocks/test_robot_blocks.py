@@ -44,36 +44,36 @@ def test_a_robot_block_agrees_with_the_dynamics_function(
     kind: type[Block], quantity: str, count: int, puma560: Robot
 ) -> None:
     inputs = RANDOM.uniform(-1, 1, (count, puma560.n))
-    (found,) = evaluate(kind(robot=puma560), *inputs).values()
+    (result,) = evaluate(kind(robot=puma560), *inputs).values()
     (expected,) = dynamics.TRACES[quantity](puma560)(*inputs)
-    assert found.shape == expected.shape
+    assert result.shape == expected.shape
     # same operations; common subexpressions may be evaluated in another order
-    assert found == pytest.approx(expected, rel=1e-13, abs=1e-12)
+    assert result == pytest.approx(expected, rel=1e-13, abs=1e-12)
 
 
 def test_forward_dynamics_outputs_states_and_acceleration(puma560: Robot) -> None:
     q, qd, tau = RANDOM.uniform(-1, 1, (3, 6))
     block = ForwardDynamics(robot=puma560, q0=0.1)
-    found = evaluate(block, tau, x=np.concatenate([q, qd]))
-    assert np.array_equal(found["q"], q)
-    assert np.array_equal(found["qd"], qd)
+    actual = evaluate(block, tau, x=np.concatenate([q, qd]))
+    assert np.array_equal(actual["q"], q)
+    assert np.array_equal(actual["qd"], qd)
     (expected,) = dynamics.trace_accel(puma560)(q, qd, tau)
-    assert found["qdd"] == pytest.approx(expected, rel=1e-12)
+    assert actual["qdd"] == pytest.approx(expected, rel=1e-12)
 
 
 def test_a_trajectory_is_the_polynomial_of_the_paper() -> None:
     q0, qf = np.array([0.1, 0.2]), np.array([3.14, -1.0])
     for t in (0.0, 2.5, 10.0):
         s = t / 10
-        found = evaluate(JTraj(q0=q0, qf=qf, tmax=10), t=t)
-        assert found["q"] == pytest.approx(q0 + (qf - q0) * (10 * s**3 - 15 * s**4 + 6 * s**5), rel=1e-14)
+        result = evaluate(JTraj(q0=q0, qf=qf, tmax=10), t=t)
+        assert result["q"] == pytest.approx(q0 + (qf - q0) * (10 * s**3 - 15 * s**4 + 6 * s**5), rel=1e-14)
         speed = (qf - q0) * (30 * s**2 - 60 * s**3 + 30 * s**4) / 10
-        assert found["qd"] == pytest.approx(speed, rel=1e-14, abs=1e-15)
+        assert result["qd"] == pytest.approx(speed, rel=1e-14, abs=1e-15)
 
 
 def test_a_trajectory_stands_still_after_its_end() -> None:
-    found = evaluate(JTraj(q0=[0.0], qf=[1.0], tmax=2.0), t=2.5)
-    assert [float(found[name][0]) for name in ("q", "qd", "qdd")] == [1.0, 0.0, 0.0]
+    result = evaluate(JTraj(q0=[0.0], qf=[1.0], tmax=2.0), t=2.5)
+    assert [float(result[name][0]) for name in ("q", "qd", "qdd")] == [1.0, 0.0, 0.0]
 
 
 def test_units_depend_on_the_joint_types(puma560: Robot) -> None:

@@ -69,8 +69,8 @@ def test_thirty_close_poles_are_realised_accurately() -> None:
     z, p, k = signal.butter(15, [100.0, 110.0], "bandpass", analog=True, output="zpk")
     points = 1j * np.linspace(90.0, 120.0, 31)
     expected = np.array([k * np.prod(s - z) / np.prod(s - p) for s in points])
-    found = response(AnalogFilter(filter_type="band_pass", order=15, edge=100.0, upper_edge=110.0), points)
-    np.testing.assert_allclose(found, expected, rtol=1e-9)
+    actual = response(AnalogFilter(filter_type="band_pass", order=15, edge=100.0, upper_edge=110.0), points)
+    np.testing.assert_allclose(actual, expected, rtol=1e-9)
     multiplied = signal.freqs(*signal.zpk2tf(z, p, k), points.imag)[1]
     assert np.max(np.abs(multiplied - expected) / np.abs(expected)) > 1e-6
 
@@ -113,14 +113,14 @@ def test_filters_agree_with_scipy(design: str, kind: str, order: int) -> None:
     points = 1j * np.logspace(-1, 3, 41)
     z, p, k = design_of([5.0, 40.0] if band else 5.0, True)
     expected = [k * np.prod(s - z) / np.prod(s - p) for s in points]
-    found = response(AnalogFilter(edge=5.0, upper_edge=40.0, **common), points)
-    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
+    actual = response(AnalogFilter(edge=5.0, upper_edge=40.0, **common), points)
+    np.testing.assert_allclose(actual, expected, rtol=1e-9, atol=1e-12)
 
     circle = np.exp(1j * np.pi * np.linspace(0.01, 0.99, 41))
     z, p, k = design_of([0.2, 0.5] if band else 0.2, False)
     expected = [k * np.prod(s - z) / np.prod(s - p) for s in circle]
-    found = response(DigitalFilter(edge=0.2, upper_edge=0.5, **common), circle)
-    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
+    actual = response(DigitalFilter(edge=0.2, upper_edge=0.5, **common), circle)
+    np.testing.assert_allclose(actual, expected, rtol=1e-9, atol=1e-12)
 
 
 @SOLVERS

@@ -39,9 +39,9 @@ from armblocks.errors import InputError
     ],
 )
 def test_values_of_the_grammar_are_parsed(text: str, value: object) -> None:
-    found = parse_value(text)
-    assert found == value
-    assert isinstance(found, type(value) | int)
+    parsed = parse_value(text)
+    assert parsed == value
+    assert isinstance(parsed, type(value) | int)
 
 
 def test_a_whole_number_is_parsed_as_an_integer() -> None:

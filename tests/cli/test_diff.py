@@ -61,9 +61,9 @@ def test_changed_logged_outputs_and_notes_are_listed(invoke: Invoke, tmp_path: P
     message = invoke("diff", "van_der_pol_pid", "new.json").stdout
     assert "Logged\n  + PID/y\n" in message
     assert 'Notes\n  ~ /n1: none -> "held by a PID"\n' in message
-    found = json.loads(invoke("diff", "van_der_pol_pid", "new.json", "--json").stdout)
-    assert found["logged_added"] == [{"path": "", "port": "PID/y"}]
-    assert found["notes"] == [{"path": "", "name": "/n1", "before": None, "after": "held by a PID"}]
+    difference = json.loads(invoke("diff", "van_der_pol_pid", "new.json", "--json").stdout)
+    assert difference["logged_added"] == [{"path": "", "port": "PID/y"}]
+    assert difference["notes"] == [{"path": "", "name": "/n1", "before": None, "after": "held by a PID"}]
 
 
 def test_the_differences_of_unlike_diagrams_fit_into_80_columns(invoke: Invoke) -> None:

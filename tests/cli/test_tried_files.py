@@ -250,7 +250,7 @@ def test_the_run_of_a_good_file_agrees_with_its_closed_form(
     with (tmp_path / "kept" / "data.csv").open(encoding="utf-8", newline="") as stream:
         names, *rows = csv.reader(stream)
     columns = np.array(rows, dtype=float).T
-    found, expected = compare(dict(zip(names, columns)))
+    actual, expected = compare(dict(zip(names, columns)))
     # The tolerance is 1e-6 per step; the accumulated error of the run stays below this bound.
-    assert found == pytest.approx(expected, rel=error, abs=error)
-    assert found.size >= 5
+    assert actual == pytest.approx(expected, rel=error, abs=error)
+    assert actual.size >= 5

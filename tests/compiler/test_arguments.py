@@ -44,7 +44,7 @@ def test_a_matrix_in_place_of_a_scalar_is_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "found"),
+    ("value", "data_type"),
     [
         (np.ones(3, complex), "complex128"),
         (np.array(["1", "2", "3"]), "<U1"),
@@ -54,9 +54,9 @@ def test_a_matrix_in_place_of_a_scalar_is_refused() -> None:
         (np.zeros(3, [("x", float)]), r"\[\('x', '<f8'\)\]"),
     ],
 )
-def test_arrays_that_are_not_real_are_refused(kernel: Kernel, value: np.ndarray, found: str) -> None:
+def test_arrays_that_are_not_real_are_refused(kernel: Kernel, value: np.ndarray, data_type: str) -> None:
     with pytest.raises(
-        InputError, match=f"mixed: 'a' holds {found}. Allowed: real numbers: any float or integer type"
+        InputError, match=f"mixed: 'a' holds {data_type}. Allowed: real numbers: any float or integer type"
     ):
         kernel(value, GOOD)
 
@@ -81,7 +81,7 @@ def read_only() -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("out", "found"),
+    ("out", "problem"),
     [
         ([0.0] * 11, "is a list"),
         (np.empty((2, 11), np.float32), "holds <f4"),
@@ -91,10 +91,10 @@ def read_only() -> np.ndarray:
         (read_only(), "is read-only"),
     ],
 )
-def test_an_unsuitable_array_for_out_is_refused(kernel: Kernel, out: object, found: str) -> None:
+def test_an_unsuitable_array_for_out_is_refused(kernel: Kernel, out: object, problem: str) -> None:
     with pytest.raises(InputError) as caught:
         kernel(np.ones((2, 3)), GOOD, out=out)
-    assert caught.match(f"mixed: out= for 'y' {found}. Allowed: a writable C-contiguous float64 array")
+    assert caught.match(f"mixed: out= for 'y' {problem}. Allowed: a writable C-contiguous float64 array")
     assert "of shape (2, 11). Fix: omit out=, or allocate it with numpy.empty." in str(caught.value)
 
 

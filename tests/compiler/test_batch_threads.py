@@ -43,7 +43,7 @@ def test_a_call_does_not_wait_for_a_late_helper_which_then_writes_nothing(
 
 @pytest.mark.parametrize("samples", [4096, 4097, 10_000, 32_767])
 def test_every_sample_is_evaluated_once(samples: int) -> None:
-    taken = np.zeros(samples, dtype=int)
+    evaluations = np.zeros(samples, dtype=int)
     lock = threading.Lock()
 
     def shares(job: ctypes.Array[ctypes.c_int64], hold: int, patience: int) -> None:
@@ -56,12 +56,12 @@ def test_every_sample_is_evaluated_once(samples: int) -> None:
                 job[0] += job[2]
             if start >= job[3]:
                 break
-            taken[start : min(start + job[2], job[3])] += 1
+            evaluations[start : min(start + job[2], job[3])] += 1
         with lock:
             job[1] -= 1
 
     batch_threads.evaluate_in_threads(shares, samples, (), 3, None)
-    assert (taken == 1).all()
+    assert (evaluations == 1).all()
 
 
 def test_an_interrupt_is_raised_after_all_helpers_have_stopped_writing(

@@ -119,8 +119,8 @@ def test_a_tape_or_record_of_another_version_is_written_again(folder: Path) -> N
             cache.store(path.stem, b'{"name": 3}')
         elif content.startswith(b"armblocks tape"):
             cache.store(path.stem, b"old tape")
-    again = cached_kernel("key", lambda: counting(calls))
-    assert again.tape == kernel.tape
+    rewritten = cached_kernel("key", lambda: counting(calls))
+    assert rewritten.tape == kernel.tape
     assert calls == ["traced", "traced"]
 
 
@@ -176,8 +176,8 @@ def test_the_least_recently_used_files_are_pruned_first(folder: Path) -> None:
     cache.prune(folder, limit=100_000)
     assert len(files(folder)) == 10
     cache.prune(folder, limit=6000)
-    kept = {path.stem for path in files(folder)}
-    assert kept == set(names[-4:])  # four files of 1050 bytes fit into three quarters of 6000 bytes
+    remaining = {path.stem for path in files(folder)}
+    assert remaining == set(names[-4:])  # four files of 1050 bytes fit into three quarters of 6000 bytes
 
 
 def test_the_folder_is_pruned_at_most_every_ten_minutes(
@@ -255,9 +255,9 @@ def test_processes_that_write_at_the_same_time_read_complete_files(folder: Path)
     workers = [context.Process(target=_work, args=(str(folder), results)) for _ in range(3)]
     for worker in workers:
         worker.start()
-    found = [results.get(timeout=60) for _ in workers]
+    outcomes = [results.get(timeout=60) for _ in workers]
     for worker in workers:
         worker.join()
-    assert found[0] == found[1] == found[2]
+    assert outcomes[0] == outcomes[1] == outcomes[2]
     assert [path for path in files(folder) if path.suffix == ".tmp"] == []
     assert all(cache.load(path.stem) is not None for path in files(folder))

@@ -113,16 +113,16 @@ def test_the_builtin_refuses_all_arguments_that_the_kernel_refuses(kernel: Kerne
     b = arguments(1)[1]
     with pytest.raises(InputError) as expected:
         kernel(value, b)
-    with pytest.raises(InputError) as found:
+    with pytest.raises(InputError) as error:
         kernel.entry(value, b)
-    assert str(found.value) == str(expected.value)
+    assert str(error.value) == str(expected.value)
 
 
 def test_wrong_counts_and_keywords_are_refused_with_the_message_of_the_kernel(kernel: Kernel) -> None:
     a, b = arguments(3)
-    for wrong in ((), (a,), (a, b, a)):
+    for inputs in ((), (a,), (a, b, a)):
         with pytest.raises(InputError, match="arguments were given"):
-            kernel.entry(*wrong)
+            kernel.entry(*inputs)
     with pytest.raises(UnknownNameError, match="no argument named 'speed'"):
         kernel.entry(a, b, speed=3)
     assert same_bits(kernel.entry(b=b, a=a), kernel(a, b))
@@ -149,14 +149,14 @@ def test_scalars_are_passed_and_returned_as_numbers(several: Kernel) -> None:
 def test_results_are_new_arrays(kernel: Kernel) -> None:
     a, b = arguments(4)
     first = kernel.entry(a, b)
-    kept = first.copy()
+    copy = first.copy()
     second = kernel.entry(b, a)
     assert first.base is None
     assert first.flags.owndata
     assert first.flags.c_contiguous
     assert first.flags.writeable
     assert not np.shares_memory(first, second)
-    assert np.array_equal(first, kept)
+    assert np.array_equal(first, copy)
 
 
 def test_calls_neither_lose_nor_leak_references(kernel: Kernel, several: Kernel) -> None:
@@ -172,20 +172,20 @@ def test_calls_neither_lose_nor_leak_references(kernel: Kernel, several: Kernel)
             several.entry(1.5, A)
             several.entry(t, A, out=None)
             kernel.entry(batch, b)
-            for wrong in ((a,), (a, A), (a, None)):
+            for inputs in ((a,), (a, A), (a, None)):
                 with pytest.raises(InputError):
-                    kernel.entry(*wrong)
+                    kernel.entry(*inputs)
 
     exercise()
     gc.collect()
-    before = [sys.getrefcount(thing) for thing in (*watched, *shared)]
+    before = [sys.getrefcount(item) for item in (*watched, *shared)]
     grown: list[int] = []
     for _ in range(3):  # other threads may allocate as well; a leak shows in every repetition
         blocks = sys.getallocatedblocks()
         exercise()
         gc.collect()
         grown.append(abs(sys.getallocatedblocks() - blocks))
-    after = [sys.getrefcount(thing) for thing in (*watched, *shared)]
+    after = [sys.getrefcount(item) for item in (*watched, *shared)]
     changes = [abs(x - y) for x, y in zip(before, after)]
     assert max(changes[: len(watched)]) < 20
     # A leak in each call would exceed three times this bound.
@@ -207,10 +207,10 @@ def test_the_builtin_keeps_its_kernel_alive_until_it_is_deleted() -> None:
 
 
 def test_arguments_outside_the_fast_path_are_passed_to_the_fallback(kernel: Kernel) -> None:
-    seen: list[tuple[object, ...]] = []
+    calls: list[tuple[object, ...]] = []
 
     def fallback(*arguments: object, **options: object) -> str:
-        seen.append((arguments, options))
+        calls.append((arguments, options))
         return "fallback"
 
     builtin = kernel.entry_before(fallback)
@@ -218,7 +218,7 @@ def test_arguments_outside_the_fast_path_are_passed_to_the_fallback(kernel: Kern
     assert same_bits(builtin(a, b), kernel(a, b))
     assert builtin(a, b, payload=3) == "fallback"
     assert builtin([1], b) == "fallback"
-    assert seen == [((a, b), {"payload": 3}), (([1], b), {})]
+    assert calls == [((a, b), {"payload": 3}), (([1], b), {})]
 
 
 def test_errors_of_the_fallback_pass_through(kernel: Kernel) -> None:
@@ -256,10 +256,10 @@ def test_random_mixtures_of_arguments(kernel: Kernel) -> None:
         assert outcome(kernel.entry, chosen, {}) == outcome(kernel, chosen, {})
 
 
-def outcome(call: Callable[..., object], given: Sequence[object], options: dict[str, object]) -> object:
+def outcome(call: Callable[..., object], arguments: Sequence[object], options: dict[str, object]) -> object:
     """Return type, shape and bits of each result of a call, or the text of its error."""
     try:
-        result = call(*given, **options)
+        result = call(*arguments, **options)
     except InputError as error:
         return str(error)
     parts = result if isinstance(result, tuple) else (result,)
@@ -272,29 +272,29 @@ def call_with_options(shapes: Sequence[tuple[int, ...]], result: tuple[int, ...]
     rng = np.random.default_rng(seed)
     samples = int(rng.choice([0, 1, 2, 7, 8, 9, 64, 600]))
     memory = rng.normal(size=40_000)  # all arrays are slices of this memory, so that they may overlap
-    place = 0
+    offset = 0
 
     def piece(shape: tuple[int, ...]) -> np.ndarray:
-        nonlocal place
-        start = place
-        place += int(np.prod(shape))
-        return memory[start:place].reshape(shape)
+        nonlocal offset
+        start = offset
+        offset += int(np.prod(shape))
+        return memory[start:offset].reshape(shape)
 
-    given: list[Any] = []
+    arguments: list[Any] = []
     for shape in shapes:
         count = samples + (rng.random() < 0.02)
         batched = rng.random() < 0.6
         value = piece((count, *shape) if batched else shape)
-        given.append(float(value) if value.ndim == 0 else value)
+        arguments.append(float(value) if value.ndim == 0 else value)
     options: dict[str, Any] = {}
     if rng.random() < 0.3:
         options["threads"] = rng.choice(np.array([1, 1, 1, 2, 0, True, None], object))
     if rng.random() < 0.7:
-        batched = any(np.ndim(value) > len(shape) for value, shape in zip(given, shapes))
-        place = max(0, place - int(rng.choice([0, 0, 0, 1, place])))
+        batched = any(np.ndim(value) > len(shape) for value, shape in zip(arguments, shapes))
+        offset = max(0, offset - int(rng.choice([0, 0, 0, 1, offset])))
         out: Any = piece((samples, *result) if batched else result)
-        wrong = rng.integers(16)
-        if wrong == 0:
+        fault = rng.integers(16)
+        if fault == 0:
             out.flags.writeable = False
         options["out"] = {
             1: lambda: out.astype(np.float32),
@@ -306,8 +306,8 @@ def call_with_options(shapes: Sequence[tuple[int, ...]], result: tuple[int, ...]
             7: lambda: out.view(Subclass),
             8: lambda: None,
             9: lambda: (out,),
-        }.get(wrong, lambda: out)()
-    return given, options, memory
+        }.get(fault, lambda: out)()
+    return arguments, options, memory
 
 
 def test_batches_and_options_give_the_results_and_errors_of_the_kernel(
@@ -323,9 +323,9 @@ def test_batches_and_options_give_the_results_and_errors_of_the_kernel(
     ):
         for seed in range(150):
             expected = call_with_options(shapes, result, seed)
-            found = call_with_options(shapes, result, seed)
-            assert outcome(called.entry, *found[:2]) == outcome(called, *expected[:2])
-            assert same_bits(found[2], expected[2])  # nothing else was written
+            actual = call_with_options(shapes, result, seed)
+            assert outcome(called.entry, *actual[:2]) == outcome(called, *expected[:2])
+            assert same_bits(actual[2], expected[2])  # nothing else was written
 
 
 def test_batches_and_options_do_not_call_python(kernel: Kernel, several: Kernel) -> None:
@@ -339,33 +339,33 @@ def test_batches_and_options_do_not_call_python(kernel: Kernel, several: Kernel)
     assert same_bits(out, kernel(a, b))
     for count in (0, 1, 8, 33, 600):
         batch = np.tile(a, (count, 1))
-        for given in ((batch, b), (a, np.tile(b, (count, 1))), (batch, np.tile(b, (count, 1)))):
-            expected = kernel(*given)  # the first call compiles the batch function for these inputs
-            assert same_bits(builtin(*given, threads=1), expected)
+        for inputs in ((batch, b), (a, np.tile(b, (count, 1))), (batch, np.tile(b, (count, 1)))):
+            expected = kernel(*inputs)  # the first call compiles the batch function for these inputs
+            assert same_bits(builtin(*inputs, threads=1), expected)
             out = np.empty((count, 11))
-            assert builtin(*given, out=out) is out
+            assert builtin(*inputs, out=out) is out
             assert same_bits(out, expected)
     t = np.arange(5.0)
     expected = several(t, np.eye(2))
-    found = several.entry_before(fallback)(t, np.eye(2))
-    assert all(map(same_bits, found, expected))
+    actual = several.entry_before(fallback)(t, np.eye(2))
+    assert all(map(same_bits, actual, expected))
 
 
 def test_batches_of_several_threads_at_the_same_time(kernel: Kernel) -> None:
     a, b = (np.random.default_rng(k).normal(size=(600, 3)) for k in (1, 2))
     expected = kernel(a, b)
-    found: list[np.ndarray] = []
+    results: list[np.ndarray] = []
 
     def work() -> None:
-        found.extend(kernel.entry(a, b) for _ in range(50))
+        results.extend(kernel.entry(a, b) for _ in range(50))
 
     workers = [threading.Thread(target=work) for _ in range(4)]
     for worker in workers:
         worker.start()
     for worker in workers:
         worker.join()
-    assert len(found) == 200
-    assert all(same_bits(result, expected) for result in found)
+    assert len(results) == 200
+    assert all(same_bits(result, expected) for result in results)
 
 
 def test_batches_of_a_kernel_with_nine_inputs_are_evaluated() -> None:

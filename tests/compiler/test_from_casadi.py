@@ -87,8 +87,8 @@ def means_what_casadi_means(names: Sequence[str], *columns: np.ndarray) -> None:
     # CasADi expects one sample per column.
     expected = np.asarray(function.casadi_function()(*(column[None] for column in columns))).T
     singles = np.array([kernel(*sample) for sample in zip(*samples)])
-    for found in (singles, kernel(*samples), interpret(kernel.tape, samples)[0]):
-        for name, one, other in zip(names, found.T, expected.T, strict=True):
+    for actual in (singles, kernel(*samples), interpret(kernel.tape, samples)[0]):
+        for name, one, other in zip(names, actual.T, expected.T, strict=True):
             # CasADi calls the C library: results may differ by the errors of both.
             np.testing.assert_allclose(one, other, rtol=1e-15, err_msg=name)
 
@@ -105,11 +105,11 @@ def test_binary_operations_agree_with_casadi() -> None:
 def test_minimum_and_maximum_propagate_nan() -> None:
     """CasADi's fmin and fmax ignore a NaN: a limiter would then hide an invalid signal."""
     names = ["fmin", "fmax", "add", "divide", "fmod", "remainder", "atan2", "hypot", "power"]
-    places = [list(BINARY).index(name) for name in names]
+    rows = [list(BINARY).index(name) for name in names]
     _, kernel = all_of(2)
     for x, y in ((np.nan, 2.0), (2.0, np.nan), (np.nan, np.nan)):
-        assert np.isnan(kernel([x], [y])[places]).all()
-        assert np.isnan(kernel([[x]] * 9, [[y]] * 9)[:, places]).all()
+        assert np.isnan(kernel([x], [y])[rows]).all()
+        assert np.isnan(kernel([[x]] * 9, [[y]] * 9)[:, rows]).all()
 
 
 def test_the_branch_that_is_not_selected_does_not_affect_the_result() -> None:

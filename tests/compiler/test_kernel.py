@@ -67,14 +67,14 @@ def test_the_number_of_threads_does_not_change_the_bits(kernel: Kernel) -> None:
 def test_calls_from_many_threads_at_once_are_safe() -> None:
     kernel = compile_function(traced(lambda a: casadi.sin(a) * a, 4, name="concurrent"))
     a = np.random.default_rng(2).normal(size=(5000, 4))
-    found: list[np.ndarray] = []
-    workers = [threading.Thread(target=lambda: found.append(kernel(a, threads=2))) for _ in range(6)]
+    results: list[np.ndarray] = []
+    workers = [threading.Thread(target=lambda: results.append(kernel(a, threads=2))) for _ in range(6)]
     for worker in workers:
         worker.start()
     for worker in workers:
         worker.join()
-    assert len(found) == 6
-    assert all(same_bits(result, kernel(a)) for result in found)
+    assert len(results) == 6
+    assert all(same_bits(result, kernel(a)) for result in results)
 
 
 def test_an_input_of_one_sample_is_broadcast(kernel: Kernel) -> None:

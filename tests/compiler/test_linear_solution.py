@@ -44,16 +44,16 @@ def test_solutions_are_as_accurate_as_the_matrix_allows_in_every_lane(n: int) ->
     b = np.einsum("kij,kj->ki", A, exact)
     kernel = compile_function(solver(n))
     x = kernel(A, b)
-    for matrix, right, found in zip(A, b, x):
+    for matrix, right, solution in zip(A, b, x):
         # Skeel's condition number is invariant under row scaling, and elementwise under column scaling.
-        known = np.linalg.solve(matrix, right) if np.linalg.cond(matrix) < 1e6 else found
+        known = np.linalg.solve(matrix, right) if np.linalg.cond(matrix) < 1e6 else solution
         inverse = np.abs(np.linalg.inv(matrix)) if np.linalg.cond(matrix) < 1e15 else None
         if inverse is not None:
-            bound = inverse @ (np.abs(matrix) @ np.abs(found))
-            assert (np.abs(found - known) <= 20.0 * n * EPS * bound).all()
+            bound = inverse @ (np.abs(matrix) @ np.abs(solution))
+            assert (np.abs(solution - known) <= 20.0 * n * EPS * bound).all()
         # The residual of every equation is a rounding error relative to its terms.
-        left = np.abs(matrix @ found - right)
-        assert (left <= 8.0 * n * EPS * (np.abs(matrix) @ np.abs(found) + np.abs(right))).all()
+        left = np.abs(matrix @ solution - right)
+        assert (left <= 8.0 * n * EPS * (np.abs(matrix) @ np.abs(solution) + np.abs(right))).all()
     single = np.array([kernel(matrix, right) for matrix, right in zip(A, b)])
     np.testing.assert_array_equal(single, x)
     np.testing.assert_array_equal(kernel.columns(A, b).T, x)
@@ -103,5 +103,5 @@ def test_first_and_second_derivatives_agree_with_closed_forms() -> None:
     weights = np.arange(1.0, n + 1.0)
     backwards = np.concatenate([[weights @ first], weights @ inverse])
     for evaluate in (compile_function(function), function):
-        for found, expected in zip(evaluate(0.3, b0), (x, first, second, inverse.ravel(), backwards)):
-            np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
+        for actual, expected in zip(evaluate(0.3, b0), (x, first, second, inverse.ravel(), backwards)):
+            np.testing.assert_allclose(actual, expected, rtol=1e-12, atol=1e-12)

@@ -46,8 +46,8 @@ def chained(A: np.ndarray, x: np.ndarray, start: np.ndarray | None) -> np.ndarra
 def test_a_product_equals_the_sum_of_its_terms_in_order_bit_for_bit(m: int, n: int) -> None:
     random = np.random.default_rng(m + n)
     kernel = compile_function(traced(m, n))
-    found = [operation.opcode for operation in kernel.tape.operations].count(Opcode.PRODUCT)
-    assert found >= 4
+    products = [operation.opcode for operation in kernel.tape.operations].count(Opcode.PRODUCT)
+    assert products >= 4
     assert Tape.from_bytes(kernel.tape.to_bytes()) == kernel.tape
     samples = 19
     x, c = random.normal(size=(samples, n)), random.normal(size=(samples, m))

@@ -67,18 +67,18 @@ def test_a_long_function_in_pieces_equals_the_uncut_one_bit_for_bit(monkeypatch:
     # A huge angle, for which the vector code calls the scalar code.
     x[20, 0] = 1e200
     in_pieces = function_in_pieces()
-    found = in_pieces(x, u)
+    actual = in_pieces(x, u)
     singles = [in_pieces(x[row], u[row]) for row in range(21)]
     message = [interpret(tape, [x[row], u[row]]) for row in (0, 7, 19)]
     monkeypatch.setenv("ARMBLOCKS_CACHE_DIR", "")
     monkeypatch.setattr(pieces, "LONGEST", 10**9)
     whole = compile_function(traced)(x, u)
     for slot in (0, 1):
-        np.testing.assert_array_equal(found[slot], whole[slot])
-        np.testing.assert_array_equal(found[slot], [single[slot] for single in singles])
+        np.testing.assert_array_equal(actual[slot], whole[slot])
+        np.testing.assert_array_equal(actual[slot], [single[slot] for single in singles])
         # Functions differ by one or two units in the last place; the recursion damps earlier differences.
-        wanted = [values[slot] for values in message]
-        np.testing.assert_allclose(found[slot][[0, 7, 19]], wanted, rtol=1e-12, atol=1e-13)
+        expected = [values[slot] for values in message]
+        np.testing.assert_allclose(actual[slot][[0, 7, 19]], expected, rtol=1e-12, atol=1e-13)
 
 
 def test_every_operation_and_store_is_in_one_piece_of_limited_length() -> None:
@@ -119,35 +119,35 @@ def test_all_optimisation_efforts_give_the_same_bits() -> None:
         emit_function(module, tape, "f", linkage="")
         return module.text
 
-    found: list[list[bytes]] = []
+    results: list[list[bytes]] = []
     for effort in Effort:
         code = load_code(("effort", tape.digest), write, effort)
         function = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * len(vectors))(code.address("f"))
         function(*(vector.ctypes.data for vector in vectors))
-        found.append([vector.tobytes() for vector in vectors])
+        results.append([vector.tobytes() for vector in vectors])
         for vector in vectors[len(tape.input_sizes) :]:
             vector[:] = np.nan
-    assert len(found) == 2 and found[0] == found[1]
+    assert len(results) == 2 and results[0] == results[1]
     message = interpret(tape, vectors[: len(tape.input_sizes)])
-    for given, expected in zip(found[0][len(tape.input_sizes) :], message):
-        np.testing.assert_allclose(np.frombuffer(given), expected, rtol=1e-12, atol=1e-13)
+    for actual, expected in zip(results[0][len(tape.input_sizes) :], message):
+        np.testing.assert_allclose(np.frombuffer(actual), expected, rtol=1e-12, atol=1e-13)
 
 
 def test_an_environment_variable_limits_the_optimisation_effort(monkeypatch: pytest.MonkeyPatch) -> None:
-    made: list[Effort] = []
+    efforts: list[Effort] = []
 
     def compiled(text: str, target: Target, *, effort: Effort) -> bytes:
-        made.append(effort)
+        efforts.append(effort)
         return compile_object(text, target, effort=effort)
 
     monkeypatch.setattr(native, "compile_object", compiled)
     monkeypatch.setenv("ARMBLOCKS_CACHE_DIR", "")
-    for requested, given in (("", "FULL"), ("full", "FULL"), ("little", "LITTLE")):
+    for requested, used in (("", "FULL"), ("full", "FULL"), ("little", "LITTLE")):
         monkeypatch.setenv("ARMBLOCKS_EFFORT", requested)
         load_code(("empty",), lambda: "")
         load_code(("empty",), lambda: "", Effort.LITTLE)
-        assert made == [Effort[given], Effort.LITTLE]
-        made.clear()
+        assert efforts == [Effort[used], Effort.LITTLE]
+        efforts.clear()
     monkeypatch.setenv("ARMBLOCKS_EFFORT", "much")
     with pytest.raises(InputError, match=r"'much' is not a valid.*'little', 'full'.*remove the variable"):
         load_code(("empty",), lambda: "")

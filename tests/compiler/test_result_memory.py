@@ -25,22 +25,22 @@ def test_memory_is_reused_once_no_array_refers_to_it() -> None:
     assert first.flags.writeable
     assert first.flags.aligned
     first[...] = 7.0
-    place, view = address(first), memoryview(first[3:4])
+    start, view = address(first), memoryview(first[3:4])
     del first
     assert pool.idle == 0  # the view refers to it
     second = pool.new_array((1000,))
     second[...] = 8.0
-    assert address(second) != place
+    assert address(second) != start
     assert (np.asarray(view) == 7.0).all()
     del view
     assert 8000 <= pool.idle <= 9000
-    assert address(pool.new_array((25, 40))) == place
+    assert address(pool.new_array((25, 40))) == start
 
 
 def test_idle_memory_of_another_size_is_not_reused() -> None:
     pool = ResultMemory(limit=1 << 20)
-    kept = pool.new_array((1000,))
-    del kept
+    array = pool.new_array((1000,))
+    del array
     assert pool.new_array((2000,)).size == 2000  # the idle memory is too small
     assert pool.new_array((100,)).size == 100  # the idle memory is much larger
     assert pool.idle > 8 * 3000
@@ -60,7 +60,7 @@ def test_idle_memory_is_bounded_and_can_be_freed() -> None:
 def test_no_two_results_share_memory() -> None:
     """Four threads allocate and drop results of random size; each result is checked when it is dropped."""
     pool = ResultMemory(limit=200_000)
-    wrong: list[float] = []
+    overwritten: list[float] = []
 
     def work(seed: int) -> None:
         rng = np.random.default_rng(seed)
@@ -68,7 +68,7 @@ def test_no_two_results_share_memory() -> None:
         for turn in range(400):
             if len(held) > rng.integers(6):
                 dropped = held.pop(rng.integers(len(held)))
-                wrong.extend(dropped[dropped != dropped[0]])
+                overwritten.extend(dropped[dropped != dropped[0]])
             result = pool.new_array((int(rng.integers(1, 3000)),))
             result[...] = 1000 * seed + turn
             held.append(result)
@@ -78,7 +78,7 @@ def test_no_two_results_share_memory() -> None:
         worker.start()
     for worker in workers:
         worker.join()
-    assert wrong == []
+    assert overwritten == []
     assert pool.idle <= 200_000
 
 
@@ -103,14 +103,14 @@ def test_large_batches_in_pool_memory_are_correct() -> None:
     a, b = rng.normal(size=(count, 3)), rng.normal(size=(count, 3))
     expected = kernel.entry(a, b, out=np.empty((count, 11)))
     first = kernel.entry(a, b)
-    place = address(first)
+    start = address(first)
     assert not first.flags.owndata
     assert same_bits(first, expected)
     second = kernel.entry(b, a)
     assert not np.shares_memory(first, second)
     assert same_bits(first, expected)
     del first
-    assert address(kernel.entry(a, b, threads=2)) == place
+    assert address(kernel.entry(a, b, threads=2)) == start
     del second
     assert result_memory().idle > 0
     gc.collect()

@@ -39,7 +39,7 @@ def test_reads_of_all_implementations_agree_with_numpy(count: int) -> None:
     entries = table[np.clip(np.trunc(u), 0, count - 1).astype(int)]
     indices = np.searchsorted(table, u, side="right") - 1.0
     kernel = compile_function(function)
-    for found in (
+    for actual in (
         kernel(u, table),
         kernel(u, np.tile(table, (len(u), 1))),
         kernel.columns(u, np.tile(table, (len(u), 1))),
@@ -47,8 +47,8 @@ def test_reads_of_all_implementations_agree_with_numpy(count: int) -> None:
         np.transpose([function(value, table) for value in u]),
         np.transpose([kernel(value, table) for value in u]),
     ):
-        np.testing.assert_array_equal(np.ravel(found[0]), entries)
-        np.testing.assert_array_equal(np.ravel(found[1]), indices)
+        np.testing.assert_array_equal(np.ravel(actual[0]), entries)
+        np.testing.assert_array_equal(np.ravel(actual[1]), indices)
 
 
 def test_each_sample_may_have_its_own_table() -> None:

@@ -35,7 +35,7 @@ def test_registers_are_numbered_inputs_constants_operations() -> None:
 
 def test_only_a_product_that_is_used_once_without_rounding_is_fused() -> None:
     builder = TapeBuilder([4])
-    a, b, c, d = (builder.input(0, place) for place in range(4))
+    a, b, c, d = (builder.input(0, index) for index in range(4))
     product = builder.add(Opcode.MULTIPLY, a, b)
     once = builder.build([[builder.add(Opcode.SUBTRACT, c, product)]])
     assert once.operations == (Operation(Opcode.FNMA, (0, 1, 2)),)
@@ -66,7 +66,7 @@ def test_dead_code_is_removed() -> None:
 def test_the_two_terms_of_if_else_become_one_selection() -> None:
     builder = TapeBuilder([3])
     zero = builder.constant(0.0)
-    condition, yes, no = (builder.input(0, place) for place in range(3))
+    condition, yes, no = (builder.input(0, index) for index in range(3))
     first = builder.add(Opcode.SELECT, condition, yes, zero)
     second = builder.add(Opcode.SELECT, builder.add(Opcode.NOT, condition), no, zero)
     tape = builder.build([[builder.add(Opcode.ADD, first, second)]])
@@ -102,9 +102,9 @@ def test_constants_are_folded() -> None:
 
 def test_bytes_and_digest_identify_a_tape() -> None:
     tape = tape_from(mixed())
-    again = Tape.from_bytes(tape.to_bytes())
-    assert again == tape
-    assert again.digest == tape.digest == tape_from(mixed()).digest
+    copy = Tape.from_bytes(tape.to_bytes())
+    assert copy == tape
+    assert copy.digest == tape.digest == tape_from(mixed()).digest
     changed = Tape(tape.input_sizes, (*tape.constants[:-1], 99.0), tape.operations, tape.outputs)
     assert changed.digest != tape.digest
 
@@ -173,7 +173,7 @@ def test_the_interpreter_broadcasts_inputs_and_checks_their_sizes() -> None:
 
 def test_the_absolute_value_of_copysign_ignores_the_sign() -> None:
     builder = TapeBuilder([2])
-    a, b = (builder.input(0, place) for place in range(2))
+    a, b = (builder.input(0, index) for index in range(2))
     signed = builder.add(Opcode.COPY_SIGN, builder.constant(-2.2), b)
     other = builder.add(Opcode.COPY_SIGN, a, b)
     tape = builder.build([[builder.add(Opcode.ABSOLUTE, signed), builder.add(Opcode.ABSOLUTE, other)]])

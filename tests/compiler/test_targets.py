@@ -27,11 +27,11 @@ LAYOUT = BatchLayout(inputs=(Layout.ROWS, Layout.ROWS), outputs=(Layout.ROWS,))
 def module(lanes: int) -> str:
     function = mixed()
     tape = tape_from(function)
-    made = Module()
-    emit_batch(made, tape, LAYOUT, lanes, "batch")
-    emit_function(made, tape, "evaluate", linkage="")
-    emit_entry(made, function.inputs, function.outputs, "evaluate")
-    return made.text
+    result = Module()
+    emit_batch(result, tape, LAYOUT, lanes, "batch")
+    emit_function(result, tape, "evaluate", linkage="")
+    emit_entry(result, function.inputs, function.outputs, "evaluate")
+    return result.text
 
 
 @pytest.mark.parametrize(
@@ -122,9 +122,9 @@ def test_arm64_code_has_no_negated_multiply_add(effort: Effort) -> None:
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
     target = replace(host_target(), triple="aarch64-unknown-linux-gnu", cpu="generic", features="", lanes=2)
-    made = Module()
-    emit_function(made, tape_from(traced(negations, 5, 5)), "evaluate", linkage="")
-    code = compile_object(made.text, target, effort=effort)
+    result = Module()
+    emit_function(result, tape_from(traced(negations, 5, 5)), "evaluate", linkage="")
+    code = compile_object(result.text, target, effort=effort)
     words = np.frombuffer(code[: len(code) // 4 * 4], "<u4")
     # C7.2 of the Arm Architecture Reference Manual: FMADD and FNMADD differ in bit 21 (o1), bit 15 (o0) is 0.
     assert np.any((words & 0xFFE08000) == 0x1F400000) or np.any((words & 0xFFE08000) == 0x1F408000)

@@ -99,25 +99,25 @@ def all_equations(block: Block, shapes: Shapes) -> Function:
     x, u, e, p = (dict(natural(slots, symbol)) for slots, symbol in zip(ends, symbols))
     if block.sampled:
         p["T"] = SX(0.1)
-    found = [
+    results = [
         equation(Arguments(t, x, u, p, e))
         for kind, equation in features.equations.items()
         if kind is not SlotKind.RESET or features.guards
     ]
-    found += [features.starts(p), features.history(p), features.held(p), features.guesses(p)]
-    found += [{name: bound[k] for name, bound in features.delay_bounds(p).items()} for k in (0, 1)]
-    found += [dict(enumerate(map(SX, features.breakpoints(p))))]
-    return Function("f", [t, *symbols], [SX(value) for group in found for value in group.values()])
+    results += [features.starts(p), features.history(p), features.held(p), features.guesses(p)]
+    results += [{name: bound[k] for name, bound in features.delay_bounds(p).items()} for k in (0, 1)]
+    results += [dict(enumerate(map(SX, features.breakpoints(p))))]
+    return Function("f", [t, *symbols], [SX(value) for group in results for value in group.values()])
 
 
-def numbers(equations: Function, values: Block, least: float = 0.1) -> list[np.ndarray]:
+def numbers(equations: Function, values: Block, minimum: float = 0.1) -> list[np.ndarray]:
     """Evaluate equations at fixed pseudo-random t, x, u and the parameters of the block ``values``.
 
-    States and inputs lie between ``least`` and ``least + 0.8``.
+    States and inputs lie between ``minimum`` and ``minimum + 0.8``.
     """
     random = np.random.default_rng(1)
     tunables = [np.ravel(values.parameter_value(rule.name)) for rule in values.parameters() if rule.tunable]
-    points = [0.37, *(random.uniform(least, least + 0.8, equations.numel_in(k)) for k in (1, 2, 3))]
+    points = [0.37, *(random.uniform(minimum, minimum + 0.8, equations.numel_in(k)) for k in (1, 2, 3))]
     points.append(np.concatenate([*tunables, []]))
     return [np.asarray(value) for value in equations.call([np.asarray(point) for point in points])]
 
@@ -230,8 +230,8 @@ def test_equations_are_pure_and_read_tunable_parameters_only_from_p(kind: type[B
     )
     for shapes in fitting_shapes(block):
         first = numbers(all_equations(block, shapes), block)
-        for again in (block, other):
-            for one, two in zip(first, numbers(all_equations(again, shapes), block), strict=True):
+        for repeated in (block, other):
+            for one, two in zip(first, numbers(all_equations(repeated, shapes), block), strict=True):
                 assert np.array_equal(one, two, equal_nan=True)
 
 
@@ -257,7 +257,7 @@ def test_every_choice_of_a_parameter_has_finite_equations(kind: type[Block]) -> 
             for shapes in fitting_shapes(block):
                 # acosh is not defined below 1, asin not above
                 equations = all_equations(block, shapes)
-                tried = (numbers(equations, block, least) for least in (0.1, 1.1))
+                tried = (numbers(equations, block, minimum) for minimum in (0.1, 1.1))
                 assert any(all(np.isfinite(value).all() for value in values) for values in tried)
 
 

@@ -32,10 +32,10 @@ SI_UNIT = re.compile(
 
 def changed(rule: Parameter, value: object) -> np.ndarray:
     """Return a slightly changed value within the bounds of a tunable parameter; infinity is not changed."""
-    given = np.asarray(value, dtype=np.float64)
-    finite = np.where(np.isfinite(given), given, 0.0)
+    array = np.asarray(value, dtype=np.float64)
+    finite = np.where(np.isfinite(array), array, 0.0)
     return np.where(
-        np.isfinite(given), np.clip(given + 1e-3 * (1.0 + np.abs(finite)), rule.minimum, rule.maximum), given
+        np.isfinite(array), np.clip(array + 1e-3 * (1.0 + np.abs(finite)), rule.minimum, rule.maximum), array
     )
 
 
@@ -51,9 +51,9 @@ def test_units_of_ports_and_parameters_are_si_units() -> None:
 def test_a_file_keeps_the_worked_example(kind: type[Block]) -> None:
     diagram = worked_example(kind)
     data = diagram_to_bytes(diagram, load_robot)
-    again = diagram_from_bytes(data, "example", BLOCKS, load_robot)
-    assert again == diagram
-    assert diagram_to_bytes(again, load_robot) == data
+    reread = diagram_from_bytes(data, "example", BLOCKS, load_robot)
+    assert reread == diagram
+    assert diagram_to_bytes(reread, load_robot) == data
 
 
 @each_kind

@@ -32,7 +32,7 @@ from armblocks.face.block_examples import example_block
 
 def switching() -> list[str]:
     """Return the names of blocks with modes whose ports take scalars."""
-    found: list[str] = []
+    switching_names: list[str] = []
     for name, kind in BLOCKS.items():
         block = example_block(kind)
         ports = block.input_ports()
@@ -41,8 +41,8 @@ def switching() -> list[str]:
         if scalar and not block.sampled and not block.virtual:
             with suppress(InputError):  # some blocks take only vectors
                 block.output_shapes(scalars)
-                found += [name] * bool(block.modes(scalars))
-    return found
+                switching_names += [name] * bool(block.modes(scalars))
+    return switching_names
 
 
 def jump(builder: ab.DiagramBuilder, name: str, by: str, before: float, after: float) -> BlockHandle:
@@ -76,27 +76,27 @@ def diagram_of(
 def ranges(diagram: Diagram, blocks: dict[str, Block]) -> dict[str, tuple[float, float]]:
     """Return the middle and half the width of the range of each scalar output."""
     result = ab.simulate(diagram, stop_time=1.25, sample_time=0.005)
-    found: dict[str, tuple[float, float]] = {}
+    result_ranges: dict[str, tuple[float, float]] = {}
     for name, block in blocks.items():
         for port in block.output_ports():
             values = np.asarray(result[f"{name}/{port.name}"])
             if values.ndim == 1:
-                least, most = float(values.min()), float(values.max())
-                found[f"{name}/{port.name}"] = (0.5 * (least + most), 0.5 * (most - least))
-    return found
+                lowest, highest = float(values.min()), float(values.max())
+                result_ranges[f"{name}/{port.name}"] = (0.5 * (lowest + highest), 0.5 * (highest - lowest))
+    return result_ranges
 
 
 @pytest.mark.parametrize("by", ["breakpoint", "tick", "event"])
 @pytest.mark.parametrize("seed", range(2))
 def test_no_event_sees_an_output_during_the_mode_iteration(seed: int, by: str) -> None:
     builder, blocks = diagram_of(switching(), by, np.random.default_rng(seed))
-    found = ranges(builder.build(), blocks)
-    assert len(found) > 30
-    for path, (middle, half) in found.items():
+    actual = ranges(builder.build(), blocks)
+    assert len(actual) > 30
+    for path, (middle, half) in actual.items():
         name, _, port = path.partition("/")
         distance = builder.add(f"distance of {port} of {name}", Bias(bias=-middle), PortRef(name, port))
         size = builder.add(f"size of {port} of {name}", Abs(zero_crossing=False), distance)
         builder.add(f"{port} of {name} leaves", HitCrossing(offset=1.02 * half + 1e-3), size)
     result = ab.simulate(builder.build(), stop_time=1.25, sample_time=0.25)
-    left = [path for path in found if result["{1} of {0} leaves/count".format(*path.split("/"))][-1] != 0.0]
+    left = [path for path in actual if result["{1} of {0} leaves/count".format(*path.split("/"))][-1] != 0.0]
     assert left == []

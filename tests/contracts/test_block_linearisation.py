@@ -70,15 +70,15 @@ def test_linearisation_agrees_with_finite_differences(kind: type[Block]) -> None
     if system.algebraic.size:
         pytest.skip("the example has an implicit equation")
     x, z = packed(system.states, point.states), packed(system.discrete, point.discrete)
-    place = system.parameters.ranges["nudge.value"]
+    entry = system.parameters.ranges["nudge.value"]
 
     def at(s: float) -> np.ndarray:
         p = packed(system.parameters, point.parameters)
-        p[place] += s
+        p[entry] += s
         (y,) = system.signals(TIME, x, z, (), p)
         (dx,) = system.derivative(TIME, x, z, (), p)
-        seen = system.signals_layout.unpack(y)
-        chosen = [np.ravel(seen[system.aliases.get(path, path)]) for path in outputs]
+        signals = system.signals_layout.unpack(y)
+        chosen = [np.ravel(signals[system.aliases.get(path, path)]) for path in outputs]
         return np.concatenate([np.ravel(dx), *chosen])
 
     expected = np.concatenate([linear.B.ravel(), linear.D.ravel()])

@@ -22,7 +22,7 @@ from armblocks.errors import ArmblocksError, InputError, SimulationError
 from armblocks.face.block_examples import block_name
 
 SETTINGS = {"rtol": 1e-10, "atol": 1e-11, "stop_time": 3.0, "sample_time": 3.0 / 37.3, "solver": "rk45"}
-PLACES = ("plain", "enabled", "delayed")
+SURROUNDINGS = ("plain", "enabled", "delayed")
 SHORT = (
     ("FirstOrderHold", "plain"),
     ("PWM", "delayed"),
@@ -36,7 +36,7 @@ SHORT = (
 )
 LONG = os.environ.get("ARMBLOCKS_LONG", "")
 SEED = int(LONG) if LONG.isdigit() else 1
-CASES = [(kind, place) for kind in sorted(BLOCKS) for place in PLACES] if LONG else SHORT
+CASES = [(kind, surroundings) for kind in sorted(BLOCKS) for surroundings in SURROUNDINGS] if LONG else SHORT
 REFUSED = (
     "is a table that is read by index",
     "acts only through comparisons or its integer part",
@@ -73,22 +73,24 @@ def enabled(name: str, block: Block) -> Block:
     return EnabledSubsystem(diagram=inside.build())
 
 
-def case(kind: str, place: str, seed: int) -> tuple[Diagram, str, Sequence[str]]:
+def case(kind: str, surroundings: str, seed: int) -> tuple[Diagram, str, Sequence[str]]:
     """Return the diagram, the path of the block, and the integrals of its outputs."""
-    random = np.random.default_rng([seed, *map(ord, kind + place)])
+    random = np.random.default_rng([seed, *map(ord, kind + surroundings)])
     example, name = ab.block_example(kind), block_name(BLOCKS[kind])
     builder = DiagramBuilder("case")
     shown = [other for other, block in example.blocks.items() if block.views() and other != name]
     for other, block in example.blocks.items():
         if other not in shown:
             changed = shaken(block, random)
-            builder.add(other, enabled(name, changed) if (other, place) == (name, "enabled") else changed)
-    if place == "enabled":
+            builder.add(
+                other, enabled(name, changed) if (other, surroundings) == (name, "enabled") else changed
+            )
+    if surroundings == "enabled":
         control = SineWave(frequency=1.7, bias=0.31, phase=0.4)
         builder.connect(builder.add("control", control), PortRef(name, "enable"))
 
     def source(end: PortRef) -> PortRef:
-        return PortRef(name, f"{end.port} out") if (end.block, place) == (name, "enabled") else end
+        return PortRef(name, f"{end.port} out") if (end.block, surroundings) == (name, "enabled") else end
 
     for wire in example.connections:
         if wire.target.block not in shown:
@@ -96,10 +98,10 @@ def case(kind: str, place: str, seed: int) -> tuple[Diagram, str, Sequence[str]]
     integrals: list[str] = []
     for port in example.blocks[name].output_ports():
         last = source(PortRef(name, port.name))
-        if place == "delayed":
+        if surroundings == "delayed":
             last = builder.add(f"late {port.name}", TransportDelay(delay=0.37), last)
         integrals.append(builder.add(f"integral of {port.name}", Integrator(), last).name)
-    return builder.build(), f"{name}/{name}" if place == "enabled" else name, integrals
+    return builder.build(), f"{name}/{name}" if surroundings == "enabled" else name, integrals
 
 
 def differences(
@@ -120,20 +122,20 @@ def differences(
     yield extrapolated(
         [[(a - b) / (2.0 * h) for a, b in zip(*ends)] for h, *ends in zip(steps, above, below)], 4
     )
-    here = run(0.0)
+    unchanged = run(0.0)
     for side, ends in ((1.0, above), (-1.0, below)):
         yield extrapolated(
-            [[(a - b) / (side * h) for a, b in zip(end, here)] for h, end in zip(steps, ends)], 2
+            [[(a - b) / (side * h) for a, b in zip(end, unchanged)] for h, end in zip(steps, ends)], 2
         )
 
 
 def extrapolated(plain: Sequence[Sequence[Array]], ratio: int) -> list[tuple[Array, Array]]:
     """Return the limit of differences whose errors decrease by ``ratio`` per step, and its uncertainty."""
-    found: list[tuple[Array, Array]] = []
+    estimates: list[tuple[Array, Array]] = []
     for rows in zip(*plain):
         first, second = ((ratio * fine - coarse) / (ratio - 1) for coarse, fine in pairwise(rows))
-        found.append((second, np.abs(second - first) + 0.05 * np.abs(rows[-1] - second)))
-    return found
+        estimates.append((second, np.abs(second - first) + 0.05 * np.abs(rows[-1] - second)))
+    return estimates
 
 
 def agree(
@@ -148,9 +150,9 @@ def agree(
             for compared in differences(diagram, parameter, value, along, step, outputs):
                 judged, wrong = True, False
                 for output, (expected, doubt) in zip(outputs, compared):
-                    found = result[output, parameter].reshape(*expected.shape, -1) @ along.ravel()
+                    actual = result[output, parameter].reshape(*expected.shape, -1) @ along.ravel()
                     bound = 1e-4 * (0.05 + np.abs(expected).max()) + 10.0 * doubt
-                    wrong |= bool((~(np.abs(found - expected) <= bound)).any())
+                    wrong |= bool((~(np.abs(actual - expected) <= bound)).any())
                 if not wrong:
                     return True
         except ArmblocksError:
@@ -158,10 +160,10 @@ def agree(
     return not judged
 
 
-@pytest.mark.parametrize(("kind", "place"), CASES)
-def test_sensitivities_agree_with_differences_of_runs(kind: str, place: str) -> None:
+@pytest.mark.parametrize(("kind", "surroundings"), CASES)
+def test_sensitivities_agree_with_differences_of_runs(kind: str, surroundings: str) -> None:
     try:
-        diagram, path, outputs = case(kind, place, SEED)
+        diagram, path, outputs = case(kind, surroundings, SEED)
         ab.simulate(diagram, **SETTINGS)
     except ArmblocksError:
         assert LONG, "a case of the short list cannot be built or run"

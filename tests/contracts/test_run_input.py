@@ -58,24 +58,24 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     ("settings", "words"), REFUSED, ids=[" ".join(f"{k}={v}" for k, v in s.items()) for s, _ in REFUSED]
 )
 def test_an_invalid_setting_is_refused_with_one_message(settings: dict[str, Any], words: str) -> None:
-    given: dict[str, Any] = {"stop_time": 1.0, **settings}
+    arguments: dict[str, Any] = {"stop_time": 1.0, **settings}
     with pytest.raises(ArmblocksError) as refused:
-        ab.simulate(ramp(), **given)
+        ab.simulate(ramp(), **arguments)
     assert words in message(refused.value)
 
 
 def test_a_run_with_stop_time_0_records_one_sample() -> None:
-    found = ab.simulate(ramp(), stop_time=0.0)
-    assert found.time.tolist() == [0.0]
-    assert found["x"].tolist() == [0.0]
+    result = ab.simulate(ramp(), stop_time=0.0)
+    assert result.time.tolist() == [0.0]
+    assert result["x"].tolist() == [0.0]
 
 
 @pytest.mark.parametrize("stop", [1e-320, 1e-9, 1e15, 1e308, np.float32(2.0), np.int64(2)])
 def test_runs_of_any_duration_and_number_type(stop: float) -> None:
-    found = ab.simulate(ramp(), stop_time=stop)
-    assert found.time[-1] == stop
+    result = ab.simulate(ramp(), stop_time=stop)
+    assert result.time[-1] == stop
     # rounding errors of some hundred steps
-    assert found["x"][-1] == pytest.approx(float(stop), rel=1e-12)
+    assert result["x"][-1] == pytest.approx(float(stop), rel=1e-12)
 
 
 def test_a_stop_time_before_the_initial_state_is_refused() -> None:

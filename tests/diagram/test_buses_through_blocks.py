@@ -58,8 +58,8 @@ def bus_of(builder: DiagramBuilder, mark: str, parts: list[BlockHandle]) -> Bloc
 
 def pass_through(kind: str) -> Diagram:
     builder = DiagramBuilder(kind)
-    entering = builder.add("u", Inport())
-    builder.add("y", Outport(), entering)
+    signal = builder.add("u", Inport())
+    builder.add("y", Outport(), signal)
     return builder.build()
 
 

@@ -103,7 +103,7 @@ def content(diagram: Diagram, name: str) -> tuple[object, ...]:
 
     blocks = {key: block for key, block in flat.blocks.items() if zero(PortRef(key, "")).block != name}
     wires = {(zero(wire.source), wire.target) for wire in flat.connections if wire.target.block in blocks}
-    shapes = {key: found for key, found in infer_shapes(diagram).inputs.items() if key in blocks}
+    shapes = {key: shape for key, shape in infer_shapes(diagram).inputs.items() if key in blocks}
     views = [(key, view) for key, view in diagram_views(diagram) if key != name]
     return blocks, wires, dict(flat.gates), shapes, views
 
@@ -192,7 +192,7 @@ def model(*, open_input: bool = False) -> Diagram:
 
 
 @pytest.mark.parametrize(
-    ("comments", "gone", "zeros"),
+    ("comments", "removed", "zeros"),
     [
         ({"gain": "out"}, [], ["gain/y", "integrator/y", "filter/y"]),
         ({"integrator": "out"}, ["integrator/initial"], ["integrator/y", "filter/y"]),
@@ -203,10 +203,10 @@ def model(*, open_input: bool = False) -> Diagram:
     ],
 )
 def test_a_block_that_is_commented_out_takes_no_part(
-    comments: dict[str, Any], gone: list[str], zeros: list[str]
+    comments: dict[str, Any], removed: list[str], zeros: list[str]
 ) -> None:
     result = run(with_comments(model(), comments))
-    assert not [name for name in gone if name in result]
+    assert not [name for name in removed if name in result]
     for name in zeros:
         assert result[name].shape == (9, 3)
         assert not result[name].any()
@@ -339,8 +339,8 @@ def test_the_key_of_the_cache_the_difference_and_copies_contain_comments() -> No
     out = with_comments(plain, {"gain": "out", "filter/k": "through"})
     keys = {content_key(plain), content_key(out), content_key(with_comments(plain, {"gain": "through"}))}
     assert len(keys) == 3
-    found = diagram_difference(plain, out).comments
-    assert [(entry.path, entry.before, entry.after) for entry in found] == [
+    comments = diagram_difference(plain, out).comments
+    assert [(entry.path, entry.before, entry.after) for entry in comments] == [
         ("filter/k", None, "through"),
         ("gain", None, "out"),
     ]

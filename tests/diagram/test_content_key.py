@@ -84,11 +84,11 @@ def others(rule: Parameter, value: Any) -> Iterator[object]:
 @pytest.mark.parametrize("name", sorted(BLOCKS))
 def test_the_key_contains_every_parameter_of_every_block(name: str) -> None:
     diagram = worked_example(BLOCKS[name])
-    for place in [place for place, block in diagram.blocks.items() if type(block) is BLOCKS[name]][:1]:
-        block = diagram.blocks[place]
-        found: dict[Block, str | None] = {block: content_key(diagram)}
+    for path in [path for path, block in diagram.blocks.items() if type(block) is BLOCKS[name]][:1]:
+        block = diagram.blocks[path]
+        keys: dict[Block, str | None] = {block: content_key(diagram)}
         for rule in block.parameters():
-            before = len(found)
+            before = len(keys)
             for value in others(rule, block.parameter_value(rule.name)):
                 try:
                     checked = rule.check(value, "here")
@@ -97,11 +97,11 @@ def test_the_key_contains_every_parameter_of_every_block(name: str) -> None:
                 # The key is also defined if the changed block or diagram is invalid.
                 changed = copy.copy(block)
                 object.__setattr__(changed, rule.name, checked)
-                blocks = {**diagram.blocks, place: changed}
-                found.setdefault(changed, content_key(dataclasses.replace(diagram, blocks=blocks)))
-            assert len(found) > before, f"no other value for {rule.name}"
-        assert None not in found.values()
-        assert len(set(found.values())) == len(found)
+                blocks = {**diagram.blocks, path: changed}
+                keys.setdefault(changed, content_key(dataclasses.replace(diagram, blocks=blocks)))
+            assert len(keys) > before, f"no other value for {rule.name}"
+        assert None not in keys.values()
+        assert len(set(keys.values())) == len(keys)
 
 
 values = st.floats(allow_nan=False, allow_infinity=False)
@@ -202,16 +202,16 @@ def test_the_key_contains_the_code_of_a_function_and_of_all_names_it_uses(
         driver(2.0),
         driver(3.0),
     ]
-    found = [keyed(function) for function in functions]
-    assert len(set(found)) == len(found)
-    assert found == [keyed(function) for function in functions]
-    assert keyed(driver(2.0)) == found[4]
+    keys = [keyed(function) for function in functions]
+    assert len(set(keys)) == len(keys)
+    assert keys == [keyed(function) for function in functions]
+    assert keyed(driver(2.0)) == keys[4]
     monkeypatch.setattr(sys.modules[__name__], "STIFFNESS", 3.5)
-    assert keyed(spring) != found[0] and keyed(through_another) != found[1]
+    assert keyed(spring) != keys[0] and keyed(through_another) != keys[1]
     monkeypatch.undo()
-    assert keyed(spring) == found[0]
+    assert keyed(spring) == keys[0]
     monkeypatch.setattr(by_default, "__defaults__", (2.5,))
-    assert keyed(by_default) != found[2]
+    assert keyed(by_default) != keys[2]
 
 
 class Law:

@@ -49,13 +49,13 @@ def loop(names: Mapping[str, str] | None = None, *, inner: str = "law", **blocks
     return builder.build()
 
 
-def only(found: DiagramDifference, *kinds: str) -> None:
+def only(actual: DiagramDifference, *kinds: str) -> None:
     """Check that the difference has entries of exactly these kinds."""
-    given = {entry.name for entry in dataclasses.fields(found) if getattr(found, entry.name)}
-    assert given == set(kinds)
+    nonempty = {entry.name for entry in dataclasses.fields(actual) if getattr(actual, entry.name)}
+    assert nonempty == set(kinds)
 
 
-def swapped(found: DiagramDifference) -> DiagramDifference:
+def swapped(actual: DiagramDifference) -> DiagramDifference:
     """Return the reverse difference; changed connections must not contain renamed blocks."""
 
     def turned(changes: tuple[object, ...]) -> tuple[object, ...]:
@@ -65,31 +65,31 @@ def swapped(found: DiagramDifference) -> DiagramDifference:
         )
 
     return DiagramDifference(
-        added=found.removed,
-        removed=found.added,
-        renamed=turned(found.renamed),  # pyright: ignore[reportArgumentType]
-        types=turned(found.types),  # pyright: ignore[reportArgumentType]
-        parameters=turned(found.parameters),  # pyright: ignore[reportArgumentType]
-        wires_added=found.wires_removed,
-        wires_removed=found.wires_added,
-        logged_added=found.logged_removed,
-        logged_removed=found.logged_added,
-        notes=turned(found.notes),  # pyright: ignore[reportArgumentType]
-        settings=turned(found.settings),  # pyright: ignore[reportArgumentType]
-        descriptions=turned(found.descriptions),  # pyright: ignore[reportArgumentType]
+        added=actual.removed,
+        removed=actual.added,
+        renamed=turned(actual.renamed),  # pyright: ignore[reportArgumentType]
+        types=turned(actual.types),  # pyright: ignore[reportArgumentType]
+        parameters=turned(actual.parameters),  # pyright: ignore[reportArgumentType]
+        wires_added=actual.wires_removed,
+        wires_removed=actual.wires_added,
+        logged_added=actual.logged_removed,
+        logged_removed=actual.logged_added,
+        notes=turned(actual.notes),  # pyright: ignore[reportArgumentType]
+        settings=turned(actual.settings),  # pyright: ignore[reportArgumentType]
+        descriptions=turned(actual.descriptions),  # pyright: ignore[reportArgumentType]
     )
 
 
 @pytest.mark.parametrize("name", ["kr180model", "van_der_pol_pid", "bouncing_ball", "robertson_kinetics"])
 def test_equal_diagrams_and_other_layouts_have_no_difference(name: str) -> None:
     diagram = ab.load_diagram(name)
-    moved = dataclasses.replace(
+    rearranged = dataclasses.replace(
         diagram,
         name="elsewhere",
         layout={block: Placement(x=7.0 * k, y=3.0) for k, block in enumerate(diagram.blocks)},
     )
     assert not diagram_difference(diagram, ab.load_diagram(name))
-    assert diagram_difference(diagram, moved) == DiagramDifference()
+    assert diagram_difference(diagram, rearranged) == DiagramDifference()
 
 
 def test_layout_inside_a_subsystem_is_no_difference() -> None:
@@ -106,42 +106,42 @@ def test_layout_inside_a_subsystem_is_no_difference() -> None:
 
 def test_every_changed_parameter_is_reported_with_both_values() -> None:
     before = loop()
-    found = diagram_difference(
+    difference = diagram_difference(
         before, with_parameters(before, {"wanted.time": 0.75, "controller/law.gain": 4})
     )
-    only(found, "parameters")
-    assert [(c.path, c.name, c.before, c.after) for c in found.parameters] == [
+    only(difference, "parameters")
+    assert [(c.path, c.name, c.before, c.after) for c in difference.parameters] == [
         ("controller/law", "gain", 3.0, 4.0),
         ("wanted", "time", 0.5, 0.75),
     ]
 
 
 def test_a_changed_block_type_is_reported_with_the_parameters_of_both() -> None:
-    found = diagram_difference(loop(), loop(wanted=Constant(value=2.0)))
-    only(found, "types", "parameters")
-    assert [(c.path, c.before, c.after) for c in found.types] == [("wanted", "Step", "Constant")]
-    assert ("value", None, 2.0) in [(c.name, c.before, c.after) for c in found.parameters]
-    assert ("time", 0.5, None) in [(c.name, c.before, c.after) for c in found.parameters]
+    difference = diagram_difference(loop(), loop(wanted=Constant(value=2.0)))
+    only(difference, "types", "parameters")
+    assert [(c.path, c.before, c.after) for c in difference.types] == [("wanted", "Step", "Constant")]
+    assert ("value", None, 2.0) in [(c.name, c.before, c.after) for c in difference.parameters]
+    assert ("time", 0.5, None) in [(c.name, c.before, c.after) for c in difference.parameters]
 
 
-@pytest.mark.parametrize("gone", ["wanted", "error", "controller", "plant", "scope"])
-def test_a_renamed_block_is_recognised(gone: str) -> None:
-    found = diagram_difference(loop(), loop({gone: "another"}))
-    only(found, "renamed")
-    assert [(entry.before, entry.after) for entry in found.renamed] == [(gone, "another")]
+@pytest.mark.parametrize("old_name", ["wanted", "error", "controller", "plant", "scope"])
+def test_a_renamed_block_is_recognised(old_name: str) -> None:
+    difference = diagram_difference(loop(), loop({old_name: "another"}))
+    only(difference, "renamed")
+    assert [(entry.before, entry.after) for entry in difference.renamed] == [(old_name, "another")]
 
 
 def test_connected_blocks_that_are_all_renamed_are_recognised() -> None:
     names = {"wanted": "a", "error": "b", "controller": "c", "plant": "d", "scope": "e"}
-    found = diagram_difference(loop(), loop(names))
-    only(found, "renamed")
-    assert {entry.before: entry.after for entry in found.renamed} == names
+    difference = diagram_difference(loop(), loop(names))
+    only(difference, "renamed")
+    assert {entry.before: entry.after for entry in difference.renamed} == names
 
 
 def test_a_renamed_block_in_a_subsystem_is_reported_with_its_paths() -> None:
-    found = diagram_difference(loop(), loop(inner="gain"))
-    only(found, "renamed")
-    assert [(e.before, e.after) for e in found.renamed] == [("controller/law", "controller/gain")]
+    difference = diagram_difference(loop(), loop(inner="gain"))
+    only(difference, "renamed")
+    assert [(e.before, e.after) for e in difference.renamed] == [("controller/law", "controller/gain")]
 
 
 def chains(*names: str) -> Diagram:
@@ -154,9 +154,9 @@ def chains(*names: str) -> Diagram:
 
 
 def test_equal_blocks_are_distinguished_by_their_connections() -> None:
-    found = diagram_difference(chains("a", "b", "c"), chains("z", "y", "x"))
-    only(found, "renamed")
-    assert {entry.before: entry.after for entry in found.renamed} == {
+    difference = diagram_difference(chains("a", "b", "c"), chains("z", "y", "x"))
+    only(difference, "renamed")
+    assert {entry.before: entry.after for entry in difference.renamed} == {
         "a": "z", "a_gain": "z_gain", "b": "y", "b_gain": "y_gain", "c": "x", "c_gain": "x_gain",
     }  # fmt: skip
 
@@ -168,18 +168,18 @@ def test_indistinguishable_blocks_are_each_paired_at_most_once() -> None:
             builder.add(name, Constant(value=1.0))
         return builder.build()
 
-    found = diagram_difference(sources("a", "b", "c"), sources("x", "y"))
-    only(found, "renamed", "removed")
-    assert len({entry.after for entry in found.renamed}) == 2
+    difference = diagram_difference(sources("a", "b", "c"), sources("x", "y"))
+    only(difference, "renamed", "removed")
+    assert len({entry.after for entry in difference.renamed}) == 2
 
 
 def test_a_block_with_other_name_and_other_parameter_is_a_new_block() -> None:
-    found = diagram_difference(loop(), loop({"wanted": "target"}, wanted=Step(time=9.0)))
-    only(found, "added", "removed", "wires_added", "wires_removed")
-    assert [entry.path for entry in found.removed] == ["wanted"]
-    assert [(entry.path, entry.block) for entry in found.added] == [("target", Step(time=9.0))]
-    assert [str(entry.wire) for entry in found.wires_added] == ["target/y -> error/u1"]
-    assert [str(entry.wire) for entry in found.wires_removed] == ["wanted/y -> error/u1"]
+    difference = diagram_difference(loop(), loop({"wanted": "target"}, wanted=Step(time=9.0)))
+    only(difference, "added", "removed", "wires_added", "wires_removed")
+    assert [entry.path for entry in difference.removed] == ["wanted"]
+    assert [(entry.path, entry.block) for entry in difference.added] == [("target", Step(time=9.0))]
+    assert [str(entry.wire) for entry in difference.wires_added] == ["target/y -> error/u1"]
+    assert [str(entry.wire) for entry in difference.wires_removed] == ["wanted/y -> error/u1"]
 
 
 def test_a_changed_connection_is_reported_with_its_subsystem() -> None:
@@ -196,9 +196,9 @@ def test_a_changed_connection_is_reported_with_its_subsystem() -> None:
         builder.add("sub", Subsystem(diagram=inner(twice)), builder.add("u", Constant()))
         return builder.build()
 
-    found = diagram_difference(outer(False), outer(True))
-    only(found, "wires_added", "wires_removed")
-    (new,), (old,) = found.wires_added, found.wires_removed
+    difference = diagram_difference(outer(False), outer(True))
+    only(difference, "wires_added", "wires_removed")
+    (new,), (old,) = difference.wires_added, difference.wires_removed
     assert new.path == old.path == "sub"
     assert new.wire.source == PortRef("gain", new.wire.source.port)
     assert isinstance(old.wire, Connection)
@@ -212,13 +212,13 @@ def test_settings_and_description_are_reported() -> None:
         description="a loop",
         settings=dataclasses.replace(before.settings, stop_time=3.0, solver="rk4"),
     )
-    found = diagram_difference(before, after)
-    only(found, "settings", "descriptions")
-    assert [(c.name, c.before, c.after) for c in found.settings] == [
+    difference = diagram_difference(before, after)
+    only(difference, "settings", "descriptions")
+    assert [(c.name, c.before, c.after) for c in difference.settings] == [
         ("stop_time", 10.0, 3.0),
         ("solver", "auto", "rk4"),
     ]
-    assert [(c.before, c.after) for c in found.descriptions] == [("", "a loop")]
+    assert [(c.before, c.after) for c in difference.descriptions] == [("", "a loop")]
 
 
 def test_logged_outputs_are_reported_with_the_new_block_names() -> None:
@@ -226,21 +226,21 @@ def test_logged_outputs_are_reported_with_the_new_block_names() -> None:
     after = dataclasses.replace(
         loop({"plant": "tank"}), logged=(PortRef("tank", "y"), PortRef("controller", "u"))
     )
-    found = diagram_difference(before, after)
-    only(found, "renamed", "logged_added", "logged_removed")
-    assert [(entry.path, str(entry.port)) for entry in found.logged_added] == [("", "controller/u")]
-    assert [(entry.path, str(entry.port)) for entry in found.logged_removed] == [("", "wanted/y")]
+    difference = diagram_difference(before, after)
+    only(difference, "renamed", "logged_added", "logged_removed")
+    assert [(entry.path, str(entry.port)) for entry in difference.logged_added] == [("", "controller/u")]
+    assert [(entry.path, str(entry.port)) for entry in difference.logged_removed] == [("", "wanted/y")]
 
 
 def test_changed_texts_of_notes_are_reported_and_moved_notes_are_not() -> None:
     def noted(**notes: tuple[float, str]) -> Diagram:
-        found = {f"/{name}": Note(x=x, y=0.0, text=text) for name, (x, text) in notes.items()}
-        return dataclasses.replace(loop(), notes=found)
+        difference = {f"/{name}": Note(x=x, y=0.0, text=text) for name, (x, text) in notes.items()}
+        return dataclasses.replace(loop(), notes=difference)
 
     before = noted(a=(0.0, "stays"), b=(0.0, "old"), c=(0.0, "gone"))
-    found = diagram_difference(before, noted(a=(9.0, "stays"), b=(0.0, "new"), d=(0.0, "more")))
-    only(found, "notes")
-    assert [(c.name, c.before, c.after) for c in found.notes] == [
+    difference = diagram_difference(before, noted(a=(9.0, "stays"), b=(0.0, "new"), d=(0.0, "more")))
+    only(difference, "notes")
+    assert [(c.name, c.before, c.after) for c in difference.notes] == [
         ("/b", "old", "new"),
         ("/c", "gone", None),
         ("/d", None, "more"),

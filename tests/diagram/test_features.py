@@ -64,8 +64,10 @@ def test_equations_of_a_disabled_block_are_zero_unchanged_or_evaluated(block: Bl
         for name, value in equation(at).items():
             if name.startswith("?"):
                 continue
-            wanted = plain[name] if evaluated else at.x[name] if kind.while_off is WhileOff.KEPT else SX(0.0)
-            assert number(value) == number(wanted), (kind, name)
+            expected = (
+                plain[name] if evaluated else at.x[name] if kind.while_off is WhileOff.KEPT else SX(0.0)
+            )
+            assert number(value) == number(expected), (kind, name)
 
 
 @each_block
@@ -73,11 +75,11 @@ def test_equations_of_an_enabled_block_are_those_of_the_block_alone(block: Block
     alone, inside = gated(block, ON, RESTART)
     at = arguments(block, inside, {ON: 1.0, "?works": 1.0})
     for kind, equation in inside.equations.items():
-        found = {name: number(value) for name, value in equation(at).items() if not name.startswith("?")}
+        values = {name: number(value) for name, value in equation(at).items() if not name.startswith("?")}
         plain = {name: number(value) for name, value in alone.equations[kind](at).items()}
         if kind is SlotKind.RESET:  # a restart may change all states; without a restart they are unchanged
-            plain = {name: number(at.x[name]) for name in found} | plain
-        assert found == plain, kind
+            plain = {name: number(at.x[name]) for name in values} | plain
+        assert values == plain, kind
 
 
 @each_block

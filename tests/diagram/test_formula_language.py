@@ -94,10 +94,10 @@ def test_values_are_those_of_linear_algebra(text: str, expected: object) -> None
     ],
 )
 def test_python_code_is_refused(text: str) -> None:
-    with pytest.raises(ArmblocksError) as found:
+    with pytest.raises(ArmblocksError) as error:
         value(text)
-    assert "block 'b', parameter 'p'" in str(found.value)
-    assert "Allowed: " in str(found.value)
+    assert "block 'b', parameter 'p'" in str(error.value)
+    assert "Allowed: " in str(error.value)
 
 
 @pytest.mark.parametrize(
@@ -139,8 +139,8 @@ def test_error_messages_name_position_and_reason(text: str, message: str) -> Non
 
 
 def test_the_value_of_a_formula_has_the_kind_of_its_parameter() -> None:
-    def rule(kind: ParameterKind, **more: object) -> Parameter:
-        return Parameter(name="p", kind=kind, doc="a value", default=REQUIRED, **more)  # pyright: ignore
+    def rule(kind: ParameterKind, **options: object) -> Parameter:
+        return Parameter(name="p", kind=kind, doc="a value", default=REQUIRED, **options)  # pyright: ignore
 
     assert value("n*2", rule(ParameterKind.INTEGER)) == 6
     assert value("k > 1", rule(ParameterKind.BOOLEAN)) is True

@@ -393,9 +393,9 @@ def test_a_bus_at_a_scalar_port_and_invalid_elements_are_refused() -> None:
     builder.add("pick", BusSelector(elements="a"), builder.add("c", Constant()))
     with pytest.raises(DiagramError, match="the input 'bus' is the single signal 'c/y'"):
         builder.build()
-    for wrong in ("", "a, a", "a b"):
+    for elements in ("", "a, a", "a b"):
         with pytest.raises(InputError, match=r"the list is empty|in .* is not allowed"):
-            BusCreator(names=wrong)
+            BusCreator(names=elements)
     with pytest.raises(InputError, match="an element is named 'bus'"):
         BusAssignment(elements="bus")
 

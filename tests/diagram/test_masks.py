@@ -105,8 +105,8 @@ def test_mask_parameters_are_tuned_without_compilation() -> None:
     assert run.parameters["two/pull.gain"] == pytest.approx((2 * np.pi * 0.2) ** 2, rel=1e-15)
     assert model.compiled is compiled
     whole = ab.simulate(model, parameters={"K": 6.0}, stop_time=1.0)
-    fresh = ab.simulate(with_parameters(oscillator(masked=True), {"K": 6.0}), stop_time=1.0)
-    assert np.array_equal(whole["one"], fresh["one"])
+    recompiled = ab.simulate(with_parameters(oscillator(masked=True), {"K": 6.0}), stop_time=1.0)
+    assert np.array_equal(whole["one"], recompiled["one"])
     assert whole["one"][0] == 1.5
 
 
@@ -138,9 +138,9 @@ def test_arrays_and_choices_pass_through_masks() -> None:
 def test_reading_a_written_diagram_gives_the_same_diagram() -> None:
     for diagram in (oscillator(masked=True), oscillator(masked=False)):
         data = diagram_to_bytes(diagram, load_robot)
-        again = diagram_from_bytes(data, "oscillator.json", BLOCKS, load_robot)
-        assert again == diagram
-        assert diagram_to_bytes(again, load_robot) == data
+        reread = diagram_from_bytes(data, "oscillator.json", BLOCKS, load_robot)
+        assert reread == diagram
+        assert diagram_to_bytes(reread, load_robot) == data
     text = diagram_to_bytes(oscillator(masked=True), load_robot).decode()
     assert '"m": "K/2"' in text
     assert '"gain": 0.3333' not in text  # computed values are not written
@@ -149,14 +149,18 @@ def test_reading_a_written_diagram_gives_the_same_diagram() -> None:
 def test_differences_list_masks_and_formulas() -> None:
     before = oscillator(masked=True)
     after = with_parameters(before, {"K": 8.0, "two.f": 0.9})
-    found = ab.diagram_difference(before, after)
-    assert [(entry.path, entry.name, entry.after) for entry in found.parameters] == [
+    difference = ab.diagram_difference(before, after)
+    assert [(entry.path, entry.name, entry.after) for entry in difference.parameters] == [
         ("two", "f", 0.9),
         ("", "K", 8.0),
     ]
-    found = ab.diagram_difference(before, oscillator(masked=False))
-    assert {(entry.path, entry.name) for entry in found.parameters} == {("one", "m"), ("two", "m"), ("", "K")}
-    assert [(entry.path, entry.name) for entry in found.masks] == [("", "K")]
+    difference = ab.diagram_difference(before, oscillator(masked=False))
+    assert {(entry.path, entry.name) for entry in difference.parameters} == {
+        ("one", "m"),
+        ("two", "m"),
+        ("", "K"),
+    }
+    assert [(entry.path, entry.name) for entry in difference.masks] == [("", "K")]
 
 
 def test_formulas_of_constants_need_no_mask() -> None:

@@ -35,8 +35,8 @@ def test_an_algebraic_loop_lists_its_signals_in_evaluation_order() -> None:
     builder.connect(third, total["u2"])
     builder.add("after", Gain(), total)
     (loop,) = loops_of(builder).values()
-    place = loop.index("sum/y")
-    assert loop[place:] + loop[:place] == ("sum/y", "half/y", "third/y")
+    index = loop.index("sum/y")
+    assert loop[index:] + loop[:index] == ("sum/y", "half/y", "third/y")
 
 
 def test_a_loop_with_a_gain_of_zero_is_detected() -> None:

@@ -149,23 +149,23 @@ def test_a_signal_cannot_have_the_name_of_a_control_input() -> None:
 
 def test_files_programs_keys_and_differences_contain_the_names() -> None:
     diagram = model()
-    again = diagram_from_bytes(diagram_to_bytes(diagram, load_robot), "m", BLOCKS, load_robot)
-    assert again == diagram
+    reread = diagram_from_bytes(diagram_to_bytes(diagram, load_robot), "m", BLOCKS, load_robot)
+    assert reread == diagram
     program = ab.to_python(diagram)
     namespace: dict[str, Any] = {}
     exec(program.rpartition("result = ")[0], namespace)  # noqa: S102 - the generated program
     assert not diagram_difference(namespace["diagram"], diagram)
     plain = dataclasses.replace(diagram, signal_names={})
     assert content_key(plain) != content_key(diagram)
-    found = diagram_difference(plain, diagram).signal_names
-    assert [(entry.path, entry.after) for entry in found] == [
+    names = diagram_difference(plain, diagram).signal_names
+    assert [(entry.path, entry.after) for entry in names] == [
         ("bus/bus", "both"),
         ("gain/y", "speed"),
         ("sub/y", "torque"),
     ]
-    wrong = diagram_to_bytes(diagram, load_robot).replace(b'"gain/y": "speed"', b'"gain/y": "sub"')
+    invalid = diagram_to_bytes(diagram, load_robot).replace(b'"gain/y": "speed"', b'"gain/y": "sub"')
     with pytest.raises(DiagramError, match=r"signal_names.*like the block 'sub'"):
-        diagram_from_bytes(wrong, "wrong", BLOCKS, load_robot)
+        diagram_from_bytes(invalid, "wrong", BLOCKS, load_robot)
 
 
 def test_edits_keep_names_with_their_signals() -> None:

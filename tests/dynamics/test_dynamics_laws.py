@@ -36,10 +36,10 @@ def test_mass_matrix_is_symmetric_and_positive_definite(robot: Robot):
 
 
 def test_columns_of_the_mass_matrix_are_torques_of_unit_accelerations(robot: Robot):
-    still = np.zeros(robot.n)
+    zeros = np.zeros(robot.n)
     for q, _, _ in random_states(robot, 2):
-        at_rest = evaluate(robot, "rne", q, still, still)
-        columns = [evaluate(robot, "rne", q, still, unit) - at_rest for unit in np.eye(robot.n)]
+        at_rest = evaluate(robot, "rne", q, zeros, zeros)
+        columns = [evaluate(robot, "rne", q, zeros, unit) - at_rest for unit in np.eye(robot.n)]
         scaled(evaluate(robot, "inertia", q), np.column_stack(columns), 1e-12)
 
 

@@ -27,11 +27,11 @@ def described_poses(robot: Robot, q: np.ndarray) -> list[np.ndarray]:
     """Return the poses of base, links and tool as numeric products of the description's matrices."""
     at = dict(zip(robot.joint_names, q))
     world: dict[str | None, np.ndarray] = {None: robot.base.matrix}
-    waiting = list(robot.links)
-    while waiting:
-        for link in [link for link in waiting if link.parent in world]:
+    remaining = list(robot.links)
+    while remaining:
+        for link in [link for link in remaining if link.parent in world]:
             world[link.name] = world[link.parent] @ link.pose(at.get(link.name, 0.0)).matrix
-            waiting.remove(link)
+            remaining.remove(link)
     links = [world[link.name] for link in robot.links]
     return [robot.base.matrix, *links, links[-1] @ robot.tool.matrix]
 
@@ -178,13 +178,13 @@ def test_the_order_of_the_links_does_not_change_the_dynamics():
     robot = build_random_tree(2)
     last = robot.links[-1]
     turned = replace(robot, links=(*reversed(robot.links[:-1]), last))
-    place = [turned.joint_names.index(name) for name in robot.joint_names]
+    order = [turned.joint_names.index(name) for name in robot.joint_names]
     back = [robot.joint_names.index(name) for name in turned.joint_names]
     for q, qd, qdd in random_states(robot, 2):
         state = [x[back] for x in (q, qd, qdd)]
         for name in ("rne", "accel"):
             expected = evaluate(robot, name, q, qd, qdd)
-            actual = evaluate(turned, name, *state)[place]
+            actual = evaluate(turned, name, *state)[order]
             assert_allclose(actual, expected, rtol=0, atol=1e-11 * np.abs(expected).max())
 
 

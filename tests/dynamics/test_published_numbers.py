@@ -98,16 +98,16 @@ def test_forward_dynamics(puma560: Robot):
 
 def test_the_arm_of_the_paper_along_its_trajectory(kr180: Robot):
     qf = np.array([3.14, 0, 1.57, 0])
-    places = {
+    positions = {
         0: (1.95, -1.25, -1.85),
         2: (2.36963237462, -0.835183999087, -1.693963015984),
         5: (1.252643063297, 3.318570240624, 0.041710789934),
         10: (-2.949278739196, 1.254698768685, 2.347929043243),
     }
-    for t, place in places.items():
+    for t, position in positions.items():
         s = t / 10
         q = qf * (10 * s**3 - 15 * s**4 + 6 * s**5)
-        assert_allclose(evaluate(kr180, "fkine", q)[:3, 3], place, rtol=0, atol=1e-11)
+        assert_allclose(evaluate(kr180, "fkine", q)[:3, 3], position, rtol=0, atol=1e-11)
     assert_allclose(evaluate(kr180, "gravload", np.zeros(4)), (0, 2305.35, 2452.5, 0), rtol=0, atol=1e-9)
 
 

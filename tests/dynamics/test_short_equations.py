@@ -29,7 +29,7 @@ def arithmetic(traced: TracedFunction) -> int:
 
 
 @pytest.mark.parametrize(
-    ("robot", "name", "most"),
+    ("robot", "name", "limit"),
     [
         # Upper limits of the design. Present counts are 379, 650, 77 and 75, and 223 for the paper's arm.
         (build_puma560(), "rne", 500),
@@ -40,8 +40,8 @@ def arithmetic(traced: TracedFunction) -> int:
     ],
     ids=lambda value: getattr(value, "name", str(value)),
 )
-def test_operation_counts_are_below_their_limits(robot: Robot, name: str, most: int):
-    assert arithmetic(TRACES[name](robot)) <= most
+def test_operation_counts_are_below_their_limits(robot: Robot, name: str, limit: int):
+    assert arithmetic(TRACES[name](robot)) <= limit
 
 
 def test_regrouping_moves_the_mass_of_revolute_links_to_their_parents(puma560: Robot):

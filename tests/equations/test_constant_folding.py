@@ -63,9 +63,11 @@ def test_constants_that_pass_through_blocks() -> None:
 @pytest.mark.usefixtures("marked")
 def test_constants_that_solve_equations() -> None:
     z, u = SX.sym("z", 2), SX.sym("u")
-    found = substituted(casadi.vertcat(casadi.cos(z[0]) * u, casadi.exp(z[1])), z, casadi.vertcat(1.995, u))
-    assert float(casadi.substitute(found[0], u, 1.0)) == MARK
-    assert casadi.depends_on(found[1], u)
+    solution = substituted(
+        casadi.vertcat(casadi.cos(z[0]) * u, casadi.exp(z[1])), z, casadi.vertcat(1.995, u)
+    )
+    assert float(casadi.substitute(solution[0], u, 1.0)) == MARK
+    assert casadi.depends_on(solution[1], u)
 
 
 def test_the_logarithm_in_the_derivative_of_a_power_is_left_to_the_compiled_code() -> None:

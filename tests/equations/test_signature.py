@@ -37,8 +37,8 @@ def test_symbols_are_stored_in_row_major_order(shape: tuple[int, ...]) -> None:
     flat = SX.sym("flat", numbers.size)
     natural = unflatten(flat, shape)
     back = Function("f", [flat], [flatten(natural, shape), natural])
-    again, matrix = (np.asarray(value) for value in back.call([numbers]))
-    assert np.array_equal(again.ravel(), numbers)
+    unpacked, matrix = (np.asarray(value) for value in back.call([numbers]))
+    assert np.array_equal(unpacked.ravel(), numbers)
     assert np.array_equal(matrix.ravel(), numbers)
 
 

@@ -84,8 +84,8 @@ def test_errors_about_wrong_calls_state_the_correct_call(puma: ab.Arm) -> None:
 
 @pytest.mark.parametrize("method", [*METHODS_OF_Q, "friction"])
 def test_a_pickled_method_contains_its_arm(puma: ab.Arm, states: list[np.ndarray], method: str) -> None:
-    again = pickle.loads(pickle.dumps(getattr(puma, method)))
-    np.testing.assert_array_equal(again(states[0]), getattr(puma, method)(states[0]))
+    copy = pickle.loads(pickle.dumps(getattr(puma, method)))
+    np.testing.assert_array_equal(copy(states[0]), getattr(puma, method)(states[0]))
 
 
 def test_integers_lists_and_strided_arrays_are_accepted(puma: ab.Arm) -> None:

@@ -35,8 +35,8 @@ def loop() -> ab.Diagram:
     return builder.build()
 
 
-def response(diagram: ab.Diagram, source: str, seen: str) -> np.ndarray:
-    return ab.frequency_response(diagram, source, seen, FREQUENCIES)[:, 0, 0]
+def response(diagram: ab.Diagram, source: str, output: str) -> np.ndarray:
+    return ab.frequency_response(diagram, source, output, FREQUENCIES)[:, 0, 0]
 
 
 def test_the_frequency_response_of_a_loop_with_dead_time_is_exact() -> None:
@@ -44,8 +44,8 @@ def test_the_frequency_response_of_a_loop_with_dead_time_is_exact() -> None:
 
 
 def test_the_frequency_response_with_an_opened_signal_is_that_of_the_open_loop() -> None:
-    found = ab.frequency_response(loop(), "x", "x", FREQUENCIES, open="x")[:, 0, 0]
-    np.testing.assert_allclose(found, -np.exp(-DELAY * S) / S, rtol=1e-13)
+    actual = ab.frequency_response(loop(), "x", "x", FREQUENCIES, open="x")[:, 0, 0]
+    np.testing.assert_allclose(actual, -np.exp(-DELAY * S) / S, rtol=1e-13)
 
 
 def test_delays_in_series_and_their_derivative() -> None:
@@ -121,8 +121,8 @@ def test_a_variable_delay_is_linearised_with_its_present_value() -> None:
     builder.add(
         "late", VariableTimeDelay(shortest=0.1, longest=2.0), builder.add("lag", FirstOrderLag(), u), how_long
     )
-    found = ab.frequency_response(builder.build(), "u", "late", FREQUENCIES, at=5.0)[:, 0, 0]
-    np.testing.assert_allclose(found, np.exp(-0.7 * S) / (S + 1.0), rtol=1e-12)
+    actual = ab.frequency_response(builder.build(), "u", "late", FREQUENCIES, at=5.0)[:, 0, 0]
+    np.testing.assert_allclose(actual, np.exp(-0.7 * S) / (S + 1.0), rtol=1e-12)
 
 
 def test_a_diagram_without_dead_time_has_the_response_of_its_linear_system() -> None:
@@ -144,8 +144,8 @@ def test_without_an_order_dead_time_is_refused() -> None:
 
 
 def test_in_steady_state_the_output_of_a_delay_equals_its_input() -> None:
-    found = ab.trim(loop())
-    assert float(found.point.states["x/x"]) == pytest.approx(1.0, rel=1e-12)
-    assert float(found.point.discrete["late/past"]) == pytest.approx(1.0, rel=1e-12)
-    settled = ab.simulate(loop(), stop_time=30.0, rtol=1e-9)
-    assert settled["x"][-1] == pytest.approx(1.0, abs=1e-7)
+    actual = ab.trim(loop())
+    assert float(actual.point.states["x/x"]) == pytest.approx(1.0, rel=1e-12)
+    assert float(actual.point.discrete["late/past"]) == pytest.approx(1.0, rel=1e-12)
+    run = ab.simulate(loop(), stop_time=30.0, rtol=1e-9)
+    assert run["x"][-1] == pytest.approx(1.0, abs=1e-7)

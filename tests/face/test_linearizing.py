@@ -31,9 +31,9 @@ def oscillator(mass: float = 2.0, damping: float = 0.4, stiffness: float = 8.0) 
     total = builder.add("sum", Sum(signs="+--"), force)
     rate = builder.add("mass", Gain(gain=1.0 / mass), total)
     speed = builder.add("v", Integrator(), rate)
-    place = builder.add("x", Integrator(), speed)
+    angle = builder.add("x", Integrator(), speed)
     builder.connect(builder.add("c", Gain(gain=damping), speed), total["u2"])
-    builder.connect(builder.add("k", Gain(gain=stiffness), place), total["u3"])
+    builder.connect(builder.add("k", Gain(gain=stiffness), angle), total["u3"])
     return builder.build()
 
 
@@ -90,8 +90,8 @@ def test_several_times_give_one_linear_system_each() -> None:
     for system, k in zip(systems, (2, 0, 1)):
         slope = system.A[system.states.index("qd/x"), system.states.index("q/x")]
         assert slope == pytest.approx(-np.cos(float(result["q"][k])), abs=1e-9)
-    again = ab.linearize(diagram, "torque", "q", at=result.final_state)
-    assert np.allclose(again.A, systems[0].A, atol=1e-9, rtol=0.0)
+    from_state = ab.linearize(diagram, "torque", "q", at=result.final_state)
+    assert np.allclose(from_state.A, systems[0].A, atol=1e-9, rtol=0.0)
 
 
 def test_the_gain_of_a_limiter_at_its_limit_is_zero() -> None:
@@ -199,9 +199,9 @@ def test_a_held_input_of_a_state_space_plant_gives_the_matrix_exponential() -> N
     held = builder.add("hold", ZeroOrderHold(sample_time=0.25), source)
     total = builder.add("sum", Sum(signs="+--"), held)
     speed = builder.add("v", Integrator(), total)
-    place = builder.add("q", Integrator(), speed)
+    angle = builder.add("q", Integrator(), speed)
     builder.connect(builder.add("c", Gain(gain=0.2), speed), total["u2"])
-    builder.connect(builder.add("k", Gain(gain=4.0), place), total["u3"])
+    builder.connect(builder.add("k", Gain(gain=4.0), angle), total["u3"])
     system = ab.linearize(builder.build(), "u", "q")
     assert system.states == ("q/x", "v/x")
     assert np.allclose(system.A, expm(A * 0.25), rtol=1e-13, atol=1e-15)

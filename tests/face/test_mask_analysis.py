@@ -32,13 +32,13 @@ def loop() -> Diagram:
 
 def test_sensitivity_to_a_mask_parameter_agrees_with_differences_of_runs() -> None:
     settings: dict[str, Any] = {"stop_time": 2.0, "rtol": 1e-12, "atol": 1e-14, "sample_time": 0.1}
-    found = ab.sensitivity(loop(), ["K", "forward.a"], "x", **settings)
+    actual = ab.sensitivity(loop(), ["K", "forward.a"], "x", **settings)
     h = 1e-5
     runs = [ab.simulate(loop(), parameters={"K": 2.0 + step}, **settings)["x"] for step in (h, -h)]
     # A central difference has the error h^2/6 times the third derivative, plus rounding errors over h.
-    assert np.abs(found["x", "K"] - (runs[0] - runs[1]) / (2 * h)).max() < 1e-8
-    assert found["x", "K"][0] == 0.25
-    assert np.abs(found["x", "forward.a"]).max() > 0.01
+    assert np.abs(actual["x", "K"] - (runs[0] - runs[1]) / (2 * h)).max() < 1e-8
+    assert actual["x", "K"][0] == 0.25
+    assert np.abs(actual["x", "forward.a"]).max() > 0.01
 
 
 def test_linearisation_by_a_mask_parameter_uses_the_chain_rule() -> None:

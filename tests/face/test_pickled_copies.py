@@ -103,28 +103,28 @@ def test_every_public_type_is_among_the_examples() -> None:
     assert types - {"DiagramRun"} <= examples().keys()
 
 
-@pytest.mark.parametrize("way", COPY_FUNCTIONS)
-def test_a_copy_has_the_content_of_the_original(way: str) -> None:
+@pytest.mark.parametrize("method", COPY_FUNCTIONS)
+def test_a_copy_has_the_content_of_the_original(method: str) -> None:
     for name, value in examples().items():
-        assert content(COPY_FUNCTIONS[way](value)) == content(value), name
+        assert content(COPY_FUNCTIONS[method](value)) == content(value), name
 
 
-@pytest.mark.parametrize("way", COPY_FUNCTIONS)
-def test_arrays_of_copies_are_read_only(way: str) -> None:
+@pytest.mark.parametrize("method", COPY_FUNCTIONS)
+def test_arrays_of_copies_are_read_only(method: str) -> None:
     payload, system, table = (examples()[name] for name in ("Payload", "LinearSystem", "TimeTable"))
     assert payload.numbers.sum() == 2.0  # computed and cached before the copy
-    copies = [COPY_FUNCTIONS[way](value) for value in (payload, system, table)]
+    copies = [COPY_FUNCTIONS[method](value) for value in (payload, system, table)]
     assert not any(array.flags.writeable for array in (copies[0].numbers, copies[1].A, copies[2].rows))
 
 
-@pytest.mark.parametrize("way", COPY_FUNCTIONS)
-def test_a_copy_computes_the_same_bits(way: str) -> None:
+@pytest.mark.parametrize("method", COPY_FUNCTIONS)
+def test_a_copy_computes_the_same_bits(method: str) -> None:
     arm, diagram = ab.load_robot("puma560"), ab.load_diagram("kr180model")
     q = np.linspace(-1, 1, 6)
-    assert COPY_FUNCTIONS[way](arm).rne(q, q, q).tobytes() == arm.rne(q, q, q).tobytes()
+    assert COPY_FUNCTIONS[method](arm).rne(q, q, q).tobytes() == arm.rne(q, q, q).tobytes()
     for model in (diagram, ab.compile_diagram(diagram)):
-        again = ab.simulate(COPY_FUNCTIONS[way](model), stop_time=0.5)
-        assert again.signals.tobytes() == ab.simulate(diagram, stop_time=0.5).signals.tobytes()
+        copied = ab.simulate(COPY_FUNCTIONS[method](model), stop_time=0.5)
+        assert copied.signals.tobytes() == ab.simulate(diagram, stop_time=0.5).signals.tobytes()
 
 
 @pytest.mark.filterwarnings("ignore::armblocks.errors.ArmblocksWarning")
@@ -134,10 +134,10 @@ def test_shipped_robots_and_examples_are_pickled() -> None:
         assert content(pickle.loads(pickle.dumps(arm))) == content(arm)
     for name in ab.list_examples():
         diagram = formats.load_diagram(name, BLOCKS, draft=True)
-        again = pickle.loads(pickle.dumps(diagram))
-        assert again == diagram and content(again) == content(diagram)
+        copied = pickle.loads(pickle.dumps(diagram))
+        assert copied == diagram and content(copied) == content(diagram)
         # the copy loads the code of the original from the cache
-        assert content_key(again) == content_key(diagram)
+        assert content_key(copied) == content_key(diagram)
 
 
 def raised(kind: type[errors.ArmblocksError]) -> errors.ArmblocksError:
@@ -150,18 +150,18 @@ def raised(kind: type[errors.ArmblocksError]) -> errors.ArmblocksError:
     return error
 
 
-@pytest.mark.parametrize("way", COPY_FUNCTIONS)
-def test_copies_of_errors_keep_all_their_parts(way: str) -> None:
+@pytest.mark.parametrize("method", COPY_FUNCTIONS)
+def test_copies_of_errors_keep_all_their_parts(method: str) -> None:
     kinds = [kind for kind in vars(errors).values() if isinstance(kind, type)]
     for kind in kinds:
         if issubclass(kind, errors.ArmblocksError):
-            assert content(COPY_FUNCTIONS[way](raised(kind))) == content(raised(kind))
+            assert content(COPY_FUNCTIONS[method](raised(kind))) == content(raised(kind))
 
 
 def test_a_python_function_is_pickled_by_its_name(tmp_path: Path) -> None:
     diagram = diagram_with(half)
-    again = pickle.loads(pickle.dumps(diagram))
-    assert again == diagram
+    copied = pickle.loads(pickle.dumps(diagram))
+    assert copied == diagram
     assert b"co_code" not in pickle.dumps(diagram)
     file = tmp_path / "laws.py"
     file.write_text("def twice(u):\n    return 2.0 * u\n", encoding="utf-8")
@@ -191,9 +191,9 @@ def test_a_local_function_or_lambda_cannot_be_pickled() -> None:
 
 def test_a_run_in_progress_cannot_be_pickled() -> None:
     run = ab.begin("van_der_pol_pid")
-    for way in COPY_FUNCTIONS.values():
+    for method in COPY_FUNCTIONS.values():
         with pytest.raises(errors.InputError, match=r"a run in progress cannot be copied.*initial_state"):
-            way(run)
+            method(run)
     with pytest.raises(errors.InputError, match=r"native code cannot be pickled"):
         pickle.dumps(ab.load_robot("twolink")._kernel("fkine").entry)
     assert isinstance(pickle.loads(pickle.dumps(run.samples())), Samples)
@@ -225,12 +225,12 @@ def test_values_sent_to_another_process_give_the_same_results() -> None:
     function = diagram_with(half)
     sent = {"arm": arm, "fkine": arm.fkine, "rne": arm.rne, "compiled": compiled, "function": function}
     context = multiprocessing.get_context("spawn")
-    here, there = context.Pipe()
-    process = context.Process(target=in_another_process, args=(sent, there))
+    parent, child = context.Pipe()
+    process = context.Process(target=in_another_process, args=(sent, child))
     process.start()
-    there.close()
-    bits, _ = here.recv()
-    _, error = here.recv()
+    child.close()
+    bits, _ = parent.recv()
+    _, error = parent.recv()
     process.join()
     q = np.linspace(-1, 1, 6)
     assert bits == {

@@ -30,8 +30,8 @@ def test_the_run_reproduces_the_positions_of_the_paper(paper: ab.Diagram) -> Non
     assert len(result.time) == 1001
     for t, expected in POSITIONS.items():
         row = int(np.searchsorted(result.time, t))
-        found = [result[f"T2xyz/{axis}"][row] for axis in "xyz"]
-        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9)
+        actual = [result[f"T2xyz/{axis}"][row] for axis in "xyz"]
+        np.testing.assert_allclose(actual, expected, rtol=0, atol=1e-9)
 
 
 def test_derivative_blocks_are_exact(paper: ab.Diagram) -> None:
@@ -59,10 +59,10 @@ def test_signatures_list_the_settings_of_a_run() -> None:
         parameters = inspect.signature(call).parameters
         assert list(parameters)[-len(fields) :] == list(fields), call
         assert {repr(parameters[name].default) for name in fields} == {"<the diagram's>"}
-        given = {"diagram": "kr180model"} if "diagram" in parameters else {"self": None}
-        required = [n for n, p in parameters.items() if p.default is p.empty and n not in given]
+        arguments = {"diagram": "kr180model"} if "diagram" in parameters else {"self": None}
+        required = [n for n, p in parameters.items() if p.default is p.empty and n not in arguments]
         with pytest.raises(UnknownNameError, match=r"no argument named 'stop_tme'.*did you mean 'stop_time'"):
-            call(**given, **dict.fromkeys(required, ""), stop_tme=1.0)
+            call(**arguments, **dict.fromkeys(required, ""), stop_tme=1.0)
 
 
 def test_unknown_settings_and_parameters_are_refused_with_the_nearest_name(paper: ab.Diagram) -> None:

@@ -242,13 +242,13 @@ def test_sensitivities_agree_with_differences_of_runs(
     settings = {**TIGHT, "sample_time": 0.0997}
     result = ab.sensitivity(diagram, parameters, "x", **settings)
     for parameter in parameters:
-        found = result["x", parameter]
+        actual = result["x", parameter]
         # Where an event of one run is before a sample and that of another run after it, differences are
         # invalid.
         expected, doubt = differences(diagram, parameter, "x", step, **settings)
         assert np.mean(doubt < 1e-3) > 0.8
-        assert np.all(np.abs(found - expected) <= 1e-5 * (1.0 + np.abs(expected)) + 10.0 * doubt), parameter
-        assert np.abs(found).max() > 1e-2
+        assert np.all(np.abs(actual - expected) <= 1e-5 * (1.0 + np.abs(expected)) + 10.0 * doubt), parameter
+        assert np.abs(actual).max() > 1e-2
 
 
 def test_the_sensitivity_of_a_delayed_ramp_agrees_with_the_closed_form() -> None:
@@ -256,9 +256,9 @@ def test_the_sensitivity_of_a_delayed_ramp_agrees_with_the_closed_form() -> None
     builder = ab.DiagramBuilder("ramp")
     builder.add("y", TransportDelay(delay=0.7, initial=0.2), builder.add("u", Ramp(slope=1.5)))
     result = ab.sensitivity(builder.build(), ["u.slope", "y.delay", "y.initial"], "y", **TIGHT)
-    late = result.time > 0.75
-    assert np.allclose(result["y", "u.slope"], np.where(late, result.time - 0.7, 0.0), atol=1e-12)
-    assert np.allclose(result["y", "y.delay"][late], -1.5, atol=1e-12)
+    after_delay = result.time > 0.75
+    assert np.allclose(result["y", "u.slope"], np.where(after_delay, result.time - 0.7, 0.0), atol=1e-12)
+    assert np.allclose(result["y", "y.delay"][after_delay], -1.5, atol=1e-12)
     assert np.array_equal(result["y", "y.initial"], result.time < 0.65)
 
 
@@ -393,6 +393,6 @@ def test_the_sensitivity_to_an_indexed_table_is_refused_and_others_are_correct()
     diagram = builder.build()
     with pytest.raises(InputError, match=r"'table\.data' is a table that is read by index"):
         ab.sensitivity(diagram, "table.data", "sum")
-    found = ab.sensitivity(diagram, ["gain.gain"], ["sum"])
+    result = ab.sensitivity(diagram, ["gain.gain"], ["sum"])
     # d/dk of k times the integral of the table is that integral: 0, 0.75, 2, 3, 3 every half second
-    assert found["sum", "gain.gain"] == pytest.approx([0.0, 0.75, 2.0, 3.0, 3.0], rel=1e-5, abs=1e-6)
+    assert result["sum", "gain.gain"] == pytest.approx([0.0, 0.75, 2.0, 3.0, 3.0], rel=1e-5, abs=1e-6)

@@ -57,21 +57,21 @@ def test_values_that_are_zero_to_their_accuracy_are_shown_as_zero(seed: int) -> 
     block = StateSpace(A=A, B=-A @ rest[:, None], C=np.eye(3), D=np.zeros((3, 1)), initial=[0.3, -0.2, 0.1])
     builder = ab.DiagramBuilder("rest")
     builder.add("plant", block, builder.add("one", Constant(value=1.0)))
-    found = ab.trim(builder.build())
-    (name,) = found.point.states
-    value, least = found.point.states[name], found.accuracies[name]
-    assert (np.abs(value - rest) <= least).all()
-    assert least.max() < 1e-13
-    shown = found.shown(name, value)
+    trimmed = ab.trim(builder.build())
+    (name,) = trimmed.point.states
+    value, accuracy = trimmed.point.states[name], trimmed.accuracies[name]
+    assert (np.abs(value - rest) <= accuracy).all()
+    assert accuracy.max() < 1e-13
+    shown = trimmed.shown(name, value)
     assert shown.tolist() == [value[0], 0.0, value[2]]
-    assert np.array2string(shown, precision=8) in repr(found)
+    assert np.array2string(shown, precision=8) in repr(trimmed)
 
 
 def test_a_free_torque_holds_a_given_angle() -> None:
-    for given in ({"states": {"q": 0.7}}, {"outputs": {"q": 0.7}}):
-        found = ab.trim(pendulum(), free=["torque"], **given)  # type: ignore[arg-type]
-        assert float(found.free["torque.value"]) == pytest.approx(9.81 * math.sin(0.7), rel=1e-12)
-    held = ab.simulate(pendulum(), parameters=found.free, initial_state=found.point, stop_time=5.0)
+    for conditions in ({"states": {"q": 0.7}}, {"outputs": {"q": 0.7}}):
+        trimmed = ab.trim(pendulum(), free=["torque"], **conditions)  # type: ignore[arg-type]
+        assert float(trimmed.free["torque.value"]) == pytest.approx(9.81 * math.sin(0.7), rel=1e-12)
+    held = ab.simulate(pendulum(), parameters=trimmed.free, initial_state=trimmed.point, stop_time=5.0)
     assert np.allclose(held["q"], 0.7, atol=1e-9)
 
 
@@ -82,8 +82,8 @@ def test_a_state_may_move_while_another_is_steady() -> None:
     speed = builder.add("speed", Integrator(), total)
     builder.add("place", Integrator(), speed)
     builder.connect(builder.add("drag", Expression(formula="0.4 * u * abs(u)"), speed), total["u2"])
-    found = ab.trim(builder.build(), moving=["place"], guess={"speed": 1.0})
-    assert float(found.point.states["speed/x"]) == pytest.approx(5.0, rel=1e-12)
+    trimmed = ab.trim(builder.build(), moving=["place"], guess={"speed": 1.0})
+    assert float(trimmed.point.states["speed/x"]) == pytest.approx(5.0, rel=1e-12)
     with pytest.raises(SimulationError, match="no operating point was found"):
         ab.trim(builder.build(), guess={"speed": 1.0})
 
@@ -97,9 +97,9 @@ def test_the_steady_state_of_a_sampled_controller_with_integral_action() -> None
     state = builder.add("x", Integrator(), rate)
     builder.connect(builder.add("loss", Gain(gain=3.0), state), rate["u2"])
     builder.connect(state, error["u2"])
-    found = ab.trim(builder.build())
-    assert float(found.point.signals["x/y"]) == pytest.approx(2.0, rel=1e-12)
-    assert float(found.point.signals["control/y"]) == pytest.approx(6.0, rel=1e-12)
+    trimmed = ab.trim(builder.build())
+    assert float(trimmed.point.signals["x/y"]) == pytest.approx(2.0, rel=1e-12)
+    assert float(trimmed.point.signals["control/y"]) == pytest.approx(6.0, rel=1e-12)
 
 
 def limited(torque: float) -> ab.Diagram:
@@ -114,8 +114,8 @@ def limited(torque: float) -> ab.Diagram:
 
 
 def test_modes_are_consistent_with_the_operating_point() -> None:
-    found = ab.trim(limited(0.0), free=["torque"], guess={"torque.value": 5.0}, outputs={"x": 0.4})
-    assert float(found.free["torque.value"]) == pytest.approx(0.4, rel=1e-12)
+    trimmed = ab.trim(limited(0.0), free=["torque"], guess={"torque.value": 5.0}, outputs={"x": 0.4})
+    assert float(trimmed.free["torque.value"]) == pytest.approx(0.4, rel=1e-12)
 
 
 def test_bounds_are_respected_and_active_bounds_are_named() -> None:
@@ -134,8 +134,8 @@ def test_an_operating_point_solves_implicit_equations() -> None:
     state = builder.add("x", Integrator(initial=0.1), total)
     builder.connect(builder.add("cube", Expression(formula="u^3"), total), total["u2"])
     builder.connect(state, total["u3"])
-    found = ab.trim(builder.build())
-    assert float(found.point.states["x/x"]) == pytest.approx(3.0, rel=1e-12)
+    trimmed = ab.trim(builder.build())
+    assert float(trimmed.point.states["x/x"]) == pytest.approx(3.0, rel=1e-12)
 
 
 def test_the_torque_that_holds_a_puma_is_its_gravity_load() -> None:
@@ -144,8 +144,8 @@ def test_the_torque_that_holds_a_puma_is_its_gravity_load() -> None:
     builder = ab.DiagramBuilder("held")
     torque = builder.add("torque", Constant(value=np.zeros(6)))
     builder.add("arm", ab.blocks.BLOCKS["ForwardDynamics"](robot=puma.robot), torque)  # type: ignore[call-arg]
-    found = ab.trim(builder.build(), free=["torque"], states={"arm/q": q, "arm/qd": 0.0})
-    assert np.allclose(found.free["torque.value"], puma.gravload(q), rtol=0.0, atol=1e-9)
+    trimmed = ab.trim(builder.build(), free=["torque"], states={"arm/q": q, "arm/qd": 0.0})
+    assert np.allclose(trimmed.free["torque.value"], puma.gravload(q), rtol=0.0, atol=1e-9)
 
 
 def test_an_equation_that_depends_on_nothing_free_is_named() -> None:
@@ -243,10 +243,10 @@ def test_single_entries_of_short_tables_may_be_free() -> None:
         builder.connect(builder.add("error", Sum(signs="+-"), curve, state), state["u"])
         return builder.build()
 
-    found = ab.trim(following(9), free=["curve.table[3]"], states={"x": 3.0})
+    trimmed = ab.trim(following(9), free=["curve.table[3]"], states={"x": 3.0})
     upper = 2.5**2 - 2.0
-    assert float(found.free["curve.table"][3]) == pytest.approx((3.0 - 0.2 * upper) / 0.8, rel=1e-12)
-    assert float(found.free["curve.table"][4]) == upper
+    assert float(trimmed.free["curve.table"][3]) == pytest.approx((3.0 - 0.2 * upper) / 0.8, rel=1e-12)
+    assert float(trimmed.free["curve.table"][4]) == upper
     for name in ("curve.table", "curve.table[400]", "curve.positions"):
         with pytest.raises(InputError, match="is part of a table that is read by index"):
             ab.trim(following(1000), free=[name], states={"x": 3.0})

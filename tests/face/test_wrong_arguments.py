@@ -17,8 +17,8 @@ def robot(**values: object) -> ab.Robot:
     return ab.Robot(name="x", links=LINKS, **values)
 
 
-def added(*given: object, **named: object) -> object:
-    return ab.DiagramBuilder("d").add("g", *given, **named)
+def added(*args: object, **named: object) -> object:
+    return ab.DiagramBuilder("d").add("g", *args, **named)
 
 
 WRONG: dict[str, tuple[Callable[[], object], str]] = {

@@ -133,9 +133,9 @@ def diagrams(draw: st.DrawFn) -> Diagram:
 @given(diagrams())
 def test_reading_a_written_diagram_gives_the_same_diagram(diagram: Diagram) -> None:
     data = write(diagram)
-    again = read(data)
-    assert again == diagram
-    assert write(again) == data
+    reread = read(data)
+    assert reread == diagram
+    assert write(reread) == data
 
 
 @pytest.mark.parametrize("name", list_examples())
@@ -160,10 +160,10 @@ def test_order_in_the_file_does_not_matter() -> None:
 
 def test_infinities_are_written_as_text_and_numbers_keep_their_bits() -> None:
     diagram = with_parameters(small(), {"gain.gain": 0.1 + 0.2, "speed.initial": -0.0})
-    again = read(write(diagram))
-    assert again.blocks["limit"] == Saturation(lower=-math.inf, upper=0.5)
-    assert again.blocks["gain"] == Gain(gain=0.30000000000000004)
-    assert math.copysign(1, again.blocks["speed"].initial) == -1  # type: ignore[attr-defined]
+    reread = read(write(diagram))
+    assert reread.blocks["limit"] == Saturation(lower=-math.inf, upper=0.5)
+    assert reread.blocks["gain"] == Gain(gain=0.30000000000000004)
+    assert math.copysign(1, reread.blocks["speed"].initial) == -1  # type: ignore[attr-defined]
     assert '"lower": "-inf"' in write(diagram).decode()
 
 
@@ -273,8 +273,8 @@ def test_other_robots_are_written_completely_and_once_under_unique_names(
     other = dataclasses.replace(one, comment="another")
     odd = dataclasses.replace(one, name="a/b")
     diagram = arms(one, other, one, odd)
-    found = robots_of(diagram)
-    assert found["named"] == ["arm", "arm 2", "arm", "robot"]
+    robots = robots_of(diagram)
+    assert robots["named"] == ["arm", "arm 2", "arm", "robot"]
     schema.validate(json.loads(write(diagram)))
     assert read(write(diagram)) == diagram
 
@@ -326,10 +326,10 @@ DOCUMENT = json.loads(write(small()))
 
 def altered(*path: str | int, value: object) -> bytes:
     document = json.loads(json.dumps(DOCUMENT))
-    here = document
+    node = document
     for step in path[:-1]:
-        here = here[step]
-    here[path[-1]] = value
+        node = node[step]
+    node[path[-1]] = value
     return json.dumps(document, indent=1).encode()
 
 
@@ -460,14 +460,14 @@ def test_unknown_and_missing_diagrams_raise_errors_with_their_name(tmp_path: Pat
 def test_a_mutated_document_is_read_or_refused_with_a_package_error(data: st.DataObject) -> None:
     document = json.loads(write(EXAMPLE))
     for _ in range(data.draw(st.integers(1, 3))):
-        here: Any = document
-        while isinstance(here, dict | list) and here:
-            key = data.draw(st.sampled_from(list(here) if isinstance(here, dict) else list(range(len(here)))))
-            if isinstance(here[key], dict | list) and data.draw(st.booleans()):
-                here = here[key]
+        node: Any = document
+        while isinstance(node, dict | list) and node:
+            key = data.draw(st.sampled_from(list(node) if isinstance(node, dict) else list(range(len(node)))))
+            if isinstance(node[key], dict | list) and data.draw(st.booleans()):
+                node = node[key]
                 continue
             junk = [None, True, -1, 1e300, "", "x", [], {}, [1, [2]], "inf", "a/b -> c/d", {"robot": []}]
-            here[key] = data.draw(st.sampled_from(junk))
+            node[key] = data.draw(st.sampled_from(junk))
             break
     try:
         read(json.dumps(document).encode())
@@ -515,9 +515,9 @@ def test_diagrams_inside_blocks_are_written_and_read_again(schema: jsonschema.Dr
     for depth in (1, 2, 99):
         diagram = _nested(depth)
         data = diagram_to_bytes(diagram, load_robot)
-        again = diagram_from_bytes(data, "model.json", BLOCKS, load_robot)
-        assert again == diagram
-        assert diagram_to_bytes(again, load_robot) == data
+        reread = diagram_from_bytes(data, "model.json", BLOCKS, load_robot)
+        assert reread == diagram
+        assert diagram_to_bytes(reread, load_robot) == data
         assert data.count(b'"format"') == 1
         assert b'"gain": {"x": 10, "y": 20}' in data
         assert b'"colour": "red"' in data
@@ -528,10 +528,10 @@ def test_diagrams_inside_blocks_are_written_and_read_again(schema: jsonschema.Dr
 
 def test_errors_inside_a_block_have_line_and_path() -> None:
     text = diagram_to_bytes(_nested(1), load_robot).decode()
-    wrong = text.replace('"gain": 2', '"gain": "two"')
-    line = wrong[: wrong.index('"two"')].count("\n") + 1
+    invalid = text.replace('"gain": 2', '"gain": "two"')
+    line = invalid[: invalid.index('"two"')].count("\n") + 1
     with pytest.raises(FormatError) as caught:
-        diagram_from_bytes(wrong.encode(), "model.json", BLOCKS, load_robot)
+        diagram_from_bytes(invalid.encode(), "model.json", BLOCKS, load_robot)
     assert f"model.json:{line}, blocks.sub.diagram.blocks.gain.parameters.gain" in str(caught.value)
     with pytest.raises(UnknownNameError, match="there is no parameter of Subsystem named 'diagram'"):
         diagram_from_bytes(

@@ -45,18 +45,18 @@ def read(text: str | bytes) -> Node:
 @given(DOCUMENTS)
 def test_reading_a_written_value_gives_the_same_value(value: object) -> None:
     data = canonical_bytes(value)
-    again = read_document(data, "a.json", 10**6).value
-    assert again == value
-    assert canonical_bytes(again) == data
+    reread = read_document(data, "a.json", 10**6).value
+    assert reread == value
+    assert canonical_bytes(reread) == data
     assert json.loads(data) == value, "the standard JSON reader gives the same value"
 
 
 @settings(max_examples=100, deadline=None, derandomize=True)
 @given(st.floats(allow_nan=False, allow_infinity=False))
 def test_floats_keep_their_bits(number: float) -> None:
-    again = read(canonical_bytes([number])).elements()[0].number()
-    assert math.copysign(1, again) == math.copysign(1, number)
-    assert again == number
+    reread = read(canonical_bytes([number])).elements()[0].number()
+    assert math.copysign(1, reread) == math.copysign(1, number)
+    assert reread == number
 
 
 def test_rows_of_numbers_stay_on_one_line() -> None:

@@ -51,8 +51,8 @@ def test_the_generated_code_builds_the_same_diagram(tmp_path: Path) -> None:
     # The code is generated from the diagram above.
     scope: dict[str, object] = {}
     exec(compile(text, "listing", "exec"), scope)  # noqa: S102
-    found = ab.diagram_difference(diagram, scope["diagram"])  # pyright: ignore
-    assert not found, found
+    difference = ab.diagram_difference(diagram, scope["diagram"])  # pyright: ignore
+    assert not difference, difference
 
 
 def test_show_prints_the_tree(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

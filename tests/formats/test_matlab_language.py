@@ -131,10 +131,10 @@ def value(text: str) -> object:
     ],
 )
 def test_expression_has_matlabs_value(text: str, expected: object) -> None:
-    found = value(text)
-    assert isinstance(found, np.ndarray)
-    np.testing.assert_allclose(found, np.asarray(expected, dtype=float), rtol=1e-15, atol=1e-15)
-    assert found.shape == np.shape(expected)
+    actual = value(text)
+    assert isinstance(actual, np.ndarray)
+    np.testing.assert_allclose(actual, np.asarray(expected, dtype=float), rtol=1e-15, atol=1e-15)
+    assert actual.shape == np.shape(expected)
 
 
 @pytest.mark.parametrize(
@@ -164,9 +164,9 @@ def test_byte_order_mark_and_old_encodings_are_read() -> None:
 
 
 def test_an_incomplete_statement_continues_on_the_next_line() -> None:
-    found = read_script(b"x =\n2 +\n3; y\n= 4; z = [\n5 6];", "a.m").variables
-    assert (found["x"], found["y"]) == (5, 4)
-    np.testing.assert_array_equal(found["z"], [[5, 6]])
+    variables = read_script(b"x =\n2 +\n3; y\n= 4; z = [\n5 6];", "a.m").variables
+    assert (variables["x"], variables["y"]) == (5, 4)
+    np.testing.assert_array_equal(variables["z"], [[5, 6]])
 
 
 def test_a_long_chain_needs_no_deep_recursion() -> None:

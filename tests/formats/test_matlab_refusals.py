@@ -258,8 +258,8 @@ SCRIPT = (
 @given(st.lists(st.tuples(st.integers(0, len(SCRIPT)), st.binary(max_size=3), st.integers(0, 3)), max_size=6))
 def test_mutated_script_is_read_or_refused(changes: list[tuple[int, bytes, int]]) -> None:
     data = SCRIPT
-    for place, new, removed in changes:
-        data = data[:place] + new + data[place + removed :]
+    for index, new, removed in changes:
+        data = data[:index] + new + data[index + removed :]
     _read_or_refuse(data)
 
 

@@ -30,8 +30,8 @@ PRINTED = Path(__file__).with_name("kr180_as_printed.m")
 
 def robot(text: str, **options: FrictionModel) -> Robot:
     """The only robot of a script."""
-    (found,) = read_script(text.encode(), "test.m", **options).robots.values()
-    return found
+    (result,) = read_script(text.encode(), "test.m", **options).robots.values()
+    return result
 
 
 # -- the paper ---------------------------------------------------------------------------------------------
@@ -170,8 +170,8 @@ def test_robot_from_a_matrix_is_named_by_its_variable() -> None:
 
 
 def test_name_arguments_of_robot_are_read() -> None:
-    made = robot("L{1} = link([0 1 0 0]); r = robot(L, 'A', 'B', 'C');")
-    assert (made.name, made.manufacturer, made.comment) == ("A", "B", "C")
+    result = robot("L{1} = link([0 1 0 0]); r = robot(L, 'A', 'B', 'C');")
+    assert (result.name, result.manufacturer, result.comment) == ("A", "B", "C")
 
 
 def test_values_are_copied_in_release_8() -> None:
@@ -180,7 +180,7 @@ def test_values_are_copied_in_release_8() -> None:
         "L{1}.m = 2; a.m = 3; M{1}.m = 4; s.name = 'other'; clear L"
     )
     script = read_script(text.encode(), "a.m")
-    assert [found.links[0].mass for found in script.robots.values()] == [1, 1]
+    assert [member.links[0].mass for member in script.robots.values()] == [1, 1]
     assert script.robots["s"].name == "other"
 
 
@@ -213,9 +213,9 @@ def test_gravity_changes_its_sign_when_read() -> None:
 
 
 def test_base_and_tool_are_poses() -> None:
-    made = robot("r = robot([0 1 0 0]); r.base = transl(1, 2, 3)*trotx(pi/2); r.tool = transl([0 0 0.1]);")
-    assert made.base.translation == (1, 2, 3)
-    assert made.tool.translation == (0, 0, 0.1)
+    result = robot("r = robot([0 1 0 0]); r.base = transl(1, 2, 3)*trotx(pi/2); r.tool = transl([0 0 0.1]);")
+    assert result.base.translation == (1, 2, 3)
+    assert result.tool.translation == (0, 0, 0.1)
 
 
 def test_the_default_gear_ratio_is_one() -> None:
@@ -292,20 +292,20 @@ def test_serial_link_accepts_options() -> None:
         "'base', transl(1, 0, 0), 'tool', transl(0, 1, 0), 'gravity', [0 0 1.6], 'qlim', [-1 1; -inf inf], "
         "'offset', [0.1 0.2], 'plotopt', {'workspace', [-1 1]});"
     )
-    made = robot(text)
-    assert (made.name, made.manufacturer, made.comment) == ("A", "B", "C")
-    assert made.gravity == (0, 0, -1.6)
-    assert [link.joint.limits.position for link in made.links] == [(-1, 1), None]
-    assert [link.joint.offset for link in made.links] == [0.1, 0.2]
-    assert made.base.translation == (1, 0, 0)
-    assert made.tool.translation == (0, 1, 0)
-    assert all(link.dh and link.dh.convention is DhConvention.MODIFIED for link in made.links)
+    result = robot(text)
+    assert (result.name, result.manufacturer, result.comment) == ("A", "B", "C")
+    assert result.gravity == (0, 0, -1.6)
+    assert [link.joint.limits.position for link in result.links] == [(-1, 1), None]
+    assert [link.joint.offset for link in result.links] == [0.1, 0.2]
+    assert result.base.translation == (1, 0, 0)
+    assert result.tool.translation == (0, 1, 0)
+    assert all(link.dh and link.dh.convention is DhConvention.MODIFIED for link in result.links)
 
 
 def test_handles_are_shared_in_release_9() -> None:
     text = "L(1) = Link([0 0 1 0]); r = SerialLink(L); L(1).m = 2; s = r; s.name = 'x'; r.links(1).G = 5;"
-    made = robot(text)
-    assert (made.name, made.links[0].mass, made.gear_ratios[0]) == ("x", 2, 5)
+    result = robot(text)
+    assert (result.name, result.links[0].mass, result.gear_ratios[0]) == ("x", 2, 5)
 
 
 @pytest.mark.parametrize("links", ["[L1 L2]", "{L1 L2}", "[[] L1 L2]", "[L1 L2]'", "[[L1] [L2]]"])
@@ -316,7 +316,7 @@ def test_links_can_be_collected_in_arrays_and_cell_arrays(links: str) -> None:
 def test_copy_of_a_serial_link_has_its_own_name() -> None:
     text = "r = SerialLink(Link([0 0 1 0]), 'name', 'A', 'comment', 'C'); s = SerialLink(r, 'name', 'B');"
     script = read_script(text.encode(), "a.m")
-    assert [(found.name, found.comment) for found in script.robots.values()] == [("A", "C"), ("B", "C")]
+    assert [(member.name, member.comment) for member in script.robots.values()] == [("A", "C"), ("B", "C")]
 
 
 # -- files -------------------------------------------------------------------------------------------------

@@ -122,9 +122,9 @@ def robots(draw: st.DrawFn) -> Robot:
 @given(robots())
 def test_reading_a_written_robot_gives_the_same_robot(robot: Robot) -> None:
     data = write_robot(robot)
-    again = read_robot(data, "robot.json")
-    assert again == robot
-    assert write_robot(again) == data
+    reread = read_robot(data, "robot.json")
+    assert reread == robot
+    assert write_robot(reread) == data
     validator("robot").validate(json.loads(data))
 
 
@@ -153,13 +153,13 @@ EXACT = object()
 def changed(*path: str | int, value: object = EXACT) -> bytes:
     """The robot above with one value replaced, or removed."""
     document = json.loads(json.dumps(ROBOT))
-    here = document
+    node = document
     for step in path[:-1]:
-        here = here[step]
+        node = node[step]
     if value is EXACT:
-        del here[path[-1]]
+        del node[path[-1]]
     else:
-        here[path[-1]] = value
+        node[path[-1]] = value
     return json.dumps(document, indent=1).encode()
 
 
@@ -230,16 +230,16 @@ def test_the_schema_refuses_most_invalid_files() -> None:
 def test_a_mutated_document_is_read_or_refused_with_a_package_error(data: st.DataObject) -> None:
     document = json.loads(write_robot(load_robot("puma560")))
     for _ in range(data.draw(st.integers(1, 3))):
-        here: Any = document
+        node: Any = document
         while True:
-            keys = list(here) if isinstance(here, dict) else list(range(len(here)))
+            keys = list(node) if isinstance(node, dict) else list(range(len(node)))
             if not keys:
                 break
             key = data.draw(st.sampled_from(keys))
-            if isinstance(here[key], dict | list) and data.draw(st.booleans()):
-                here = here[key]
+            if isinstance(node[key], dict | list) and data.draw(st.booleans()):
+                node = node[key]
                 continue
-            here[key] = data.draw(
+            node[key] = data.draw(
                 st.sampled_from([None, True, -1, 1e300, 0, "", "x", [], {}, [1, 2, 3], "5 deg"])
             )
             break
@@ -261,11 +261,11 @@ def test_user_files_warn_of_impossible_inertias_but_shipped_robots_do_not(tmp_pa
     robot = load_robot("puma560")
     path.write_bytes(write_robot(robot))
     with pytest.warns(InertiaWarning) as caught:
-        mine = load_robot(path)
+        loaded = load_robot(path)
     assert "robot 'Puma 560', link 'link1': it has inertia but no mass" in str(caught[0].message)
     assert len(caught) == 2
-    assert mine == robot
-    assert (mine.source, robot.source) == (str(path), "puma560")
+    assert loaded == robot
+    assert (loaded.source, robot.source) == (str(path), "puma560")
 
 
 def test_friction_model_of_a_file_can_be_replaced(tmp_path: Path) -> None:

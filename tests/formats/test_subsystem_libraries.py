@@ -99,12 +99,14 @@ def test_an_unlinked_copy_can_be_changed_inside(folder: Path) -> None:
     assert isinstance(block, Subsystem)
     own = dataclasses.replace(block, diagram=dataclasses.replace(block.diagram, link=""))
     free = dataclasses.replace(diagram, blocks={**diagram.blocks, "amp": own})
-    found = ab.diagram_difference(diagram, free)
-    assert [(entry.path, entry.name, entry.after) for entry in found.parameters] == [("amp", "library", None)]
+    difference = ab.diagram_difference(diagram, free)
+    assert [(entry.path, entry.name, entry.after) for entry in difference.parameters] == [
+        ("amp", "library", None)
+    ]
     written_out = diagram_to_bytes(free, load_robot, folder=folder)
     assert b'"first"' in written_out
-    again = diagram_from_bytes(written_out, "model.json", BLOCKS, load_robot, folder=folder)
-    assert again == free
+    reread = diagram_from_bytes(written_out, "model.json", BLOCKS, load_robot, folder=folder)
+    assert reread == free
 
 
 def test_the_shipped_servo_is_used_six_times() -> None:

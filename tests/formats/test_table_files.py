@@ -52,9 +52,9 @@ def test_a_csv_file_gives_its_numbers_in_every_dialect(
     trailing: bool,
 ) -> None:
     times = np.cumsum([row[0] for row in rows])
-    wanted = [[float(time), row[1], row[2]] for time, row in zip(times, rows)]
+    expected = [[float(time), row[1], row[2]] for time, row in zip(times, rows)]
     decimal_comma = comma and delimiter != ","
-    texts = [[repr(value) for value in row] for row in wanted]
+    texts = [[repr(value) for value in row] for row in expected]
     if decimal_comma:
         texts = [[text.replace(".", ",") for text in row] for row in texts]
     lines = [delimiter.join(row) for row in texts]
@@ -75,7 +75,7 @@ def test_a_csv_file_gives_its_numbers_in_every_dialect(
     text = line_end.join(["", *lines, ""])
     file = columns(text.encode(encoding))
     table = table_of(file, "a")
-    assert np.asarray(table).tolist() == wanted
+    assert np.asarray(table).tolist() == expected
     assert list(table.names) == names[1:]
     if header == "units":
         assert table.units == ("deg", "Nm")
@@ -90,10 +90,10 @@ def test_a_field_that_is_not_a_number_is_never_read_as_one(
     texts = [[repr(float(time)), repr(row[1]), repr(row[2])] for time, row in zip(times, rows)]
     row = data.draw(st.integers(0, len(rows) - 1))
     column = data.draw(st.integers(0, 2))
-    wrong = data.draw(
+    invalid = data.draw(
         st.sampled_from(["", "nan", "x", "1_000", "12:30", "0x1F", "--", "1,5", "1.234,5", "1e"])
     )
-    texts[row][column] = wrong
+    texts[row][column] = invalid
     text = "\n".join(["time;a;b", *(";".join(fields) for fields in texts)])
     with pytest.raises(ArmblocksError) as caught:
         np.asarray(table_of(columns(text), "a", "time", ("a", "b")))
@@ -177,20 +177,20 @@ def test_dates_are_seconds_since_the_first_row(steps: list[int], zone: str) -> N
     for step in steps:
         moments.append(moments[-1] + timedelta(microseconds=step))
     lines = [f"{moment.isoformat()}{zone},{k}" for k, moment in enumerate(moments)]
-    found = numbers("\n".join(["time,k", *lines]))
-    wanted = [(moment - moments[0]) / timedelta(seconds=1) for moment in moments]
-    assert [row[0] for row in found] == pytest.approx(wanted, rel=1e-15)
+    actual = numbers("\n".join(["time,k", *lines]))
+    expected = [(moment - moments[0]) / timedelta(seconds=1) for moment in moments]
+    assert [row[0] for row in actual] == pytest.approx(expected, rel=1e-15)
 
 
-def parquet(**given: object) -> bytes:
+def parquet(**columns: object) -> bytes:
     buffer = io.BytesIO()
-    pq.write_table(pa.table(given), buffer)
+    pq.write_table(pa.table(columns), buffer)
     return buffer.getvalue()
 
 
-def mat(**given: object) -> bytes:
+def mat(**variables: object) -> bytes:
     buffer = io.BytesIO()
-    savemat(buffer, given)
+    savemat(buffer, variables)
     return buffer.getvalue()
 
 
@@ -238,9 +238,9 @@ def test_vectors_and_matrices_of_mat_files_in_both_orientations(row: bool, acros
 
 def test_a_matrix_with_times_in_its_first_row() -> None:
     t, y = np.array([0.0, 0.5, 2.0, 2.5]), np.array([-3.0, 1.0, 2.0, 0.0])
-    wanted = np.column_stack([t, y]).tolist()
-    assert numbers(mat(ans=np.array([t, y])), ".mat") == wanted
-    assert numbers(mat(ans=np.column_stack([t, y])), ".mat") == wanted
+    expected = np.column_stack([t, y]).tolist()
+    assert numbers(mat(ans=np.array([t, y])), ".mat") == expected
+    assert numbers(mat(ans=np.column_stack([t, y])), ".mat") == expected
     with pytest.raises(InputError, match="both its first row and its first column can be times"):
         numbers(mat(ans=np.array([t, y + 4.0])), ".mat")
 

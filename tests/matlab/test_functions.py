@@ -127,8 +127,8 @@ def test_numbers_constants_and_symbols_have_the_same_values(name: str) -> None:
     ],
 )
 def test_values_are_those_of_matlab(text: str, value: float) -> None:
-    found = read_script(f"x = {text};".encode(), "x.m").variables["x"]
-    assert np.ravel(found).tolist() == [value]
+    actual = read_script(f"x = {text};".encode(), "x.m").variables["x"]
+    assert np.ravel(actual).tolist() == [value]
     assert casadi.evalf(Formula(text, "here").trace({})).full().ravel().tolist() == [value]
 
 
@@ -156,8 +156,8 @@ def test_values_are_those_of_matlab(text: str, value: float) -> None:
     ],
 )
 def test_arrays_of_scripts_have_the_shapes_of_matlab(text: str, value: list[list[float]]) -> None:
-    found = read_script(f"x = {text};".encode(), "x.m").variables["x"]
-    assert np.asarray(found, dtype=float).tolist() == value
+    actual = read_script(f"x = {text};".encode(), "x.m").variables["x"]
+    assert np.asarray(actual, dtype=float).tolist() == value
 
 
 @pytest.mark.parametrize(
@@ -194,14 +194,14 @@ def test_formulas_whose_value_depends_on_the_orientation_of_a_vector_are_refused
 
 
 def test_vectors_of_formulas_take_two_indices_where_one_of_them_is_1() -> None:
-    found = Formula("[v(2, 1), v(1, 3), A(2, :)(1, 2), A(:, 2)(3, 1), A(:, 2)'(1, 3)]", "here").trace(
+    actual = Formula("[v(2, 1), v(1, 3), A(2, :)(1, 2), A(:, 2)(3, 1), A(:, 2)'(1, 3)]", "here").trace(
         {"v": SX([4.0, 5.0, 6.0]), "A": SX(np.arange(9.0).reshape(3, 3))}
     )
-    assert casadi.evalf(found).full().ravel().tolist() == [5.0, 6.0, 4.0, 7.0, 7.0]
+    assert casadi.evalf(actual).full().ravel().tolist() == [5.0, 6.0, 4.0, 7.0, 7.0]
 
 
 def test_wrong_arguments_are_refused_with_a_message() -> None:
-    wrong = ("", "[]", "'a'", "1, 'a'", "[1 2; 3 4], [1 2 3]", "1, 2, 3, 4", "[1 2], [3; 4]", "inf, -1")
+    invalid = ("", "[]", "'a'", "1, 'a'", "[1 2; 3 4], [1 2 3]", "1, 2, 3, 4", "[1 2], [3; 4]", "inf, -1")
 
     def by_numbers(text: str) -> object:
         return read_script(f"x = {text};".encode(), "x.m")
@@ -209,7 +209,7 @@ def test_wrong_arguments_are_refused_with_a_message() -> None:
     def by_symbols(text: str) -> object:
         return Formula(text, "here").trace({})
 
-    for text in (f"{name}({arguments})" for name in TABLE for arguments in wrong):
+    for text in (f"{name}({arguments})" for name in TABLE for arguments in invalid):
         for evaluated in (by_numbers, by_symbols):
             try:
                 evaluated(text)
@@ -247,8 +247,8 @@ def test_a_name_hides_a_function_that_is_not_reserved() -> None:
     length = Formula("length + length(2)*size([1 2 3])(2)", "here")
     assert length.names == {"length"}
     assert length.readable_names == {"length", "size"}
-    found = length.trace({"length": SX([4.0, 5.0])})
-    assert casadi.evalf(found).full().ravel().tolist() == [9.0, 10.0]  # a vector of a formula is a column
+    actual = length.trace({"length": SX([4.0, 5.0])})
+    assert casadi.evalf(actual).full().ravel().tolist() == [9.0, 10.0]  # a vector of a formula is a column
     assert Formula("length([1 2 3])", "here").names == frozenset()
 
 

@@ -38,8 +38,8 @@ def by_symbols(text: str) -> float:
     """The value of a formula whose numbers are symbols, so that nothing is a constant."""
     numbers: list[float] = []
 
-    def named(found: re.Match[str]) -> str:
-        numbers.append(float(found[0]))
+    def named(actual: re.Match[str]) -> str:
+        numbers.append(float(actual[0]))
         return f"x{len(numbers)}x"
 
     formula = Formula(re.sub(r"(?<![\w.])(\d+\.?\d*|\.\d+)(e\d+)?", named, text), "here")
@@ -216,8 +216,8 @@ class TwoStacks:
 def by_two_stacks(text: str) -> float:
     """The value of a text of :func:`written`; raises ``ValueError`` for a comparison of a comparison."""
     stacks, before = TwoStacks(), "("
-    for found in _TOKEN.finditer(text):
-        token = found[0]
+    for match in _TOKEN.finditer(text):
+        token = match[0]
         operand_before = before not in ("(", "operator")
         if token[0].isdigit() or (token[0] == "." and token[1:2].isdigit()):
             stacks.values.append(float(token))
@@ -225,7 +225,7 @@ def by_two_stacks(text: str) -> float:
         elif token in ("'", ".'", "abs"):
             pass
         elif token == "(":
-            name = "abs" if text[: found.start()].endswith("abs") else ""
+            name = "abs" if text[: match.start()].endswith("abs") else ""
             stacks.pending.append(("(", name))
             before = "("
         elif token == ")":
@@ -240,7 +240,7 @@ def by_two_stacks(text: str) -> float:
             before = "operator"
         else:
             stacks.reduce(_BINDING[token])
-            if _BINDING[token] == 5 and re.search(r"[<>=~!]=|[<>]", _since_bracket(text, found.start())):
+            if _BINDING[token] == 5 and re.search(r"[<>=~!]=|[<>]", _since_bracket(text, match.start())):
                 raise ValueError("a comparison of a comparison")
             stacks.pending.append((token, ""))
             before = "operator"
@@ -289,16 +289,16 @@ def test_random_expressions_have_the_values_of_an_independent_evaluator() -> Non
         assert shape_of(parse_formula(formula_source(spelling(tree), "here"))) == shape_of(tree), text
         if not math.isfinite(expected) or abs(expected) > 1e200:
             continue
-        found = by_formula(text)[0]
+        actual = by_formula(text)[0]
         # Powers of the C library differ in the last place; later powers increase the difference.
-        assert found == pytest.approx(expected, rel=1e-9, abs=1e-300), text
+        assert actual == pytest.approx(expected, rel=1e-9, abs=1e-300), text
         assert by_symbols(text) == pytest.approx(expected, rel=1e-9, abs=1e-300), text
         try:
             by_numbers = by_script(text)[0]
         except ArmblocksError as error:  # a complex value in a part without effect on the result
             assert "complex" in str(error)
         else:
-            assert by_numbers == found or abs(by_numbers) == abs(found) == 0.0, text
+            assert by_numbers == actual or abs(by_numbers) == abs(actual) == 0.0, text
             compared += 1
     assert compared > 120
     assert refused > 5
@@ -316,8 +316,10 @@ def test_values_agree_with_python_for_expressions_with_the_same_grammar() -> Non
         text += "2"
         logical = any(word in text for word in ("and", "or"))
         expected = eval(text)  # noqa: S307 (a text made here)
-        found = by_formula(text)[0]
-        assert bool(found) == bool(expected) if logical else found == pytest.approx(expected, rel=1e-15), text
+        actual = by_formula(text)[0]
+        assert bool(actual) == bool(expected) if logical else actual == pytest.approx(expected, rel=1e-15), (
+            text
+        )
         compared += 1
     assert compared == 400
 
@@ -338,8 +340,12 @@ def arrays(draw: random.Random, kind: str, depth: int) -> str:
         "v": [f"sum({m})", f"({m})(2, :)", f"({v}) * ({m})", f"[{n}, ({v})(2:end)]", f"cross({v}, {v})"],
         "m": [f"({m}) * ({a})", f"({a})'", f"[{v}; {v}; {v}]", f"diag({v})", f"eye(3) + {a}"],
     }[kind]
-    more = {"n": [f"size({m}, 2)"], "v": [f"sum({m}, 1)", f"sum({m}, 2)'"], "m": [f"({m})^2", f"({m}).^2'"]}
-    own += more[kind]
+    choices = {
+        "n": [f"size({m}, 2)"],
+        "v": [f"sum({m}, 1)", f"sum({m}, 2)'"],
+        "m": [f"({m})^2", f"({m}).^2'"],
+    }
+    own += choices[kind]
     return draw.choice([*same, *own, *own])
 
 
@@ -348,7 +354,7 @@ def test_arrays_of_numbers_and_of_symbols_agree() -> None:
     for k in range(150):
         text = arrays(draw, "nvm"[k % 3], 2)
         expected = read_script(f"x = {text};".encode(), "here.m").variables["x"]
-        found = casadi.evalf(Formula(text, "here").trace({})).full()
+        actual = casadi.evalf(Formula(text, "here").trace({})).full()
         if 1 in np.shape(expected):
-            expected, found = np.ravel(expected), found.ravel()  # vectors of formulas have no orientation
-        np.testing.assert_allclose(found, np.asarray(expected, float), rtol=1e-14, atol=1e-14, err_msg=text)
+            expected, actual = np.ravel(expected), actual.ravel()  # vectors of formulas have no orientation
+        np.testing.assert_allclose(actual, np.asarray(expected, float), rtol=1e-14, atol=1e-14, err_msg=text)

@@ -165,12 +165,11 @@ FORMULAS: Mapping[str, Formula] = {
 }
 
 
-def broken_formulas(diagram: Diagram, found: Any, t: np.ndarray) -> dict[str, tuple[int, float, float]]:
+def broken_formulas(diagram: Diagram, actual: Any, t: np.ndarray) -> dict[str, tuple[int, float, float]]:
     """Return by block the first row that contradicts its formula, the output, and the required output.
 
-    ``found`` gives signals (N, *shape) by path, at the times ``t`` (N,). Blocks inside conditional subsystems
-    are skipped: their outputs are undefined while the subsystem is off.
-    """
+    ``actual`` gives signals (N, *shape) by path, at the times ``t`` (N,). Blocks inside conditional
+    subsystems are skipped: their outputs are undefined while the subsystem is off. """
     flat = flat_diagram(diagram)
     broken: dict[str, tuple[int, float, float]] = {}
     for name, block in flat.blocks.items():
@@ -178,8 +177,8 @@ def broken_formulas(diagram: Diagram, found: Any, t: np.ndarray) -> dict[str, tu
         sampled = block.sampled or name in flat.gates
         if kind not in FORMULAS or sampled or getattr(block, "zero_crossing", True) is False:
             continue
-        inputs = {port.name: _array(found[f"{name}/{port.name}"]) for port in block.input_ports()}
-        y = _array(found[f"{name}/y"])
+        inputs = {port.name: _array(actual[f"{name}/{port.name}"]) for port in block.input_ports()}
+        y = _array(actual[f"{name}/y"])
         wrong = contradictions(FORMULAS[kind], block, inputs, _array(t), y)
         if wrong is not None:
             broken[name] = wrong

@@ -121,14 +121,14 @@ def rows_of(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def different(
-    found: Signals, wanted: Signals, tolerance: float, excess: Mapping[str, np.ndarray] | None = None
+    actual: Signals, wanted: Signals, tolerance: float, excess: Mapping[str, np.ndarray] | None = None
 ) -> Iterator[str]:
     """Yield every signal that differs by more than ``tolerance`` of its size plus its uncertainty."""
     for name, values in wanted.items():
-        if name not in found:
+        if name not in actual:
             yield f"'{name}' is missing"
             continue
-        other = found[name]
+        other = actual[name]
         if len(other) != len(values):
             yield f"'{name}' has {len(other)} rows in the place of {len(values)}"
             continue
@@ -223,11 +223,11 @@ def is_action(node: Node, source: str) -> bool:
     return node.kind in ("Merge", "ActionSubsystem") or source.split("/")[0].startswith("if ")
 
 
-def without_single_rows(found: Signals, wanted: Signals, beside: Signals) -> dict[str, np.ndarray]:
+def without_single_rows(actual: Signals, wanted: Signals, beside: Signals) -> dict[str, np.ndarray]:
     """Replace a single deviating row by the wanted one if it lies between its neighbours in time."""
     changed: dict[str, np.ndarray] = {}
     for name, values in wanted.items():
-        rows = found[name].copy()
+        rows = actual[name].copy()
         wrong = rows_of(rows, values) > 1e-6 * (1.0 + np.abs(values).max(initial=0.0))
         for k in np.flatnonzero(wrong):
             alone = not wrong[max(k - 1, 0) : k].any() and not wrong[k + 1 : k + 2].any()
@@ -319,17 +319,17 @@ def obeys_formulas_at_default_tolerances(case: Case) -> Iterator[str]:
         yield f"'{name}' gives {found:.17g} at row {row}; its formula gives {wanted:.17g}"
 
 
-def rows_beyond(found: np.ndarray, wanted: np.ndarray, tolerance: float) -> np.ndarray:
+def rows_beyond(actual: np.ndarray, wanted: np.ndarray, tolerance: float) -> np.ndarray:
     """Return by row whether it is outside the range of the wanted row and its neighbours, by ``tolerance``.
 
     At the time of an event rounding errors decide which of these values a row has.
     """
-    if len(found) != len(wanted):
+    if len(actual) != len(wanted):
         return np.ones(len(wanted), dtype=bool)
     near = tolerance * (1.0 + np.abs(wanted).max(initial=0.0))
     rows = np.stack([np.roll(wanted, k, axis=0) for k in (-1, 0, 1)])
     rows[0, -1:], rows[2, :1] = wanted[-1:], wanted[:1]
-    outside = (found < rows.min(axis=0) - near) | (found > rows.max(axis=0) + near)
+    outside = (actual < rows.min(axis=0) - near) | (actual > rows.max(axis=0) + near)
     return outside.reshape(len(outside), -1).any(axis=1)
 
 
@@ -375,9 +375,9 @@ def repeats(case: Case) -> Iterator[str]:
             yield from same_bits(f"compiled with {effort} effort", case.signals(case.diagram), case.run)
 
 
-def same_bits(what: str, found: Signals, wanted: Signals) -> Iterator[str]:
+def same_bits(what: str, actual: Signals, wanted: Signals) -> Iterator[str]:
     for name, values in wanted.items():
-        if name not in found or not np.array_equal(found[name], values):
+        if name not in actual or not np.array_equal(actual[name], values):
             yield f"{what}: '{name}' has other bits"
 
 

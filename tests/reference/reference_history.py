@@ -7,8 +7,8 @@ import bisect
 import numpy as np
 
 SAME = 2.0**-50
-PLACES = np.array([0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0])
-TO_COEFFICIENTS = np.linalg.inv(np.vander(PLACES, 4, increasing=True))
+POSITIONS = np.array([0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0])
+TO_COEFFICIENTS = np.linalg.inv(np.vander(POSITIONS, 4, increasing=True))
 
 
 class History:

@@ -34,20 +34,20 @@ def chain(source: Block, *blocks: Block) -> ab.Diagram:
 def test_a_mode_is_consistent_after_a_jump_at_a_limit() -> None:
     """The sawtooth reaches the limit -1 exactly when it jumps to 1: the limiter never limits."""
     wave = bl.SignalGenerator(waveform="sawtooth", frequency=2.652)
-    found = run_reference(chain(wave, bl.Saturation(lower=-1.0, upper=1.0), bl.Integrator()), TIMES)
+    result = run_reference(chain(wave, bl.Saturation(lower=-1.0, upper=1.0), bl.Integrator()), TIMES)
     phase = np.mod(TIMES * 2.652, 1.0)
-    np.testing.assert_allclose(found["u/y"], 1.0 - 2.0 * phase, atol=1e-12)
-    np.testing.assert_array_equal(found["b1/y"], np.clip(found["u/y"], -1.0, 1.0))
-    np.testing.assert_allclose(found["b2/y"], (phase - phase**2) / 2.652, atol=1e-10)
+    np.testing.assert_allclose(result["u/y"], 1.0 - 2.0 * phase, atol=1e-12)
+    np.testing.assert_array_equal(result["b1/y"], np.clip(result["u/y"], -1.0, 1.0))
+    np.testing.assert_allclose(result["b2/y"], (phase - phase**2) / 2.652, atol=1e-10)
 
 
 def test_a_hysteresis_has_a_memory() -> None:
     """The relay is on from sin t = 0.5 (rising) to sin t = -0.5 (falling)."""
     t = np.arange(101) * 0.1
-    found = run_reference(chain(bl.SineWave(), bl.Relay(), bl.Integrator()), t)
+    result = run_reference(chain(bl.SineWave(), bl.Relay(), bl.Integrator()), t)
     on, off = math.pi / 6, 7 * math.pi / 6
     hours = sum(np.clip(t, on + k, off + k) - (on + k) for k in (0.0, 2 * math.pi))
-    np.testing.assert_allclose(found["b2/y"], hours, atol=1e-10)
+    np.testing.assert_allclose(result["b2/y"], hours, atol=1e-10)
 
 
 def test_a_ball_bounces() -> None:
@@ -56,7 +56,7 @@ def test_a_ball_bounces() -> None:
     place = bl.SecondOrderIntegratorLimited(initial=1.0, lower=0.0, reinitialize=True)
     ball = builder.add("ball", place, builder.add("weight", bl.Constant(value=-9.81)))
     builder.connect(builder.add("bounce", bl.Gain(gain=-0.5), ball["dx"]), ball["dx0"])
-    found = run_reference(builder.build(), TIMES)
+    actual = run_reference(builder.build(), TIMES)
     fall = math.sqrt(2 / 9.81)
     t = TIMES - fall
     expected = 1.0 - 9.81 / 2 * TIMES**2
@@ -65,13 +65,13 @@ def test_a_ball_bounces() -> None:
         expected = np.where(t >= 0.0, speed * t - 9.81 / 2 * t**2, expected)
         t = t - flight
     expected = np.where(3 * fall <= TIMES, 0.0, expected)
-    np.testing.assert_allclose(found["ball/x"], expected, atol=1e-9)
+    np.testing.assert_allclose(actual["ball/x"], expected, atol=1e-9)
 
 
 def test_a_delayed_jump_arrives_on_time() -> None:
     """The integral of a step at 0.31 s after a delay of 0.5 s."""
-    found = run_reference(chain(bl.Step(time=0.31), bl.TransportDelay(delay=0.5), bl.Integrator()), TIMES)
-    np.testing.assert_allclose(found["b2/y"], np.maximum(TIMES - 0.81, 0.0), atol=1e-12)
+    result = run_reference(chain(bl.Step(time=0.31), bl.TransportDelay(delay=0.5), bl.Integrator()), TIMES)
+    np.testing.assert_allclose(result["b2/y"], np.maximum(TIMES - 0.81, 0.0), atol=1e-12)
 
 
 def test_a_held_output_has_the_value_just_before_the_subsystem_is_disabled() -> None:
@@ -84,16 +84,16 @@ def test_a_held_output_has_the_value_just_before_the_subsystem_is_disabled() -> 
     builder.add(
         "sub", bl.EnabledSubsystem(diagram=inner.build()), builder.add("t", bl.Clock()), enable=enable
     )
-    found = run_reference(builder.build(), TIMES)
-    np.testing.assert_allclose(found["sub/y/y"], np.minimum(TIMES, 1.0), atol=1e-15)
-    np.testing.assert_allclose(found["sub/area/y"], np.minimum(TIMES, 1.0) ** 2 / 2, atol=1e-12)
+    result = run_reference(builder.build(), TIMES)
+    np.testing.assert_allclose(result["sub/y/y"], np.minimum(TIMES, 1.0), atol=1e-15)
+    np.testing.assert_allclose(result["sub/area/y"], np.minimum(TIMES, 1.0) ** 2 / 2, atol=1e-12)
 
 
 def test_ticks_use_the_previous_discrete_state() -> None:
     """z(k + 1) = z(k) + 0.1 k 0.1; the output is evaluated before the update."""
-    found = run_reference(chain(bl.Clock(), bl.DiscreteIntegrator(sample_time=0.1)), TIMES)
+    result = run_reference(chain(bl.Clock(), bl.DiscreteIntegrator(sample_time=0.1)), TIMES)
     k = np.floor(TIMES / 0.1 + 1e-9)
-    np.testing.assert_allclose(found["b1/y"], 0.01 * k * (k - 1) / 2, atol=1e-14)
+    np.testing.assert_allclose(result["b1/y"], 0.01 * k * (k - 1) / 2, atol=1e-14)
 
 
 def test_an_algebraic_loop_is_solved() -> None:
@@ -134,26 +134,26 @@ def test_a_native_run_agrees_with_the_reference(kind: str) -> None:
     times = np.arange(11) * 0.1
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # warnings about exceeded joint limits are not tested here
-        found = ab.simulate(diagram, stop_time=float(times[-1]), sample_time=0.1, rtol=1e-9, atol=1e-12)
+        result = ab.simulate(diagram, stop_time=float(times[-1]), sample_time=0.1, rtol=1e-9, atol=1e-12)
     worst: dict[str, float] = {}
     for step, count in TRIALS:
         wanted = run_reference(diagram, times[:count], step)
-        worst = {name: distance(found[name][:count], values) for name, values in wanted.items()}
+        worst = {name: distance(result[name][:count], values) for name, values in wanted.items()}
         if all(value < 1e-6 for value in worst.values()):
             return
     raise AssertionError({name: value for name, value in worst.items() if not value < 1e-6})
 
 
-def distance(found: np.ndarray, wanted: np.ndarray) -> float:
+def distance(actual: np.ndarray, wanted: np.ndarray) -> float:
     """Return the largest difference, relative to 1 + the largest value."""
-    if found.shape != wanted.shape:
+    if actual.shape != wanted.shape:
         return math.inf
-    return float(np.abs(found - wanted).max(initial=0.0) / (1.0 + np.abs(wanted).max(initial=0.0)))
+    return float(np.abs(actual - wanted).max(initial=0.0) / (1.0 + np.abs(wanted).max(initial=0.0)))
 
 
 @pytest.mark.parametrize("kind", FORMULAS)
 def test_a_block_agrees_with_its_formula(kind: str) -> None:
     """The comparison uses every recorded time of the worked example."""
     diagram = worked_example(BLOCKS[kind])
-    found = ab.simulate(diagram, stop_time=10.0, sample_time=0.05)
-    assert broken_formulas(diagram, found, found.time) == {}
+    result = ab.simulate(diagram, stop_time=10.0, sample_time=0.05)
+    assert broken_formulas(diagram, result, result.time) == {}

@@ -61,9 +61,9 @@ def test_a_ball_rolls_down_a_slope_and_bounces_at_the_end(run: Run) -> None:
     first = math.sqrt(2 * s0 / a)
     v1 = a * first
     stop = first + 2 * v1 / a * (e + e * e) + 0.9 * v1 * e**3 / a
-    found = run(builder.build(), stop)
-    assert found.run.events >= 3
-    t = found.time
+    result = run(builder.build(), stop)
+    assert result.run.events >= 3
+    t = result.time
     expected = np.where(t <= first, s0 - a * t**2 / 2, np.nan)
     start = first
     for k in (1, 2, 3):
@@ -71,7 +71,7 @@ def test_a_ball_rolls_down_a_slope_and_bounces_at_the_end(run: Run) -> None:
         inside = (t > start) & (t <= start + length)
         expected[inside] = (speed * (t - start) - a * (t - start) ** 2 / 2)[inside]
         start += length
-    np.testing.assert_allclose(found["ball/x"], expected, atol=3e-9)
+    np.testing.assert_allclose(result["ball/x"], expected, atol=3e-9)
 
 
 def test_a_mass_on_a_belt_sticks_and_slips_periodically(run: Run) -> None:
@@ -94,15 +94,15 @@ def test_a_mass_on_a_belt_sticks_and_slips_periodically(run: Run) -> None:
 
     # it sticks again when x' = V for the first time after that
     s2 = (2 * math.pi - 2 * math.atan2(A, B)) / w
-    found = run(builder.build(), t1 + s2 + 0.3)
-    t = found.time
+    result = run(builder.build(), t1 + s2 + 0.3)
+    t = result.time
     slip = (t > t1) & (t <= t1 + s2)
     expected = np.where(t <= t1, V * t, x(t))
     end = float(x(np.array([t1 + s2]))[0])
     expected = np.where(t > t1 + s2, end + V * (t - t1 - s2), expected)
-    np.testing.assert_allclose(found["place/y"], expected, atol=1e-8)
+    np.testing.assert_allclose(result["place/y"], expected, atol=1e-8)
     stuck = ~slip & (np.abs(t - t1) > 1e-9)
-    assert (found["mass/v"][stuck] == 0.0).all()
+    assert (result["mass/v"][stuck] == 0.0).all()
 
 
 def test_a_thermostat_with_exponential_branches(run: Run) -> None:
@@ -111,8 +111,8 @@ def test_a_thermostat_with_exponential_branches(run: Run) -> None:
     room = builder.add("room", bl.Integrator(initial=15.0))
     relay = builder.add("relay", bl.Relay(on_point=22.0, off_point=18.0, on_value=10.0, off_value=30.0), room)
     builder.connect(builder.add("rate", bl.Sum(signs="+-"), relay, room), room["u"])
-    found = run(builder.build(), 4.0)
-    t, expected = found.time, np.empty_like(found.time)
+    result = run(builder.build(), 4.0)
+    t, expected = result.time, np.empty_like(result.time)
     begin, value, target = 0.0, 15.0, 30.0
     while begin < 4.0:
         edge = 22.0 if target == 30.0 else 18.0
@@ -120,7 +120,7 @@ def test_a_thermostat_with_exponential_branches(run: Run) -> None:
         inside = (t >= begin) & (t <= begin + length)
         expected[inside] = target + (value - target) * np.exp(-(t[inside] - begin))
         begin, value, target = begin + length, edge, 40.0 - target
-    np.testing.assert_allclose(found["room"], expected, atol=3e-8)
+    np.testing.assert_allclose(result["room"], expected, atol=3e-8)
 
 
 def test_two_rates_with_offsets_around_a_plant(run: Run) -> None:
@@ -130,24 +130,24 @@ def test_two_rates_with_offsets_around_a_plant(run: Run) -> None:
     sensor = builder.add("sensor", bl.ZeroOrderHold(sample_time=(0.25, 0.07)), x)
     control = builder.add("control", bl.ZeroOrderHold(sample_time=(0.1, 0.02)), sensor)
     builder.connect(builder.add("gain", bl.Gain(gain=-1.5), control), x["u"])
-    found = run(builder.build(), 3.0)
+    result = run(builder.build(), 3.0)
     ticks = sorted([(0.07 + 0.25 * j, 0) for j in range(12)] + [(0.02 + 0.1 * j, 1) for j in range(30)])
     value, seen, held, begin = 1.0, 0.0, 0.0, 0.0
-    expected = np.empty_like(found.time)
+    expected = np.empty_like(result.time)
     pieces = [(0.0, 1.0, 0.0)]
-    for time, which in ticks:
+    for time, clock in ticks:
         value += -1.5 * held * (time - begin)
         begin = time
-        if which == 0:
+        if clock == 0:
             seen = value
         # both clocks tick at 0.32 + 0.5 j: the sensor is evaluated first, because the control depends on it
         else:
             held = seen
         pieces.append((time, value, held))
     for start, level, hold in pieces:
-        after = found.time >= start - 1e-12
-        expected[after] = level - 1.5 * hold * (found.time[after] - start)
-    np.testing.assert_allclose(found["x"], expected, atol=1e-12)
+        after = result.time >= start - 1e-12
+        expected[after] = level - 1.5 * hold * (result.time[after] - start)
+    np.testing.assert_allclose(result["x"], expected, atol=1e-12)
 
 
 def test_a_relay_with_hysteresis_in_a_double_integrator_loop(run: Run) -> None:
@@ -158,8 +158,8 @@ def test_a_relay_with_hysteresis_in_a_double_integrator_loop(run: Run) -> None:
     x = integrating(builder, "x", v)
     relay = builder.add("relay", bl.Relay(on_point=h, off_point=-h, on_value=-1.0, off_value=1.0), x)
     builder.connect(relay, v["u"])
-    found = run(builder.build(), 6.0)
-    t, expected = found.time, np.empty_like(found.time)
+    result = run(builder.build(), 6.0)
+    t, expected = result.time, np.empty_like(result.time)
     begin, place, speed, push = 0.0, 0.0, 1.0, 1.0
     while begin < 6.0:
         edge = h if push > 0 else -h
@@ -168,7 +168,7 @@ def test_a_relay_with_hysteresis_in_a_double_integrator_loop(run: Run) -> None:
         inside = (t >= begin) & (t <= begin + s)
         expected[inside] = place + speed * (t[inside] - begin) + push * (t[inside] - begin) ** 2 / 2
         begin, place, speed, push = begin + s, edge, speed + push * s, -push
-    np.testing.assert_allclose(found["x"], expected, atol=2e-8)
+    np.testing.assert_allclose(result["x"], expected, atol=2e-8)
 
 
 def test_dead_time_in_a_loop(run: Run) -> None:
@@ -177,13 +177,13 @@ def test_dead_time_in_a_loop(run: Run) -> None:
     x = builder.add("x", bl.Integrator(initial=1.0))
     late = builder.add("late", bl.TransportDelay(delay=1.0, initial=1.0), x)
     builder.connect(builder.add("minus", bl.Gain(gain=-1.0), late), x["u"])
-    found = run(builder.build(), 5.0)
-    t = found.time
+    result = run(builder.build(), 5.0)
+    t = result.time
     expected = sum(
         np.where(t > k - 1, (-1.0) ** k * np.maximum(t - (k - 1), 0.0) ** k / math.factorial(k), 0.0)
         for k in range(1, 7)
     )
-    np.testing.assert_allclose(found["x"], 1.0 + expected, atol=2e-8)
+    np.testing.assert_allclose(result["x"], 1.0 + expected, atol=2e-8)
 
 
 def test_a_sampled_pi_with_a_delay_of_one_tick(run: Run) -> None:
@@ -194,7 +194,7 @@ def test_a_sampled_pi_with_a_delay_of_one_tick(run: Run) -> None:
     error = builder.add("error", bl.Sum(signs="+-"), builder.add("wanted", bl.Constant(value=1.0)), plant)
     control = builder.add("control", bl.DiscretePID(P=kp, I=ki, sample_time=T), error)
     builder.connect(builder.add("late", bl.UnitDelay(sample_time=T), control), plant["u"])
-    found = run(builder.build(), 6.0, sample_time=T)
+    result = run(builder.build(), 6.0, sample_time=T)
     x, total, waiting, expected = 0.0, 0.0, 0.0, []
     for _ in range(31):
         e = 1.0 - x
@@ -202,7 +202,7 @@ def test_a_sampled_pi_with_a_delay_of_one_tick(run: Run) -> None:
         u, waiting = waiting, kp * e + total
         total += ki * T * e
         x = x * math.exp(-T) + 2.0 * u * (1.0 - math.exp(-T))
-    np.testing.assert_allclose(found["plant/y"], expected, atol=2e-9)
+    np.testing.assert_allclose(result["plant/y"], expected, atol=2e-9)
 
 
 def test_an_event_exactly_at_a_tick(run: Run) -> None:
@@ -212,10 +212,10 @@ def test_an_event_exactly_at_a_tick(run: Run) -> None:
     above = builder.add("above", bl.CompareToConstant(relation=">=", constant=0.5), ramp)
     builder.add("hold", bl.ZeroOrderHold(sample_time=0.25), above)
     integrating(builder, "count", above)
-    found = run(builder.build(), 1.0, sample_time=0.0625)
-    t = found.time
-    assert found["hold/y"].tolist() == (t >= 0.5).astype(float).tolist()
-    np.testing.assert_allclose(found["count"], np.maximum(t - 0.5, 0.0), atol=1e-12)
+    result = run(builder.build(), 1.0, sample_time=0.0625)
+    t = result.time
+    assert result["hold/y"].tolist() == (t >= 0.5).astype(float).tolist()
+    np.testing.assert_allclose(result["count"], np.maximum(t - 0.5, 0.0), atol=1e-12)
 
 
 def test_backlash_in_an_integrating_loop(run: Run) -> None:
@@ -224,12 +224,12 @@ def test_backlash_in_an_integrating_loop(run: Run) -> None:
     x = builder.add("x", bl.Integrator(initial=2.0))
     play = builder.add("play", bl.Backlash(width=1.0, initial=1.5), x)
     builder.connect(builder.add("minus", bl.Gain(gain=-1.0), play), x["u"])
-    found = run(builder.build(), 6.0)
-    t = found.time
+    result = run(builder.build(), 6.0)
+    t = result.time
     # b stays 1.5 while x falls from 2 to 1 (2/3 s); then b = x + 0.5, x' = -(x + 0.5)
     t1 = 1.0 / 1.5
     expected = np.where(t < t1, 2.0 - 1.5 * t, -0.5 + 1.5 * np.exp(-(t - t1)))
-    np.testing.assert_allclose(found["x"], expected, atol=2e-8)
+    np.testing.assert_allclose(result["x"], expected, atol=2e-8)
 
 
 def test_an_enabled_counter_agrees_with_a_state_machine(run: Run) -> None:
@@ -243,16 +243,16 @@ def test_an_enabled_counter_agrees_with_a_state_machine(run: Run) -> None:
     builder = ab.DiagramBuilder("enabled")
     wave = builder.add("wave", bl.PulseGenerator(amplitude=1.0, period=0.7, width=50.0))
     builder.add("counter", bl.EnabledSubsystem(diagram=inner.build()), enable=wave)
-    found = run(builder.build(), 2.0, sample_time=0.02)
+    result = run(builder.build(), 2.0, sample_time=0.02)
     count, expected, k = 0, [], 0
-    for row in range(found.time.size):
+    for row in range(result.time.size):
         if row % 5 == 0:
             # the output at a tick is the state before it
             if (0.1 * k + 1e-9) % 0.7 < 0.35:
                 shown, count = count, count + 1
             k += 1
         expected.append(shown)
-    assert found["counter/n"].tolist() == expected
+    assert result["counter/n"].tolist() == expected
 
 
 def test_a_switch_that_chatters_is_reported_with_its_block(tmp_path: Path) -> None:

@@ -74,32 +74,32 @@ OREGONATOR_END = (
 def test_hires(solver: str, tmp_path: Path) -> None:
     diagram = system_of("hires", HIRES, (1, 0, 0, 0, 0, 0, 0, 0.0057))
     settings = {"stop_time": 321.8122, "solver": solver, "rtol": 1e-8, "atol": 1e-12}
-    found = ab.simulate(diagram, **settings)
-    np.testing.assert_allclose(ends(found, 8), HIRES_END, rtol=2e-6)
+    result = ab.simulate(diagram, **settings)
+    np.testing.assert_allclose(ends(result, 8), HIRES_END, rtol=2e-6)
     ab.save_diagram(diagram, tmp_path / "hires.json")
     again = ab.simulate(ab.load_diagram(tmp_path / "hires.json"), **settings)
-    assert ends(again, 8).tolist() == ends(found, 8).tolist()
+    assert ends(again, 8).tolist() == ends(result, 8).tolist()
 
 
 @pytest.mark.parametrize("solver", ["auto", "rodas5p"])
 def test_the_oregonator(solver: str) -> None:
     diagram = system_of("oregonator", OREGONATOR, (1.0, 2.0, 3.0))
-    found = ab.simulate(diagram, stop_time=360.0, solver=solver, rtol=1e-9, atol=1e-10)
-    np.testing.assert_allclose(ends(found, 3), OREGONATOR_END, rtol=2e-6)
+    result = ab.simulate(diagram, stop_time=360.0, solver=solver, rtol=1e-9, atol=1e-10)
+    np.testing.assert_allclose(ends(result, 3), OREGONATOR_END, rtol=2e-6)
 
 
 def test_a_diode_rectifier_agrees_with_scipy() -> None:
     """C v' = Is (exp((sin(w t) 5 - v)/Ut) - 1) - v/R: rates from 1e3 to more than 1e7 1/s."""
     formula = "(1e-9*(exp((5*sin(314.159265358979*t) - u)/0.0259) - 1) - u/1000)/1e-5"
     diagram = system_of("rectifier", (formula,), (0.0,))
-    found = ab.simulate(diagram, stop_time=0.04, solver="auto", rtol=1e-8, atol=1e-10)
+    result = ab.simulate(diagram, stop_time=0.04, solver="auto", rtol=1e-8, atol=1e-10)
 
     def rate(t: float, v: Array) -> Array:
         return (1e-9 * (np.exp((5 * np.sin(314.159265358979 * t) - v) / 0.0259) - 1) - v / 1000) / 1e-5
 
-    want = solve_ivp(rate, (0, 0.04), [0.0], "Radau", t_eval=found.time, rtol=1e-11, atol=1e-13)
-    np.testing.assert_allclose(found["y1"], want.y[0], atol=2e-6)
-    assert found["y1"].max() > 4.0
+    want = solve_ivp(rate, (0, 0.04), [0.0], "Radau", t_eval=result.time, rtol=1e-11, atol=1e-13)
+    np.testing.assert_allclose(result["y1"], want.y[0], atol=2e-6)
+    assert result["y1"].max() > 4.0
 
 
 def test_a_brusselator_on_a_line_as_two_vectors() -> None:
@@ -119,7 +119,7 @@ def test_a_brusselator_on_a_line_as_two_vectors() -> None:
         moved = builder.add(f"{name} moved", bl.MatrixGain(gain=D), own)
         ends_ = builder.add(f"{name} ends", bl.Constant(value=border * edge))
         builder.connect(builder.add(name, bl.Sum(signs="+++"), made, moved, ends_), own["u"])
-    found = ab.simulate(builder.build(), stop_time=10.0, solver="rodas5p", rtol=1e-8, atol=1e-10)
+    result = ab.simulate(builder.build(), stop_time=10.0, solver="rodas5p", rtol=1e-8, atol=1e-10)
 
     def rate(_: float, y: Array) -> Array:
         a, b = y[:n], y[n:]
@@ -127,7 +127,7 @@ def test_a_brusselator_on_a_line_as_two_vectors() -> None:
 
     y0 = np.concatenate([1.0 + np.sin(2 * np.pi * place), np.full(n, 3.0)])
     want = solve_ivp(rate, (0, 10), y0, "Radau", rtol=1e-10, atol=1e-12)
-    np.testing.assert_allclose(found["u"][-1], want.y[:n, -1], rtol=1e-6)
+    np.testing.assert_allclose(result["u"][-1], want.y[:n, -1], rtol=1e-6)
 
 
 # -- loops -------------------------------------------------------------------------------------------------
@@ -153,13 +153,13 @@ def test_the_solution_of_a_loop_with_three_solutions_stays_on_its_branch(
     loop = builder.add("loop", bl.Expression(formula="0.9*tanh(3*u1) + u2 + 0.3", inputs=2), u2=drive)
     builder.connect(loop, loop["u1"])
     builder.add("area", bl.Integrator(), loop)
-    found = ab.simulate(builder.build(), stop_time=6.0, sample_time=0.1, **settings)
+    result = ab.simulate(builder.build(), stop_time=6.0, sample_time=0.1, **settings)
 
     def root(t: float) -> float:
         return brentq(lambda w: w - 0.9 * math.tanh(3 * w) - 0.05 * math.sin(t) - 0.3, -0.4, 0.0, xtol=1e-15)
 
-    want = np.array([root(t) for t in found.time])
-    np.testing.assert_allclose(found["loop"], want, atol=1e-12)
+    want = np.array([root(t) for t in result.time])
+    np.testing.assert_allclose(result["loop"], want, atol=1e-12)
 
 
 @RUNS
@@ -177,13 +177,13 @@ def test_a_vector_loop_through_a_matrix_solve(settings: Mapping[str, object]) ->
     solve = builder.add("solve", bl.LinearSolve(), builder.add("A", bl.Constant(value=A)), rest)
     builder.connect(builder.add("part", bl.Gain(gain=0.3), solve), rest["u2"])
     builder.add("integral", bl.Integrator(initial=np.zeros(2)), solve)
-    found = ab.simulate(builder.build(), stop_time=3.0, sample_time=0.1, **settings)
-    t = found.time
+    result = ab.simulate(builder.build(), stop_time=3.0, sample_time=0.1, **settings)
+    t = result.time
     inverse = np.linalg.inv(A + 0.3 * np.eye(2))
     want = np.stack([np.cos(t), np.sin(t)], axis=1) @ inverse.T
-    np.testing.assert_allclose(found["solve"].reshape(-1, 2), want, atol=1e-13)
+    np.testing.assert_allclose(result["solve"].reshape(-1, 2), want, atol=1e-13)
     area = np.stack([np.sin(t), 1 - np.cos(t)], axis=1) @ inverse.T
-    np.testing.assert_allclose(found["integral"].reshape(-1, 2), area, atol=1e-9)
+    np.testing.assert_allclose(result["integral"].reshape(-1, 2), area, atol=1e-9)
 
 
 def test_a_loop_whose_solution_ceases_to_exist_is_reported_at_that_time() -> None:
@@ -209,9 +209,9 @@ def test_a_loop_with_a_singular_initial_guess_is_solved(settings: Mapping[str, o
     loop = builder.add("loop", bl.Expression(formula="u1 - u1^2 + 1 + u2", inputs=2), u2=time)
     builder.connect(loop, loop["u1"])
     builder.add("area", bl.Integrator(), loop)
-    found = ab.simulate(builder.build(), stop_time=3.0, sample_time=0.1, **settings)
-    np.testing.assert_allclose(found["loop"], np.sqrt(1 + found.time), atol=1e-12)
-    np.testing.assert_allclose(found["area"], ((1 + found.time) ** 1.5 - 1) * 2 / 3, atol=3e-9)
+    result = ab.simulate(builder.build(), stop_time=3.0, sample_time=0.1, **settings)
+    np.testing.assert_allclose(result["loop"], np.sqrt(1 + result.time), atol=1e-12)
+    np.testing.assert_allclose(result["area"], ((1 + result.time) ** 1.5 - 1) * 2 / 3, atol=3e-9)
 
 
 # -- analysis ----------------------------------------------------------------------------------------------
@@ -286,13 +286,13 @@ def test_the_motion_of_a_planar_arm_agrees_with_lagranges_equations(settings: Ma
     torque = builder.add("torque", bl.Constant(value=(1.0, -0.5)))
     builder.add("arm", bl.ForwardDynamics(robot=planar(), q0=(0.4, -0.9)), torque)
     finer = {**settings, "step": 0.002} if "step" in settings else settings
-    found = ab.simulate(builder.build(), stop_time=1.5, sample_time=0.05, **finer)
+    result = ab.simulate(builder.build(), stop_time=1.5, sample_time=0.05, **finer)
 
     def rate(_: float, y: Array) -> Array:
         return np.concatenate([y[2:], planar_acceleration(y[:2], y[2:], np.array([1.0, -0.5]))])
 
-    want = solve_ivp(rate, (0, 1.5), [0.4, -0.9, 0, 0], "DOP853", t_eval=found.time, rtol=1e-12, atol=1e-13)
-    np.testing.assert_allclose(found["arm/q"], want.y[:2].T, atol=2e-7)
+    want = solve_ivp(rate, (0, 1.5), [0.4, -0.9, 0, 0], "DOP853", t_eval=result.time, rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose(result["arm/q"], want.y[:2].T, atol=2e-7)
 
 
 def test_the_torque_with_a_payload_agrees_with_lagranges_equations() -> None:
@@ -347,11 +347,11 @@ def test_two_tanks_in_subsystems_on_a_bus(settings: Mapping[str, object], tmp_pa
     chosen = builder.add("chosen", bl.BusSelector(elements="lower"), bus)
     builder.add("total", bl.Integrator(), chosen)
     diagram = builder.build()
-    found = ab.simulate(diagram, stop_time=4.0, sample_time=0.1, **settings)
+    result = ab.simulate(diagram, stop_time=4.0, sample_time=0.1, **settings)
     A = np.array([[-1.0, 0.0, 0.0, 1.0], [2.0, -2.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0] * 4])
-    want = np.array([expm(A * max(t - 0.5, 0.0)) @ [0, 0, 0, 2.0] for t in found.time])
-    np.testing.assert_allclose(found["total"], want[:, 2], atol=3e-8)
-    np.testing.assert_allclose(found["second/level"], want[:, 1], atol=3e-8)
+    want = np.array([expm(A * max(t - 0.5, 0.0)) @ [0, 0, 0, 2.0] for t in result.time])
+    np.testing.assert_allclose(result["total"], want[:, 2], atol=3e-8)
+    np.testing.assert_allclose(result["second/level"], want[:, 1], atol=3e-8)
     ab.save_diagram(diagram, tmp_path / "tanks.json")
     again = ab.simulate(ab.load_diagram(tmp_path / "tanks.json"), stop_time=4.0, sample_time=0.1, **settings)
-    assert np.array_equal(again["total"], found["total"])
+    assert np.array_equal(again["total"], result["total"])

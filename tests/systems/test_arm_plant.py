@@ -85,10 +85,10 @@ def driven(
     return run(builder.build(), stop, solver=solver)
 
 
-def energy_balance(found: SimulationResult) -> np.ndarray:
+def energy_balance(actual: SimulationResult) -> np.ndarray:
     """Return the energy minus the work of all torques, which energy conservation keeps constant."""
-    energy = found["energy/kinetic"] + found["energy/potential"]
-    return energy - found["input work/y"] + found["friction work/y"] - found["stop work/y"]
+    energy = actual["energy/kinetic"] + actual["energy/potential"]
+    return energy - actual["input work/y"] + actual["friction work/y"] - actual["stop work/y"]
 
 
 # -- one joint, closed forms
@@ -97,57 +97,57 @@ def energy_balance(found: SimulationResult) -> np.ndarray:
 def test_a_joint_breaks_away_exactly_when_the_torque_exceeds_friction(solver: str) -> None:
     """tau = t, friction 0.6 N m, breakaway 0.9 N m: qd' = (t - 0.6) / 2 after 0.9 s."""
     plant = ArmPlant(robot=wheel(gear_ratio=3.0, coulomb_friction=(0.2, -0.1)), breakaway=1.5)
-    found = driven(plant, Clock(), stop=2.0, solver=solver)
-    t, qd = found.time, found["arm/qd"][:, 0]
+    result = driven(plant, Clock(), stop=2.0, solver=solver)
+    t, qd = result.time, result["arm/qd"][:, 0]
     assert not qd[t <= 0.9].any()
-    assert not found["arm/q"][t <= 0.9].any()
+    assert not result["arm/q"][t <= 0.9].any()
     since = np.maximum(t - 0.9, 0.0)
     np.testing.assert_allclose(qd, (0.3 * since + since**2 / 2) / 2, rtol=0, atol=1e-10)
     other = np.abs(t - 0.9) > 1e-9
     expected = np.where(t < 0.9, t, 0.6)
-    np.testing.assert_allclose(found["arm/friction"][other, 0], expected[other], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(result["arm/friction"][other, 0], expected[other], rtol=0, atol=1e-12)
 
 
 def test_a_sliding_joint_comes_to_rest_and_sticks(solver: str) -> None:
     """-1.5 rad/s, decelerated by (0.3 + 0.25) N m with 2 kg m2; afterwards the speed is exactly 0."""
     robot = wheel(gear_ratio=3.0, coulomb_friction=(0.2, -0.1))
-    found = driven(ArmPlant(robot=robot, qd0=-1.5), Constant(value=0.25), stop=20.0, solver=solver)
+    result = driven(ArmPlant(robot=robot, qd0=-1.5), Constant(value=0.25), stop=20.0, solver=solver)
     end = 1.5 / ((0.3 + 0.25) / 2.0)
-    t = np.minimum(found.time, end)
-    np.testing.assert_allclose(found["arm/qd"][:, 0], -1.5 + 0.275 * t, rtol=0, atol=1e-10)
-    np.testing.assert_allclose(found["arm/q"][:, 0], -1.5 * t + 0.275 * t**2 / 2, rtol=0, atol=1e-10)
-    assert not found["arm/qd"][found.time > end].any()
-    assert len(set(found["arm/q"][found.time > end, 0])) == 1
+    t = np.minimum(result.time, end)
+    np.testing.assert_allclose(result["arm/qd"][:, 0], -1.5 + 0.275 * t, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(result["arm/q"][:, 0], -1.5 * t + 0.275 * t**2 / 2, rtol=0, atol=1e-10)
+    assert not result["arm/qd"][result.time > end].any()
+    assert len(set(result["arm/q"][result.time > end, 0])) == 1
 
 
 def test_a_joint_reverses_without_sticking_when_the_torque_exceeds_friction(solver: str) -> None:
     """From -1 rad/s with 2 N m: decelerated by 2.3 / 2 rad/s2, then accelerated by 1.4 / 2 rad/s2."""
     robot = wheel(gear_ratio=3.0, coulomb_friction=(0.2, -0.1))
-    found = driven(ArmPlant(robot=robot, qd0=-1.0), Constant(value=2.0), stop=3.0, solver=solver)
+    result = driven(ArmPlant(robot=robot, qd0=-1.0), Constant(value=2.0), stop=3.0, solver=solver)
     turn = 1.0 / 1.15
-    before = np.minimum(found.time, turn)
-    expected = -1.0 + 1.15 * before + 0.7 * (found.time - before)
-    np.testing.assert_allclose(found["arm/qd"][:, 0], expected, rtol=0, atol=1e-10)
+    before = np.minimum(result.time, turn)
+    expected = -1.0 + 1.15 * before + 0.7 * (result.time - before)
+    np.testing.assert_allclose(result["arm/qd"][:, 0], expected, rtol=0, atol=1e-10)
 
 
 def test_a_hard_stop_ends_the_motion_without_rebound_and_releases_the_joint(solver: str) -> None:
     """1 N m accelerates 2 kg m2 to 1 rad in 2 s; a torque of -1 N m after 3 s moves the joint back."""
-    found = driven(
+    result = driven(
         ArmPlant(robot=wheel(), stops="hard"),
         Step(time=3.0, initial=1.0, final=-1.0),
         stop=4.0,
         solver=solver,
     )
-    t, q = found.time, found["arm/q"][:, 0]
+    t, q = result.time, result["arm/q"][:, 0]
     away = np.maximum(t - 3.0, 0.0)
     expected = np.where(t < 2.0, t**2 / 4, 1.0 - away**2 / 4)
     np.testing.assert_allclose(q, expected, rtol=0, atol=1e-9)
     resting = (t > 2.0 + 1e-9) & (t < 3.0)
     assert set(q[resting]) == {1.0}
-    assert not found["arm/qd"][resting].any()
-    np.testing.assert_array_equal(found["arm/stop"][resting, 0], -1.0)
+    assert not result["arm/qd"][resting].any()
+    np.testing.assert_array_equal(result["arm/stop"][resting, 0], -1.0)
     # the impact dissipates the kinetic energy: 1 N m over 1 rad
-    balance = energy_balance(found)
+    balance = energy_balance(result)
     np.testing.assert_allclose(balance[t > 2.0 + 1e-9], balance[0] - 1.0, rtol=0, atol=1e-9)
 
 
@@ -155,19 +155,19 @@ def test_an_elastic_stop_is_a_spring_and_damper_that_never_pull(solver: str) -> 
     """Contact with the stop at 1 rad/s: a damped half period, until spring and damper would pull."""
     k, d, J = 800.0, 16.0, 2.0
     plant = ArmPlant(robot=wheel(), stops="elastic", stiffness=k, damping=d, qd0=1.0)
-    found = driven(plant, Constant(value=0.0), stop=1.5, solver=solver)
+    result = driven(plant, Constant(value=0.0), stop=1.5, solver=solver)
     decay, w = d / 2 / J, np.sqrt(k / J - (d / 2 / J) ** 2)
     # k x + d x' = 0 at tan(w t) = -d w / (k - d decay)
     contact = (np.pi - np.arctan2(d * w, k - d * decay)) / w
-    since = np.clip(found.time - 1.0, 0.0, contact)
-    over = np.exp(-decay * since) * np.sin(w * since) / w
+    since = np.clip(result.time - 1.0, 0.0, contact)
+    oscillation = np.exp(-decay * since) * np.sin(w * since) / w
     rate = np.exp(-decay * since) * (np.cos(w * since) - decay / w * np.sin(w * since))
-    free = np.maximum(found.time - 1.0 - contact, 0.0)
-    expected = np.where(found.time < 1.0, found.time, 1.0 + over + rate * free)
+    free = np.maximum(result.time - 1.0 - contact, 0.0)
+    expected = np.where(result.time < 1.0, result.time, 1.0 + oscillation + rate * free)
     tolerance = 1e-9 if solver == "rk45" else 2e-4  # fixed steps of 15 ms, w = 19.6 rad/s
-    np.testing.assert_allclose(found["arm/q"][:, 0], expected, rtol=0, atol=tolerance)
+    np.testing.assert_allclose(result["arm/q"][:, 0], expected, rtol=0, atol=tolerance)
     if solver == "rk45":
-        np.testing.assert_allclose(energy_balance(found), energy_balance(found)[0], rtol=0, atol=1e-8)
+        np.testing.assert_allclose(energy_balance(result), energy_balance(result)[0], rtol=0, atol=1e-8)
 
 
 # -- two coupled joints
@@ -195,10 +195,10 @@ def test_sticking_and_sliding_of_two_joints_agree_with_the_scipy_reference() -> 
     rests = (exact[:, 2:] == 0.0).sum(axis=0)
     assert rests.min() > 5, "each joint must stick in some samples"
     # Oscillation of two joints with rtol 1e-10; RK4 has steps of 50 ms
-    for found, tolerance in ((by_rk45, 1e-7), (by_rk4, 2e-3)):
-        np.testing.assert_array_equal(found.time, by_rk45.time)
-        np.testing.assert_allclose(found["arm/q"], exact[:, :2], rtol=0, atol=tolerance)
-        assert ((found["arm/qd"] == 0.0) == (exact[:, 2:] == 0.0)).all()
+    for result, tolerance in ((by_rk45, 1e-7), (by_rk4, 2e-3)):
+        np.testing.assert_array_equal(result.time, by_rk45.time)
+        np.testing.assert_allclose(result["arm/q"], exact[:, :2], rtol=0, atol=tolerance)
+        assert ((result["arm/qd"] == 0.0) == (exact[:, 2:] == 0.0)).all()
     balance = energy_balance(by_rk45)
     np.testing.assert_allclose(balance, balance[0], rtol=0, atol=1e-7)
 
@@ -212,36 +212,36 @@ def test_joints_stick_or_slide_consistently_after_a_torque_step(tau: tuple[float
     plant = ArmPlant(robot=robot, q0=q0)
     times = np.linspace(0.0, 0.3, 101)
     exact = reference(robot, lambda t: np.array(tau), q0, times)
-    found = driven(plant, *(Constant(value=one) for one in tau), stop=0.3)
-    np.testing.assert_allclose(found["arm/q"], exact[:, :2], rtol=0, atol=1e-9)
-    np.testing.assert_allclose(found["arm/qd"], exact[:, 2:], rtol=0, atol=1e-8)
-    late = [Step(time=0.15, final=one) for one in tau]
-    found = driven(plant, *late, stop=0.45, held=0.15)
+    result = driven(plant, *(Constant(value=one) for one in tau), stop=0.3)
+    np.testing.assert_allclose(result["arm/q"], exact[:, :2], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(result["arm/qd"], exact[:, 2:], rtol=0, atol=1e-8)
+    steps = [Step(time=0.15, final=one) for one in tau]
+    result = driven(plant, *steps, stop=0.45, held=0.15)
     for name, columns in (("arm/q", exact[:, :2]), ("arm/qd", exact[:, 2:])):
-        at = [np.interp(found.time - 0.15, times, column) for column in columns.T]
-        np.testing.assert_allclose(found[name], np.array(at).T, rtol=0, atol=1e-4)
+        at = [np.interp(result.time - 0.15, times, column) for column in columns.T]
+        np.testing.assert_allclose(result[name], np.array(at).T, rtol=0, atol=1e-4)
     stuck = (exact[-1, 2:] == 0.0) & (exact[1, 2:] == 0.0)
-    assert not found["arm/qd"][:, stuck].any()
+    assert not result["arm/qd"][:, stuck].any()
 
 
 def test_an_arm_falls_comes_to_rest_and_stays_at_rest(solver: str) -> None:
-    found = driven(
+    result = driven(
         ArmPlant(robot=pair(), q0=[-0.3, 0.2]), *[Constant(value=0.0)] * 2, stop=20.0, solver=solver
     )
-    assert not found["arm/qd"][-30:].any()
-    assert len({tuple(q) for q in found["arm/q"][-30:]}) == 1
-    np.testing.assert_array_equal(found["arm/qdd"][-30:], 0.0)
+    assert not result["arm/qd"][-30:].any()
+    assert len({tuple(q) for q in result["arm/q"][-30:]}) == 1
+    np.testing.assert_array_equal(result["arm/qdd"][-30:], 0.0)
     # friction compensates the gravity load
-    hold = ab.Arm(pair()).gravload(found["arm/q"][-1])
-    np.testing.assert_allclose(-found["arm/friction"][-1], hold, rtol=1e-12)
+    hold = ab.Arm(pair()).gravload(result["arm/q"][-1])
+    np.testing.assert_allclose(-result["arm/friction"][-1], hold, rtol=1e-12)
 
 
 def test_an_arm_without_dry_friction_agrees_with_forward_dynamics(solver: str) -> None:
     robot = pair().nofriction(viscous=False)
     torques = SineWave(amplitude=9.0, frequency=2.0), Constant(value=1.0)
-    found = driven(ArmPlant(robot=robot, q0=0.1), *torques, stop=1.0, solver=solver)
+    result = driven(ArmPlant(robot=robot, q0=0.1), *torques, stop=1.0, solver=solver)
     plain = driven(ForwardDynamics(robot=robot, q0=0.1), *torques, stop=1.0, solver=solver)
-    np.testing.assert_allclose(found["arm/q"], plain["arm/q"], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(result["arm/q"], plain["arm/q"], rtol=0, atol=1e-9)
 
 
 def test_an_impact_at_a_hard_stop_changes_the_speed_of_the_other_joint(solver: str) -> None:
@@ -264,13 +264,13 @@ def test_an_impact_at_a_hard_stop_changes_the_speed_of_the_other_joint(solver: s
     # the centrifugal torque moves the joint away from its stop immediately
     assert then.y[2, -1] < 0.0
     zero = [Constant(value=0.0)] * 2
-    found = driven(ArmPlant(robot=robot, stops="hard", q0=q0, qd0=qd0), *zero, stop=0.7, solver=solver)
-    assert found.run.events == 1, "the joint leaves the stop at the time of the impact"
-    np.testing.assert_allclose(found["arm/q"][-1], then.y[:2, -1], rtol=0, atol=1e-8)
-    np.testing.assert_allclose(found["arm/qd"][-1], then.y[2:, -1], rtol=0, atol=1e-8)
+    result = driven(ArmPlant(robot=robot, stops="hard", q0=q0, qd0=qd0), *zero, stop=0.7, solver=solver)
+    assert result.run.events == 1, "the joint leaves the stop at the time of the impact"
+    np.testing.assert_allclose(result["arm/q"][-1], then.y[:2, -1], rtol=0, atol=1e-8)
+    np.testing.assert_allclose(result["arm/qd"][-1], then.y[2:, -1], rtol=0, atol=1e-8)
     lost = 0.5 * qd @ M @ qd - 0.5 * after @ M @ after
-    balance = energy_balance(found)
-    expected = balance[0] - np.where(found.time > first.t[-1], lost, 0.0)
+    balance = energy_balance(result)
+    expected = balance[0] - np.where(result.time > first.t[-1], lost, 0.0)
     np.testing.assert_allclose(balance, expected, rtol=0, atol=1e-8)
 
 
@@ -280,10 +280,10 @@ def test_energy_of_a_falling_puma_is_balanced_by_friction_and_elastic_stops(puma
     torques = [
         SineWave(amplitude=a, frequency=f) for a, f in ((30, 2), (60, 3), (20, 1), (1, 4), (1, 5), (1, 3))
     ]
-    found = driven(plant, *torques, stop=4.0)
-    assert found.run.events > 20
-    assert (found["arm/qd"] == 0.0).any()
-    balance = energy_balance(found)
+    result = driven(plant, *torques, stop=4.0)
+    assert result.run.events > 20
+    assert (result["arm/qd"] == 0.0).any()
+    balance = energy_balance(result)
     # about 1000 J are converted, at rtol 1e-10
     np.testing.assert_allclose(balance, balance[0], rtol=0, atol=1e-5)
 
@@ -296,7 +296,7 @@ def test_a_dropped_payload_changes_the_acceleration_but_not_the_speed() -> None:
     payload = np.array([2.0, 0.05, 0.0, 0.1, 0.01, 0.02, 0.02, 0.0, 0.0, 0.0])
     step = Step(time=0.3, initial=payload, final=np.zeros(10))
     wrench = (1.0, 2.0, 0.0, 0.0, 0.0, 0.5)
-    found = driven(
+    result = driven(
         ArmPlant(robot=robot, payload_input=True, wrench_input=True),
         Constant(value=1.0),
         Constant(value=2.0),
@@ -306,9 +306,9 @@ def test_a_dropped_payload_changes_the_acceleration_but_not_the_speed() -> None:
     traced = ab.dynamics.trace_accel_loaded(robot)
     for k in (20, 49, 50, 80):
         carried = payload if k < 50 else np.zeros(10)
-        (qdd,) = traced(found["arm/q"][k], found["arm/qd"][k], (1.0, 2.0), wrench, carried)
-        np.testing.assert_allclose(found["arm/qdd"][k], np.ravel(qdd), rtol=1e-11)
-    jump = np.abs(np.diff(found["arm/qd"], axis=0)).max(axis=1)
+        (qdd,) = traced(result["arm/q"][k], result["arm/qd"][k], (1.0, 2.0), wrench, carried)
+        np.testing.assert_allclose(result["arm/qdd"][k], np.ravel(qdd), rtol=1e-11)
+    jump = np.abs(np.diff(result["arm/qd"], axis=0)).max(axis=1)
     assert jump[49] < 1.2 * max(jump[48], jump[50])
 
 
@@ -336,7 +336,7 @@ def test_each_torque_pulse_moves_a_joint_by_the_same_angle() -> None:
     """Pulses of 0.5 s, 0.5 N m above friction: the joint moves equally far during and after each pulse."""
     robot = wheel(gear_ratio=1.0, coulomb_friction=(0.5, -0.5))
     pulses = PulseGenerator(amplitude=1.0, period=2.0, width=25.0)
-    found = driven(ArmPlant(robot=robot), pulses, stop=8.0)
+    result = driven(ArmPlant(robot=robot), pulses, stop=8.0)
     # 0.25 rad/s2 for 0.5 s, then -0.25 rad/s2 until rest: 2 * 0.25 * 0.5^2 / 2 per pulse
-    moved = found["arm/q"][found.time.searchsorted([1.5, 3.5, 5.5, 7.5]), 0]
-    np.testing.assert_allclose(moved, 0.0625 * np.arange(1, 5), rtol=0, atol=1e-10)
+    angles = result["arm/q"][result.time.searchsorted([1.5, 3.5, 5.5, 7.5]), 0]
+    np.testing.assert_allclose(angles, 0.0625 * np.arange(1, 5), rtol=0, atol=1e-10)

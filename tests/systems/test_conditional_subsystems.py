@@ -473,9 +473,9 @@ def test_invalid_conditions_cases_and_merges_are_refused() -> None:
         builder = DiagramBuilder("if")
         builder.add("if", If(), builder.add("c", Constant(value=[1.0, 2.0])))
         builder.build()
-    for wrong in ("1; a", "1; 1", "1;;2"):
+    for invalid in ("1; a", "1; 1", "1;;2"):
         with pytest.raises(InputError, match="the cases are '"):
-            SwitchCase(cases=wrong)
+            SwitchCase(cases=invalid)
 
 
 def test_merged_action_subsystems_without_states_agree_with_a_switch() -> None:

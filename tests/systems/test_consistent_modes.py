@@ -87,15 +87,15 @@ SWITCHING: Mapping[str, tuple[Callable[[], Block], Callable[[Array], Array]]] = 
 def sources() -> dict[str, Block]:
     """Return signals that jump to or touch a switching value; the random frequencies have a fixed seed."""
     random = np.random.default_rng(9)
-    found: dict[str, Block] = {"as found": SignalGenerator(waveform="sawtooth", frequency=2.652)}
+    blocks: dict[str, Block] = {"as found": SignalGenerator(waveform="sawtooth", frequency=2.652)}
     for number, frequency in enumerate((1.0, 2.5, *random.uniform(0.3, 4.0, 2))):
-        found[f"sawtooth {number}"] = SignalGenerator(waveform="sawtooth", frequency=frequency)
-        found[f"square {number}"] = SignalGenerator(waveform="square", frequency=frequency)
-        found[f"rise {number}"] = RepeatingSequence(times=(0.0, 1.0 / frequency), values=(-1.0, 1.0))
-        found[f"pulses {number}"] = PulseGenerator(period=1.0 / frequency, width=37.0)
-    found["step"] = Step(time=1.55, initial=1.0, final=-1.0)
-    found["crest"] = SineWave(frequency=2.0)
-    return found
+        blocks[f"sawtooth {number}"] = SignalGenerator(waveform="sawtooth", frequency=frequency)
+        blocks[f"square {number}"] = SignalGenerator(waveform="square", frequency=frequency)
+        blocks[f"rise {number}"] = RepeatingSequence(times=(0.0, 1.0 / frequency), values=(-1.0, 1.0))
+        blocks[f"pulses {number}"] = PulseGenerator(period=1.0 / frequency, width=37.0)
+    blocks["step"] = Step(time=1.55, initial=1.0, final=-1.0)
+    blocks["crest"] = SineWave(frequency=2.0)
+    return blocks
 
 
 @pytest.mark.parametrize("rtol", [1e-3, 1e-8])
@@ -107,20 +107,20 @@ def test_the_output_of_a_switching_block_agrees_with_its_formula(rtol: float) ->
         for kind, (block, _) in SWITCHING.items():
             builder.add(f"{name}: {kind}", block(), signal)
     result = ab.simulate(builder.build(), stop_time=10.0, sample_time=0.05, rtol=rtol)
-    wrong: list[str] = []
+    errors: list[str] = []
     for name in sources():
         u = result[f"{name}/y"]
         for kind, (_, formula) in SWITCHING.items():
-            found = result[f"{name}: {kind}/y"]
+            output = result[f"{name}: {kind}/y"]
             # If the input crosses a switching value at a recorded time, rounding decides between the two
             # sides.
             sides = [formula(u + shift) for shift in (0.0, -1e-12, 1e-12)]
-            differs = np.min([np.abs(found - side) for side in sides], axis=0) > 1e-11
-            wrong += [
+            differs = np.min([np.abs(output - side) for side in sides], axis=0) > 1e-11
+            errors += [
                 f"{name}: {kind} at {t} s: {y} of {value}"
-                for t, y, value in zip(result.time[differs], found[differs], u[differs])
+                for t, y, value in zip(result.time[differs], output[differs], u[differs])
             ]
-    assert not wrong, "\n".join(wrong[:20])
+    assert not errors, "\n".join(errors[:20])
 
 
 def limited(u: Array, dt: float, rising: float, falling: float, start: float) -> Array:
@@ -322,8 +322,8 @@ def test_the_unique_solution_of_coupled_modes_is_found() -> None:
         builder.connect(drive, total["u1"])
         builder.connect(builder.add("M", ab.blocks.MatrixGain(gain=matrix), positive), total["u2"])
         result = ab.simulate(builder.build(), stop_time=2.0, sample_time=0.5)
-        found = result["positive/y"][-1]
-        np.testing.assert_allclose(found, np.maximum(matrix @ found + q, 0.0), atol=1e-9)
+        solution = result["positive/y"][-1]
+        np.testing.assert_allclose(solution, np.maximum(matrix @ solution + q, 0.0), atol=1e-9)
 
 
 @pytest.mark.parametrize("formula", ["if(u > 0, -1, 1)", "1 - (u > 0)"])

@@ -67,8 +67,8 @@ def run(request: pytest.FixtureRequest) -> Run:
     return request.param
 
 
-def close(found: np.ndarray, expected: np.ndarray, tolerance: float) -> None:
-    assert found == pytest.approx(expected, abs=tolerance)
+def close(actual: np.ndarray, expected: np.ndarray, tolerance: float) -> None:
+    assert actual == pytest.approx(expected, abs=tolerance)
 
 
 def decay(delay: float = 1.0) -> Diagram:
@@ -203,10 +203,10 @@ def test_a_loop_with_dead_time(run: Run) -> None:
     builder.connect(builder.add("late", TransportDelay(delay=1.0), y), error["u2"])
     result = run(builder.build(), 60.0)
     t, e = result.time, 1.0 - result["y/y"]
-    late = t > 40.0
-    basis = np.column_stack([np.cos(math.pi / 2 * t[late]), np.sin(math.pi / 2 * t[late])])
-    fit, *_ = np.linalg.lstsq(basis, e[late], rcond=None)
-    assert np.abs(basis @ fit - e[late]).max() < 1e-5
+    decayed = t > 40.0
+    basis = np.column_stack([np.cos(math.pi / 2 * t[decayed]), np.sin(math.pi / 2 * t[decayed])])
+    fit, *_ = np.linalg.lstsq(basis, e[decayed], rcond=None)
+    assert np.abs(basis @ fit - e[decayed]).max() < 1e-5
     assert np.hypot(*fit) > 0.5
 
 
@@ -299,8 +299,8 @@ def test_a_changed_delay_takes_effect_without_compilation() -> None:
     compiled = compile_system(trace_diagram(decay()))
     options = SimulationOptions(stop_time=3.0, sample_time=0.1, rtol=1e-9, atol=1e-12)
     tuned = simulate(compiled, options, {"late.delay": 0.5})
-    fresh = simulate(compile_system(trace_diagram(decay(0.5))), options)
-    assert tuned["x/y"] == pytest.approx(fresh["x/y"], abs=1e-12)
+    recompiled = simulate(compile_system(trace_diagram(decay(0.5))), options)
+    assert tuned["x/y"] == pytest.approx(recompiled["x/y"], abs=1e-12)
 
 
 def test_delays_break_algebraic_loops_and_delay_jumps(run: Run) -> None:

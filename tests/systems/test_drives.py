@@ -31,14 +31,14 @@ def test_a_motor_with_voltage_and_load(solver: str) -> None:
     builder = DiagramBuilder("d")
     v, load = builder.add("v", Constant(value=12.0)), builder.add("load", Constant(value=0.2))
     builder.add("motor", motor, v, load)
-    found = run(builder.build(), 2.0, solver=solver)
+    result = run(builder.build(), 2.0, solver=solver)
     A = np.array([[-20.0, -3.0, 0.0], [15.0, -0.5, 0.0], [0.0, 1.0, 0.0]])
-    exact = affine(A, np.array([120.0, -10.0, 0.0]), np.array([0.5, -2.0, 1.0]), found.time)
+    exact = affine(A, np.array([120.0, -10.0, 0.0]), np.array([0.5, -2.0, 1.0]), result.time)
     # fixed steps equal the sample time, 20 ms; the time constant is 60 ms
     tolerance = 1e-7 if solver == "rk45" else 2e-3
     for column, port in enumerate(("i", "w", "angle")):
-        np.testing.assert_allclose(found[f"motor/{port}"], exact[:, column], rtol=0, atol=tolerance)
-    np.testing.assert_array_equal(found["motor/torque"], 0.3 * found["motor/i"])
+        np.testing.assert_allclose(result[f"motor/{port}"], exact[:, column], rtol=0, atol=tolerance)
+    np.testing.assert_array_equal(result["motor/torque"], 0.3 * result["motor/i"])
 
 
 def test_the_electric_power_of_windings_equals_losses_and_mechanical_power(solver: str) -> None:
@@ -47,11 +47,11 @@ def test_the_electric_power_of_windings_equals_losses_and_mechanical_power(solve
     builder = DiagramBuilder("d")
     v, w = builder.add("v", Constant(value=(24.0, 10.0))), builder.add("w", Constant(value=(-0.5, 0.7)))
     builder.add("motors", MotorWinding(R=R, L=L, k=k, gear_ratio=G, initial_current=1.0), v, w)
-    found = run(builder.build(), 2.0, solver=solver)
+    result = run(builder.build(), 2.0, solver=solver)
     rest = (np.array([24.0, 10.0]) - k * G * np.array([-0.5, 0.7])) / R
-    exact = rest + (1.0 - rest) * np.exp(-np.outer(found.time, R / L))
+    exact = rest + (1.0 - rest) * np.exp(-np.outer(result.time, R / L))
     tolerance = 1e-8 if solver == "rk45" else 2e-3
-    np.testing.assert_allclose(found["motors/i"], exact, rtol=0, atol=tolerance)
-    np.testing.assert_allclose(found["motors/tau"], G * k * found["motors/i"], rtol=1e-14)
-    i, tau = found["motors/i"][-1], found["motors/tau"][-1]
+    np.testing.assert_allclose(result["motors/i"], exact, rtol=0, atol=tolerance)
+    np.testing.assert_allclose(result["motors/tau"], G * k * result["motors/i"], rtol=1e-14)
+    i, tau = result["motors/i"][-1], result["motors/tau"][-1]
     np.testing.assert_allclose(np.array([24.0, 10.0]) * i, R * i**2 + tau * [-0.5, 0.7], rtol=1e-8)

@@ -72,9 +72,9 @@ def with_integral(block: Block, source: Block, *, name: str = "block") -> Diagra
     return builder.build()
 
 
-def assert_close(found: np.ndarray, expected: np.ndarray, tolerance: float = 5e-9) -> None:
+def assert_close(actual: np.ndarray, expected: np.ndarray, tolerance: float = 5e-9) -> None:
     # rtol 1e-10 over a few hundred steps; RK4 with h = 0.01 s on sines: h^4/120 = 1e-10
-    assert found == pytest.approx(expected, abs=tolerance)
+    assert actual == pytest.approx(expected, abs=tolerance)
 
 
 # -- sampled blocks -----------------------------------------------------------------------------------------
@@ -86,11 +86,11 @@ def test_a_sampled_loop_around_an_integrator(run: Run) -> None:
     x = builder.add("x", Integrator(initial=1.0))
     hold = builder.add("hold", ZeroOrderHold(sample_time=0.25), x)
     builder.connect(builder.add("k", Gain(gain=-2.0), hold), x)
-    found = run(builder.build(), 2.0)
-    j = np.floor(found["t"] / 0.25 + 1e-9)
+    result = run(builder.build(), 2.0)
+    j = np.floor(result["t"] / 0.25 + 1e-9)
     start = 0.5**j
-    assert_close(found["hold/y"], start, 1e-14)
-    assert_close(found["x/y"], start * (1 - 2.0 * (found["t"] - 0.25 * j)), 1e-14)
+    assert_close(result["hold/y"], start, 1e-14)
+    assert_close(result["x/y"], start * (1 - 2.0 * (result["t"] - 0.25 * j)), 1e-14)
 
 
 def test_a_held_exponential(run: Run) -> None:
@@ -99,9 +99,9 @@ def test_a_held_exponential(run: Run) -> None:
     x = builder.add("x", Integrator(initial=1.0))
     builder.connect(builder.add("k", Gain(gain=-1.0), x), x)
     builder.add("hold", ZeroOrderHold(sample_time=(0.3, 0.1)), x)
-    found = run(builder.build(), 3.0)
-    j = np.floor((found["t"] - 0.1) / 0.3 + 1e-9)
-    assert_close(found["hold/y"], np.where(j >= 0, np.exp(-(0.1 + 0.3 * j)), 0.0))
+    result = run(builder.build(), 3.0)
+    j = np.floor((result["t"] - 0.1) / 0.3 + 1e-9)
+    assert_close(result["hold/y"], np.where(j >= 0, np.exp(-(0.1 + 0.3 * j)), 0.0))
 
 
 def test_two_rates_and_a_delay(run: Run) -> None:
@@ -111,14 +111,14 @@ def test_two_rates_and_a_delay(run: Run) -> None:
     fast = builder.add("fast", ZeroOrderHold(sample_time=0.2), t)
     slow = builder.add("slow", ZeroOrderHold(sample_time=0.5), fast)
     builder.add("before", UnitDelay(), slow)
-    found = run(builder.build(), 5.0)
-    fast_tick = 0.2 * np.floor(found["t"] / 0.2 + 1e-9)
-    slow_tick = 0.5 * np.floor(found["t"] / 0.5 + 1e-9)
+    result = run(builder.build(), 5.0)
+    fast_tick = 0.2 * np.floor(result["t"] / 0.2 + 1e-9)
+    slow_tick = 0.5 * np.floor(result["t"] / 0.5 + 1e-9)
     sampled = 0.2 * np.floor(slow_tick / 0.2 + 1e-9)
-    assert_close(found["fast/y"], fast_tick, 1e-14)
-    assert_close(found["slow/y"], sampled, 1e-14)
+    assert_close(result["fast/y"], fast_tick, 1e-14)
+    assert_close(result["slow/y"], sampled, 1e-14)
     before = np.where(slow_tick > 0, 0.2 * np.floor((slow_tick - 0.5) / 0.2 + 1e-9), 0.0)
-    assert_close(found["before/y"], before, 1e-14)
+    assert_close(result["before/y"], before, 1e-14)
 
 
 def test_a_limiter_between_sampled_blocks_limits_at_the_tick(run: Run) -> None:
@@ -126,10 +126,10 @@ def test_a_limiter_between_sampled_blocks_limits_at_the_tick(run: Run) -> None:
     hold = builder.add("hold", ZeroOrderHold(sample_time=0.5), builder.add("t", Clock()))
     limit = builder.add("limit", Saturation(lower=-1.0, upper=1.2), hold)
     builder.add("again", ZeroOrderHold(), limit)
-    found = run(builder.build(), 5.0)
-    expected = np.minimum(0.5 * np.floor(found["t"] / 0.5 + 1e-9), 1.2)
-    assert_close(found["again/y"], expected, 1e-15)
-    assert_close(found["limit/y"], expected, 1e-15)
+    result = run(builder.build(), 5.0)
+    expected = np.minimum(0.5 * np.floor(result["t"] / 0.5 + 1e-9), 1.2)
+    assert_close(result["again/y"], expected, 1e-15)
+    assert_close(result["limit/y"], expected, 1e-15)
 
 
 # -- switching ---------------------------------------------------------------------------------------------
@@ -142,27 +142,27 @@ def test_saturation_and_dead_zone_of_a_sine(run: Run) -> None:
     rise, fall = np.minimum(t, edge), np.maximum(t - (np.pi - edge), 0.0)
     flat = np.clip(t - edge, 0.0, np.pi - 2 * edge)
     limited = (1 - np.cos(rise)) + 0.5 * flat + (np.cos(np.pi - edge) - np.cos(np.pi - edge + fall))
-    found = run(with_integral(Saturation(), SineWave()), 3.0)
-    assert_close(found["block/y"], np.clip(np.sin(t), -0.5, 0.5))
-    assert_close(found["integral/y"], limited)
-    found = run(with_integral(DeadZone(), SineWave()), 3.0)
-    assert_close(found["block/y"], np.maximum(np.sin(t) - 0.5, 0.0))
-    assert_close(found["integral/y"], 1 - np.cos(t) - limited)
+    result = run(with_integral(Saturation(), SineWave()), 3.0)
+    assert_close(result["block/y"], np.clip(np.sin(t), -0.5, 0.5))
+    assert_close(result["integral/y"], limited)
+    result = run(with_integral(DeadZone(), SineWave()), 3.0)
+    assert_close(result["block/y"], np.maximum(np.sin(t) - 0.5, 0.0))
+    assert_close(result["integral/y"], 1 - np.cos(t) - limited)
 
 
 def test_a_limiter_starts_above_its_limit_and_jumps_to_the_other_limit(run: Run) -> None:
-    found = run(with_integral(Saturation(), Step(time=1.0, initial=3.0, final=-2.0)), 2.0)
-    assert found["block/y"].tolist() == [0.5] * 50 + [-0.5] * 51
-    assert_close(found["integral/y"][-1:], np.zeros(1), 1e-14)
+    result = run(with_integral(Saturation(), Step(time=1.0, initial=3.0, final=-2.0)), 2.0)
+    assert result["block/y"].tolist() == [0.5] * 50 + [-0.5] * 51
+    assert_close(result["integral/y"][-1:], np.zeros(1), 1e-14)
 
 
 def test_a_relay_with_hysteresis(run: Run) -> None:
     """The relay is on from pi/6 (sin t = 0.5, rising) to 7 pi/6 (sin t = -0.5, falling)."""
-    found = run(with_integral(Relay(on_value=2.0, off_value=-1.0), SineWave()), 6.0)
-    t = found["t"]
+    result = run(with_integral(Relay(on_value=2.0, off_value=-1.0), SineWave()), 6.0)
+    t = result["t"]
     on = (t >= np.pi / 6) & (t < 7 * np.pi / 6)
-    assert found["block/y"].tolist() == np.where(on, 2.0, -1.0).tolist()
-    assert_close(found["integral/y"], -t + 3 * np.clip(t - np.pi / 6, 0.0, np.pi))
+    assert result["block/y"].tolist() == np.where(on, 2.0, -1.0).tolist()
+    assert_close(result["integral/y"], -t + 3 * np.clip(t - np.pi / 6, 0.0, np.pi))
 
 
 def test_a_thermostat_oscillates_with_the_exact_period(run: Run) -> None:
@@ -171,37 +171,37 @@ def test_a_thermostat_oscillates_with_the_exact_period(run: Run) -> None:
     x = builder.add("x", Integrator())
     relay = builder.add("relay", Relay(on_point=1.0, off_point=-1.0, on_value=-1.0, off_value=1.0), x)
     builder.connect(relay, x)
-    found = run(builder.build(), 12.5)
-    phase = (found["t"] + 1.0) % 4.0
-    assert_close(found["x/y"], 1.0 - np.abs(phase - 2.0), 1e-10)
+    result = run(builder.build(), 12.5)
+    phase = (result["t"] + 1.0) % 4.0
+    assert_close(result["x/y"], 1.0 - np.abs(phase - 2.0), 1e-10)
 
 
 def test_a_quantizer(run: Run) -> None:
-    found = run(with_integral(Quantizer(interval=0.4), SineWave()), 3.0)
-    t = found["t"]
-    assert found["block/y"] == pytest.approx(0.4 * np.floor(np.sin(t) / 0.4 + 0.5), abs=1e-15)
+    result = run(with_integral(Quantizer(interval=0.4), SineWave()), 3.0)
+    t = result["t"]
+    assert result["block/y"] == pytest.approx(0.4 * np.floor(np.sin(t) / 0.4 + 0.5), abs=1e-15)
     edges = np.arcsin([0.2, 0.6])
     levels = 0.4 * sum(np.clip(t - edge, 0, np.pi - 2 * edge) for edge in edges)
     # the step down is late by 1e-9 of the interval
-    assert_close(found["integral/y"], levels, 2e-9)
+    assert_close(result["integral/y"], levels, 2e-9)
 
 
 def test_coulomb_friction_of_a_speed_that_changes_its_sign(run: Run) -> None:
-    found = run(with_integral(CoulombFriction(offset=2.0, gain=3.0), SineWave(frequency=2.0)), 3.0)
-    t, u = found["t"], np.sin(2.0 * found["t"])
-    assert found["block/y"][0] == 0.0
-    assert_close(found["block/y"], np.sign(u) * 2.0 + 3.0 * u)
-    moved = 2.0 * (np.minimum(t, np.pi / 2) - np.maximum(t - np.pi / 2, 0.0)) + 1.5 * (1 - np.cos(2 * t))
-    assert_close(found["integral/y"], moved)
+    result = run(with_integral(CoulombFriction(offset=2.0, gain=3.0), SineWave(frequency=2.0)), 3.0)
+    t, u = result["t"], np.sin(2.0 * result["t"])
+    assert result["block/y"][0] == 0.0
+    assert_close(result["block/y"], np.sign(u) * 2.0 + 3.0 * u)
+    integral = 2.0 * (np.minimum(t, np.pi / 2) - np.maximum(t - np.pi / 2, 0.0)) + 1.5 * (1 - np.cos(2 * t))
+    assert_close(result["integral/y"], integral)
 
 
 def test_the_output_of_a_backlash_follows_and_rests(run: Run) -> None:
     """u = sin t, width 0.5: y leaves 0 at sin t = 0.25, and stays 0.75 from pi/2 until sin t = 0.5."""
-    found = run(with_integral(Backlash(width=0.5), SineWave()), 6.0)
-    t, u = found["t"], np.sin(found["t"])
+    result = run(with_integral(Backlash(width=0.5), SineWave()), 6.0)
+    t, u = result["t"], np.sin(result["t"])
     expected = np.where(t < np.pi / 2, np.maximum(u - 0.25, 0.0), np.minimum(u + 0.25, 0.75))
     expected = np.where(t > 3 * np.pi / 2, np.maximum(u - 0.25, -0.75), expected)
-    assert_close(found["block/y"], expected)
+    assert_close(result["block/y"], expected)
 
 
 def test_a_switch_controlled_by_the_time(run: Run) -> None:
@@ -209,10 +209,12 @@ def test_a_switch_controlled_by_the_time(run: Run) -> None:
     t, one = builder.add("t", Clock()), builder.add("one", Constant(value=5.0))
     switch = builder.add("switch", Switch(threshold=0.7), one, t, t)
     builder.add("integral", Integrator(), switch)
-    found = run(builder.build(), 2.0)
-    assert_close(found["switch/y"], np.where(found["t"] >= 0.7, 5.0, found["t"]), 1e-12)
+    result = run(builder.build(), 2.0)
+    assert_close(result["switch/y"], np.where(result["t"] >= 0.7, 5.0, result["t"]), 1e-12)
     assert_close(
-        found["integral/y"], np.minimum(found["t"], 0.7) ** 2 / 2 + 5 * np.maximum(found["t"] - 0.7, 0), 1e-11
+        result["integral/y"],
+        np.minimum(result["t"], 0.7) ** 2 / 2 + 5 * np.maximum(result["t"] - 0.7, 0),
+        1e-11,
     )
 
 
@@ -220,13 +222,13 @@ def test_a_pulse_generator(run: Run) -> None:
     builder = DiagramBuilder("d")
     pulses = builder.add("pulses", PulseGenerator(amplitude=3.0, period=0.5, width=50.0, delay=0.125))
     builder.add("integral", Integrator(), pulses)
-    found = run(builder.build(), 2.0)
-    since = found["t"] - 0.125
+    result = run(builder.build(), 2.0)
+    since = result["t"] - 0.125
     count = np.floor(since / 0.5)
     within = since - 0.5 * count
-    assert found["pulses/y"].tolist() == np.where((since >= 0) & (within < 0.25), 3.0, 0.0).tolist()
+    assert result["pulses/y"].tolist() == np.where((since >= 0) & (within < 0.25), 3.0, 0.0).tolist()
     area = np.where(since < 0, 0.0, 0.75 * count + 3.0 * np.minimum(within, 0.25))
-    assert_close(found["integral/y"], area, 1e-11)
+    assert_close(result["integral/y"], area, 1e-11)
 
 
 def test_a_limited_integrator_stays_at_its_limit_and_leaves_it_without_delay(run: Run) -> None:
@@ -234,11 +236,11 @@ def test_a_limited_integrator_stays_at_its_limit_and_leaves_it_without_delay(run
     builder = DiagramBuilder("d")
     rate = builder.add("rate", SineWave(amplitude=2.0, phase=np.pi / 2))
     builder.add("x", IntegratorLimited(), rate)
-    found = run(builder.build(), 3.0)
-    t = found["t"]
+    result = run(builder.build(), 3.0)
+    t = result["t"]
     expected = np.where(t < np.pi / 2, np.minimum(2 * np.sin(t), 1.0), 2 * np.sin(t) - 1.0)
-    assert_close(found["x/y"], expected)
-    assert found["x/saturated"].tolist() == ((t >= np.pi / 6) & (t < np.pi / 2)).astype(float).tolist()
+    assert_close(result["x/y"], expected)
+    assert result["x/saturated"].tolist() == ((t >= np.pi / 6) & (t < np.pi / 2)).astype(float).tolist()
 
 
 def test_an_integrator_reset_by_pulses(run: Run) -> None:
@@ -248,11 +250,11 @@ def test_an_integrator_reset_by_pulses(run: Run) -> None:
     one = builder.add("one", Constant())
     builder.add("rising", ResettableIntegrator(initial=0.25), one, pulses)
     builder.add("falling", ResettableIntegrator(external_reset="falling"), one, pulses)
-    found = run(builder.build(), 2.0)
-    t = found["t"]
-    assert_close(found["rising/y"], 0.25 + t - 0.5 * np.floor(t / 0.5), 1e-12)
+    result = run(builder.build(), 2.0)
+    t = result["t"]
+    assert_close(result["rising/y"], 0.25 + t - 0.5 * np.floor(t / 0.5), 1e-12)
     since = t - 0.25
-    assert_close(found["falling/y"], np.where(since < 0, t, since - 0.5 * np.floor(since / 0.5)), 1e-12)
+    assert_close(result["falling/y"], np.where(since < 0, t, since - 0.5 * np.floor(since / 0.5)), 1e-12)
 
 
 def ball(builder: DiagramBuilder, restitution: float, height: float) -> BlockHandle:
@@ -273,14 +275,14 @@ def test_a_bouncing_ball_reaches_the_ground_at_the_published_times(run: Run) -> 
     """h0 = 1, e = 0.7: impacts at 0.451523640985731, 1.08365673836575, 1.52614990653177 (FMI reference)."""
     builder = DiagramBuilder("d")
     ball(builder, 0.7, 1.0)
-    found = run(builder.build(), 1.8)
+    result = run(builder.build(), 1.8)
     impacts = [0.451523640985731, 1.08365673836575, 1.52614990653177]
-    t, v = found["t"], 9.81 * impacts[0]
+    t, v = result["t"], 9.81 * impacts[0]
     height = 1.0 - 9.81 * t**2 / 2
     for k, impact in enumerate(impacts):
         since = t - impact
         height = np.where(since >= 0, 0.7 ** (k + 1) * v * since - 9.81 * since**2 / 2, height)
-    assert_close(found["height/y"], height, 1e-9)
+    assert_close(result["height/y"], height, 1e-9)
 
 
 def test_a_sliding_mass_comes_to_rest_exactly(run: Run) -> None:
@@ -288,25 +290,25 @@ def test_a_sliding_mass_comes_to_rest_exactly(run: Run) -> None:
     builder = DiagramBuilder("d")
     force = builder.add("force", Constant(value=0.0))
     builder.add("mass", StickSlipFriction(coulomb=2.0, static=2.5, initial_speed=3.0), force)
-    found = run(builder.build(), 3.0)
-    t = np.minimum(found["t"], 1.5)
-    assert_close(found["mass/x"], 3 * t - t**2, 1e-11)
-    assert_close(found["mass/v"], 3 - 2 * t, 1e-11)
-    assert not found["mass/v"][51:].any()
+    result = run(builder.build(), 3.0)
+    t = np.minimum(result["t"], 1.5)
+    assert_close(result["mass/x"], 3 * t - t**2, 1e-11)
+    assert_close(result["mass/v"], 3 - 2 * t, 1e-11)
+    assert not result["mass/v"][51:].any()
 
 
 def test_a_stuck_mass_breaks_away_at_the_exact_time(run: Run) -> None:
     """F = t: the mass sticks until t = 1.2, then v' = t - 1."""
     builder = DiagramBuilder("d")
     builder.add("mass", StickSlipFriction(), builder.add("force", Clock()))
-    found = run(builder.build(), 3.0)
-    t = found["t"]
-    assert not found["mass/v"][t < 1.2 - 1e-9].any()
+    result = run(builder.build(), 3.0)
+    t = result["t"]
+    assert not result["mass/v"][t < 1.2 - 1e-9].any()
     since = np.maximum(t - 1.2, 0.0)
-    assert_close(found["mass/v"], 0.2 * since + since**2 / 2, 1e-10)
+    assert_close(result["mass/v"], 0.2 * since + since**2 / 2, 1e-10)
     # at 1.2 s both values are correct
     other = np.abs(t - 1.2) > 1e-9
-    assert_close(found["mass/friction"][other], np.where(t < 1.2, t, 1.0)[other], 1e-10)
+    assert_close(result["mass/friction"][other], np.where(t < 1.2, t, 1.0)[other], 1e-10)
 
 
 # -- implicit equations ------------------------------------------------------------------------------------
@@ -318,9 +320,9 @@ def test_a_constant_nonlinear_loop_is_solved(run: Run) -> None:
     u = builder.add("u", Trigonometry(function="cos"))
     builder.connect(u, u)
     builder.add("x", Integrator(), u)
-    found = run(builder.build(), 2.0)
-    assert_close(found["u/y"], np.full(SAMPLES + 1, 0.7390851332151607), 1e-14)
-    assert_close(found["x/y"], 0.7390851332151607 * found["t"], 1e-12)
+    result = run(builder.build(), 2.0)
+    assert_close(result["u/y"], np.full(SAMPLES + 1, 0.7390851332151607), 1e-14)
+    assert_close(result["x/y"], 0.7390851332151607 * result["t"], 1e-12)
 
 
 def test_an_implicit_equation_that_depends_on_time(run: Run) -> None:
@@ -330,8 +332,8 @@ def test_an_implicit_equation_that_depends_on_time(run: Run) -> None:
     u = builder.add("u", Sum(), t)
     half = builder.add("half", Gain(gain=0.5), builder.add("cos", Trigonometry(function="cos"), u))
     builder.connect(half, u["u2"])
-    found = run(builder.build(), 3.0)
-    assert_close(found["u/y"], found["t"] + np.cos(found["u/y"]) / 2, 1e-13)
+    result = run(builder.build(), 3.0)
+    assert_close(result["u/y"], result["t"] + np.cos(result["u/y"]) / 2, 1e-13)
 
 
 def test_a_loop_with_saturation_is_piecewise_linear(run: Run) -> None:
@@ -342,6 +344,6 @@ def test_a_loop_with_saturation_is_piecewise_linear(run: Run) -> None:
     builder.connect(builder.add("limit", Saturation(), u), u["u2"])
     diagram = builder.build()
     assert trace_diagram(diagram).algebraic.size == 0
-    found = run(diagram, 3.0)
-    s = np.sin(found["t"])
-    assert_close(found["u/y"], np.where(s < 0.5, s, 2 * s - 0.5))
+    result = run(diagram, 3.0)
+    s = np.sin(result["t"])
+    assert_close(result["u/y"], np.where(s < 0.5, s, 2 * s - 0.5))

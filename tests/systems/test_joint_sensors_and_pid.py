@@ -57,8 +57,8 @@ def sensed(seed: float = 0.0) -> SimulationResult:
 
 
 def test_sensor_noise_has_the_given_deviations_and_is_uncorrelated() -> None:
-    found = sensed()
-    noise = np.hstack([found["sensor/q_measured"] - 0.5, found["sensor/qd_measured"]])
+    result = sensed()
+    noise = np.hstack([result["sensor/q_measured"] - 0.5, result["sensor/qd_measured"]])
     assert not noise[:, 2].any(), "a deviation of 0 gives no noise"
     wanted = np.array([0.01, 0.02, 0.1, 0.1, 0.1])
     noise = np.delete(noise, 2, axis=1) / wanted
@@ -81,28 +81,28 @@ def test_an_encoder_quantises_the_angle_and_differentiates_its_counts(solver: st
     builder = DiagramBuilder("d")
     u = builder.add("u", SineWave(amplitude=(2.0, 0.3), frequency=1.3, phase=0.4))
     builder.add("encoder", Encoder(counts=counts, gear_ratio=G, sample_time=T), u)
-    found = run(builder.build(), 1.0, solver=solver)
-    t = found.time
+    result = run(builder.build(), 1.0, solver=solver)
+    t = result.time
     angle = np.outer(np.sin(1.3 * t + 0.4), (2.0, 0.3))
     expected = np.floor(G * counts * angle / (2 * np.pi))
-    np.testing.assert_array_equal(found["encoder/count"], expected)
+    np.testing.assert_array_equal(result["encoder/count"], expected)
     step = 2 * np.pi / (G * counts)
-    np.testing.assert_allclose(found["encoder/y"], expected * step, rtol=1e-14)
-    assert not found["encoder/speed"][0].any(), "the speed is 0 at the first tick"
-    np.testing.assert_allclose(found["encoder/speed"][1:], np.diff(expected, axis=0) * step / T, atol=1e-9)
+    np.testing.assert_allclose(result["encoder/y"], expected * step, rtol=1e-14)
+    assert not result["encoder/speed"][0].any(), "the speed is 0 at the first tick"
+    np.testing.assert_allclose(result["encoder/speed"][1:], np.diff(expected, axis=0) * step / T, atol=1e-9)
     # the error of the angle is below one count
-    assert (np.abs(found["encoder/y"] - angle) < np.abs(step)).all()
+    assert (np.abs(result["encoder/y"] - angle) < np.abs(step)).all()
     true = np.outer(1.3 * np.cos(1.3 * t + 0.4), (2.0, 0.3))
-    assert (np.abs(found["encoder/speed"] - true)[1:] < np.abs(step) / T + 0.02).all()
+    assert (np.abs(result["encoder/speed"] - true)[1:] < np.abs(step) / T + 0.02).all()
 
 
 def test_a_tachometer_has_a_first_order_lag(solver: str) -> None:
     builder = DiagramBuilder("d")
     builder.add("tachometer", Tachometer(gain=0.5, time_constant=0.2), builder.add("w", Ramp(slope=3.0)))
-    found = run(builder.build(), 2.0, solver=solver)
-    t = found.time
+    result = run(builder.build(), 2.0, solver=solver)
+    t = result.time
     exact = 1.5 * (t - 0.2 * (1.0 - np.exp(-t / 0.2)))
-    np.testing.assert_allclose(found["tachometer/y"], exact, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(result["tachometer/y"], exact, rtol=0, atol=1e-7)
 
 
 # -- controllers
@@ -124,20 +124,20 @@ def loop(controller: Block, stop: float, solver: str, goal: Block, load: float =
 def test_a_pid_without_limits_agrees_with_the_linear_loop(solver: str) -> None:
     """q'' = Kp (1 - q) - Kd q' + i - load, i' = Ki (1 - q): the integral compensates the load."""
     Kp, Ki, Kd = (30.0, 20.0), (40.0, 20.0), (11.0, 9.0)
-    found = loop(JointPID(Kp=Kp, Ki=Ki, Kd=Kd), 8.0, solver, Constant(value=(1.0, 1.0)), load=3.0)
+    result = loop(JointPID(Kp=Kp, Ki=Ki, Kd=Kd), 8.0, solver, Constant(value=(1.0, 1.0)), load=3.0)
     for k in range(2):
         A = np.array([[0, 1, 0, 0], [-Kp[k], -Kd[k], 1, Kp[k] - 3.0], [-Ki[k], 0, 0, Ki[k]], [0, 0, 0, 0]])
-        exact = np.array([(expm(A * t) @ (0.0, 0.0, 0.0, 1.0))[0] for t in found.time])
+        exact = np.array([(expm(A * t) @ (0.0, 0.0, 0.0, 1.0))[0] for t in result.time])
         tolerance = 1e-7 if solver == "rk45" else 5e-4  # steps of 80 ms
-        np.testing.assert_allclose(found["angle/y"][:, k], exact, rtol=0, atol=tolerance)
-    np.testing.assert_allclose(found["angle/y"][-1], 1.0, atol=1e-3)
+        np.testing.assert_allclose(result["angle/y"][:, k], exact, rtol=0, atol=tolerance)
+    np.testing.assert_allclose(result["angle/y"][-1], 1.0, atol=1e-3)
 
 
 def test_back_calculation_prevents_windup_of_a_limited_pid(solver: str) -> None:
     """Comparison with SciPy with short steps; for Kb = 0 the overshoot is much larger."""
     gains = {"Kp": 10.0, "Ki": 8.0, "Kd": 5.0, "lower": (-0.5, -0.4), "upper": 0.5}
     goal = Constant(value=(2.0, -2.0))
-    found = loop(JointPID(Kb=5.0, **gains), 10.0, solver, goal)
+    result = loop(JointPID(Kb=5.0, **gains), 10.0, solver, goal)
     wound = loop(JointPID(Kb=0.0, **gains), 10.0, solver, goal)
     for k, (aim, low, high) in enumerate(((2.0, -0.5, 0.5), (-2.0, -0.4, 0.5))):
 
@@ -147,12 +147,12 @@ def test_back_calculation_prevents_windup_of_a_limited_pid(solver: str) -> None:
             return [x[1], tau, 8.0 * (aim - x[0]) + 5.0 * (tau - free)]
 
         options = {"rtol": 1e-10, "atol": 1e-12, "max_step": 0.01, "args": (aim, low, high)}
-        exact = solve_ivp(flow, (0, 10), [0, 0, 0], "DOP853", found.time, **options)
+        exact = solve_ivp(flow, (0, 10), [0, 0, 0], "DOP853", result.time, **options)
         tolerance = 1e-7 if solver == "rk45" else 1e-4  # steps of 100 ms
-        np.testing.assert_allclose(found["angle/y"][:, k], exact.y[0], rtol=0, atol=tolerance)
-        over = [np.max(one["angle/y"][:, k] * np.sign(aim)) - 2.0 for one in (found, wound)]
-        assert over[0] < 0.5 * over[1]
-    assert found["pid/tau"].max() <= 0.5
+        np.testing.assert_allclose(result["angle/y"][:, k], exact.y[0], rtol=0, atol=tolerance)
+        overshoots = [np.max(one["angle/y"][:, k] * np.sign(aim)) - 2.0 for one in (result, wound)]
+        assert overshoots[0] < 0.5 * overshoots[1]
+    assert result["pid/tau"].max() <= 0.5
 
 
 def test_a_sampled_pid_agrees_with_its_recurrence(solver: str) -> None:
@@ -161,7 +161,7 @@ def test_a_sampled_pid_agrees_with_its_recurrence(solver: str) -> None:
     controller = SampledJointPID(
         Kp=(10.0, 6.0), Ki=(4.0, 3.0), Kd=(5.0, 4.0), lower=lower, upper=upper, sample_time=T
     )
-    found = loop(controller, 5.0, solver, Step(time=0.2, final=(1.0, -1.5)), load=0.2)
+    result = loop(controller, 5.0, solver, Step(time=0.2, final=(1.0, -1.5)), load=0.2)
     q, qd, integral, angles = np.zeros(2), np.zeros(2), np.zeros(2), []
     for k in range(101):
         angles.append(q)
@@ -172,7 +172,7 @@ def test_a_sampled_pid_agrees_with_its_recurrence(solver: str) -> None:
         integral = integral + np.where(outwards, 0.0, T * np.array([4.0, 3.0]) * e)
         a = tau - 0.2
         q, qd = q + T * qd + T * T * a / 2, qd + T * a
-    np.testing.assert_allclose(found["angle/y"], angles, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(result["angle/y"], angles, rtol=0, atol=1e-11)
 
 
 def test_reversed_limits_of_a_pid_are_refused() -> None:
@@ -192,18 +192,18 @@ def test_a_constant_twist_moves_a_frame_on_a_screw_motion(solver: str) -> None:
     source = builder.add("V", Constant(value=V))
     for axes in ("body", "world"):
         builder.add(axes, PoseIntegration(axes=axes, position=p0, quaternion=Q0), source)
-    found = run(builder.build(), 10.0, solver=solver)
-    T0 = found["body/T"][0]
+    result = run(builder.build(), 10.0, solver=solver)
+    T0 = result["body/T"][0]
     np.testing.assert_allclose(T0[:3, 3], p0)
     wx = np.array([[0, -V[5], V[4]], [V[5], 0, -V[3]], [-V[4], V[3], 0]])
     screw = np.zeros((4, 4))
     screw[:3, :3], screw[:3, 3] = wx, V[:3]
     tolerance = 1e-8 if solver == "rk45" else 1e-5  # steps of 0.1 s at 1 rad/s
     for k in (30, 100):
-        t = found.time[k]
-        np.testing.assert_allclose(found["body/T"][k], T0 @ expm(screw * t), rtol=0, atol=tolerance)
-        np.testing.assert_allclose(found["world/T"][k][:3, :3], expm(wx * t) @ T0[:3, :3], atol=tolerance)
-        np.testing.assert_allclose(found["world/T"][k][:3, 3], p0 + V[:3] * t, atol=tolerance)
+        t = result.time[k]
+        np.testing.assert_allclose(result["body/T"][k], T0 @ expm(screw * t), rtol=0, atol=tolerance)
+        np.testing.assert_allclose(result["world/T"][k][:3, :3], expm(wx * t) @ T0[:3, :3], atol=tolerance)
+        np.testing.assert_allclose(result["world/T"][k][:3, 3], p0 + V[:3] * t, atol=tolerance)
 
 
 def test_an_integrated_pose_remains_a_rotation_for_any_step() -> None:
@@ -228,9 +228,9 @@ def test_the_integrated_velocity_of_a_tool_is_its_pose(puma560: Robot, solver: s
             PoseIntegration(axes=axes, position=T0[:3, 3], quaternion=quaternion(T0[:3, :3])),
             V,
         )
-    found = run(builder.build(), 10.0, solver=solver)
+    result = run(builder.build(), 10.0, solver=solver)
     for axes in ("world", "body"):
-        np.testing.assert_allclose(found[f"{axes}/T"], found["fkine/T"], rtol=0, atol=1e-6)
+        np.testing.assert_allclose(result[f"{axes}/T"], result["fkine/T"], rtol=0, atol=1e-6)
 
 
 def quaternion(R: np.ndarray) -> np.ndarray:

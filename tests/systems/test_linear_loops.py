@@ -118,10 +118,10 @@ def test_every_signal_of_a_loop_is_as_accurate_as_its_condition_allows(seed: int
         bound = 4.0 * n * EPS * float(condition)
         if bound > 1e-3:
             continue  # too close to singular for a first-order bound
-        found = {f"s{i}": x[i]}
-        found |= {f"g{k}_{i}": x[i] * Fraction(gains[0, k, i]) for k in range(n) if fed[k, i]}
-        found |= {f"h{k}_{i}": x[i] * G[k][i] for k in range(n) if fed[k, i]}
-        for name, exact in found.items():
+        solution = {f"s{i}": x[i]}
+        solution |= {f"g{k}_{i}": x[i] * Fraction(gains[0, k, i]) for k in range(n) if fed[k, i]}
+        solution |= {f"h{k}_{i}": x[i] * G[k][i] for k in range(n) if fed[k, i]}
+        for name, exact in solution.items():
             assert abs(Fraction(float(signals[f"{name}/y"])) / exact - 1) <= bound, name
 
 
@@ -182,9 +182,9 @@ def test_a_loop_of_vectors_with_saturation_is_solved() -> None:
         for sides in itertools.product((-1.0, 0.0, 1.0), repeat=3):
             side = np.array(sides)
             free = np.diag(side == 0.0)
-            found = np.linalg.solve(np.eye(3) + M @ free, c - M @ side)
-            if (np.where(side == 0.0, np.abs(found) <= 1.0, found * side >= 1.0)).all():
-                return found
+            actual = np.linalg.solve(np.eye(3) + M @ free, c - M @ side)
+            if (np.where(side == 0.0, np.abs(actual) <= 1.0, actual * side >= 1.0)).all():
+                return actual
         raise AssertionError
 
     expected = np.array([piece(t * c0) for t in result.time])
@@ -220,9 +220,9 @@ def test_linearisation_and_sensitivity_of_a_loop_of_vectors() -> None:
     np.testing.assert_allclose(system.A, -np.linalg.inv(np.eye(3) - M), rtol=1e-12, atol=1e-13)
 
     settings = {"stop_time": 1.0, "sample_time": 0.5, "rtol": 1e-11, "atol": 1e-13}
-    found = ab.sensitivity(diagram, "g.gain", "x", **settings)
+    actual = ab.sensitivity(diagram, "g.gain", "x", **settings)
     runs = [ab.simulate(diagram, parameters={"g.gain": 1.0 + d}, **settings)["x"] for d in (1e-5, -1e-5)]
-    np.testing.assert_allclose(found["x", "g.gain"], (runs[0] - runs[1]) / 2e-5, rtol=1e-6, atol=1e-8)
+    np.testing.assert_allclose(actual["x", "g.gain"], (runs[0] - runs[1]) / 2e-5, rtol=1e-6, atol=1e-8)
     stiff = ab.simulate(diagram, **(settings | {"solver": "rodas", "rtol": 1e-9, "atol": 1e-12}))
     np.testing.assert_allclose(stiff["x"], sum(runs) / 2.0, rtol=1e-6)
 
@@ -235,6 +235,6 @@ def test_a_loop_through_the_corner_of_a_norm_is_solved() -> None:
     level = builder.add("level", DeadZone(start=-1.0, end=1.0), held)
     norm = builder.add("norm", Hypot(), level)
     builder.connect(builder.add("share", Gain(gain=0.3), norm), norm["v"])
-    found = ab.simulate(builder.build(), stop_time=4.0)
-    assert set(np.round(found["level"], 12).tolist()) == {-1.0, 0.0, 1.0}
-    assert found["norm"] == pytest.approx(np.abs(found["level"]) / np.sqrt(0.91), abs=1e-12)
+    result = ab.simulate(builder.build(), stop_time=4.0)
+    assert set(np.round(result["level"], 12).tolist()) == {-1.0, 0.0, 1.0}
+    assert result["norm"] == pytest.approx(np.abs(result["level"]) / np.sqrt(0.91), abs=1e-12)

@@ -28,15 +28,15 @@ def test_crossings_of_a_level_by_a_sine_are_found(solver: str, frequency: float,
     wave = builder.add("wave", bl.SineWave(frequency=frequency))
     above = builder.add("above", bl.CompareToConstant(relation=">", constant=0.5), wave)
     builder.add("total", bl.Integrator(), above)
-    found = ab.simulate(builder.build(), stop_time=stop, solver=solver)
+    result = ab.simulate(builder.build(), stop_time=stop, solver=solver)
     # each of about 2000 crossings has an error of some units in the last place of the time
-    assert found["total"][-1] == pytest.approx(time_above(frequency, 0.5, stop), abs=1e-9)
+    assert result["total"][-1] == pytest.approx(time_above(frequency, 0.5, stop), abs=1e-9)
 
 
 def parabolas() -> list[tuple[float, ...]]:
     """Divisors, heights, centres and curvatures of parabolas; the first ones once had missed turns."""
     random = np.random.default_rng(5)
-    found = [
+    cases = [
         (-0.7973742649797251, 0.030320733805284217, 1.5323485590083694, 6.480506838230336),
         (-0.09921919980310555, 0.10288181247854467, 1.1894898207919582, 0.19703604271943814),
         (-0.0036077546362273116, -0.7575617145201816, 0.4001330068250857, 3.4999027934506985),
@@ -47,8 +47,8 @@ def parabolas() -> list[tuple[float, ...]]:
     for _ in range(60):
         divisor = random.choice([-1.0, 1.0]) * 10.0 ** random.uniform(-2.0, 0.0)
         height, centre = random.uniform(-1.0, 1.0), random.uniform(0.2, 1.8)
-        found.append((divisor, height, centre, 10.0 ** random.uniform(-1.0, 1.0)))
-    return found
+        cases.append((divisor, height, centre, 10.0 ** random.uniform(-1.0, 1.0)))
+    return cases
 
 
 def test_turns_just_before_the_event_of_a_step_are_found() -> None:
@@ -62,9 +62,9 @@ def test_turns_just_before_the_event_of_a_step_are_found() -> None:
     diagram = builder.build()
     for divisor_value, *values in parabolas():
         tuned = {"parabola.values": values, "divisor.value": divisor_value}
-        found = ab.simulate(diagram, stop_time=2.0, sample_time=5e-4, parameters=tuned)
-        wanted = np.mod(found["parabola"], divisor_value)
-        differs = np.abs(found["rest"] - wanted) > 1e-8
+        result = ab.simulate(diagram, stop_time=2.0, sample_time=5e-4, parameters=tuned)
+        wanted = np.mod(result["parabola"], divisor_value)
+        differs = np.abs(result["rest"] - wanted) > 1e-8
         # In a row at the time of an event rounding decides between 0 and the divisor.
         assert not (differs[1:] & differs[:-1]).any(), (divisor_value, values)
 
@@ -90,9 +90,9 @@ def test_two_alternating_action_subsystems_and_their_merge() -> None:
         action=choice["else"],
     )
     builder.add("y", bl.Merge(inputs=2), first, second)
-    found = ab.simulate(builder.build(), stop_time=4.0, sample_time=0.05, rtol=1e-9)
-    t = found.time
+    result = ab.simulate(builder.build(), stop_time=4.0, sample_time=0.05, rtol=1e-9)
+    t = result.time
     within = ((t > 1 / 6) & (t < 5 / 6)) | ((t > 13 / 6) & (t < 17 / 6))
     works = 0.5 + np.clip(t - 1 / 6, 0.0, 2 / 3) + np.clip(t - 13 / 6, 0.0, 2 / 3)
     begun = np.where(t > 17 / 6, 17 / 6, np.where(t > 5 / 6, 5 / 6, 0.0))
-    np.testing.assert_allclose(found["y"], np.where(within, works, 0.5 - 2 * (t - begun)), atol=1e-9)
+    np.testing.assert_allclose(result["y"], np.where(within, works, 0.5 - 2 * (t - begun)), atol=1e-9)

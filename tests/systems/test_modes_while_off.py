@@ -65,11 +65,11 @@ def test_modes_are_consistent_with_a_jump_before_the_first_enabling(settings: di
     """The input jumps from -1 to 1 at 0.2 s; the subsystems are enabled at 0.5 s."""
     blocks = {block.type_name(): block for block, _ in SWITCHING}
     diagram = all_enabled(blocks, bl.Step(time=0.2, initial=-1.0), bl.Step(time=0.5))
-    found = ab.simulate(diagram, stop_time=1.0, sample_time=0.1, **settings)
+    result = ab.simulate(diagram, stop_time=1.0, sample_time=0.1, **settings)
     for kind, (_, expected) in zip(blocks, SWITCHING):
         wanted = pytest.approx([0.0] * 5 + [expected] * 6, abs=1e-12)
-        assert found[f"sub {kind}/o"].tolist() == wanted, kind
-        assert found[f"total {kind}"][-1] == pytest.approx(0.5 * expected, abs=1e-9), kind
+        assert result[f"sub {kind}/o"].tolist() == wanted, kind
+        assert result[f"total {kind}"][-1] == pytest.approx(0.5 * expected, abs=1e-9), kind
 
 
 @pytest.mark.parametrize("settings", RUNS, ids=lambda run: run["solver"])
@@ -83,10 +83,10 @@ def test_a_limiter_in_an_intermittently_enabled_subsystem(sampled: bool, setting
         control = builder.add("hold", bl.ZeroOrderHold(sample_time=0.11), control)
     limiter = bl.EnabledSubsystem(diagram=inside(bl.Saturation(lower=-0.3, upper=0.3)))
     builder.add("total", bl.Integrator(), builder.add("sub", limiter, wave, enable=control))
-    found = ab.simulate(builder.build(), stop_time=8.0, sample_time=0.05, **settings)
-    on = found["hold" if sampled else "control"] > 0.0
+    result = ab.simulate(builder.build(), stop_time=8.0, sample_time=0.05, **settings)
+    on = result["hold" if sampled else "control"] > 0.0
     assert 20 < on.sum() < on.size - 20
-    np.testing.assert_allclose(found["sub/o"][on], np.clip(found["wave"], -0.3, 0.3)[on], atol=1e-12)
+    np.testing.assert_allclose(result["sub/o"][on], np.clip(result["wave"], -0.3, 0.3)[on], atol=1e-12)
 
 
 @pytest.mark.parametrize("settings", RUNS, ids=lambda run: run["solver"])
@@ -94,13 +94,13 @@ def test_a_relay_keeps_its_mode_while_disabled(settings: dict[str, Any]) -> None
     """On at 0.25 s, disabled from 0.4 s to 0.8 s; the input falls to 0.1, within the hysteresis: still on."""
     source = bl.FromTable(times=(0.0, 0.2, 0.3, 0.5, 0.6, 2.0), values=(0.0, 0.0, 1.0, 1.0, 0.1, 0.1))
     control = bl.FromTable(times=(0.0, 0.4, 0.8), values=(1.0, 0.0, 1.0), method="flat")
-    found = ab.simulate(
+    result = ab.simulate(
         enabled(bl.Relay(on_value=2.0, off_value=-1.0), source, control),
         stop_time=1.0,
         sample_time=0.1,
         **settings,
     )
-    assert found["sub/o"].tolist() == [-1.0] * 3 + [2.0] * 8
+    assert result["sub/o"].tolist() == [-1.0] * 3 + [2.0] * 8
 
 
 @pytest.mark.parametrize("settings", RUNS, ids=lambda run: run["solver"])
@@ -109,10 +109,10 @@ def test_the_motion_of_a_sliding_mass_is_suspended_while_disabled(settings: dict
     block = bl.StickSlipFriction(coulomb=2.0, static=2.5, initial_speed=3.0)
     control = bl.FromTable(times=(0.0, 0.5, 1.5), values=(1.0, 0.0, 1.0), method="flat")
     diagram = enabled(block, bl.Constant(value=0.0), control, end="v")
-    found = ab.simulate(diagram, stop_time=4.0, sample_time=0.1, **settings)
-    passed = np.minimum(found.time, 0.5) + np.maximum(found.time - 1.5, 0.0)
-    np.testing.assert_allclose(found["sub/o"], np.maximum(3.0 - 2.0 * passed, 0.0), atol=1e-9)
-    assert not found["sub/o"][found.time > 2.51].any()
+    result = ab.simulate(diagram, stop_time=4.0, sample_time=0.1, **settings)
+    passed = np.minimum(result.time, 0.5) + np.maximum(result.time - 1.5, 0.0)
+    np.testing.assert_allclose(result["sub/o"], np.maximum(3.0 - 2.0 * passed, 0.0), atol=1e-9)
+    assert not result["sub/o"][result.time > 2.51].any()
 
 
 @pytest.mark.parametrize("settings", RUNS, ids=lambda run: run["solver"])
@@ -121,9 +121,9 @@ def test_a_limited_integrator_that_is_reset_leaves_its_limit(settings: dict[str,
     block = bl.IntegratorLimited(lower=-0.2, upper=0.2)
     control = bl.PulseGenerator(period=1.0, width=50.0)
     diagram = enabled(block, bl.Constant(value=1.0), control, end="y", when="reset")
-    found = ab.simulate(diagram, stop_time=3.0, sample_time=0.05, **settings)
-    since = found.time - np.floor(found.time + 1e-9)
-    np.testing.assert_allclose(found["sub/o"], np.minimum(since, 0.2), atol=1e-9)
+    result = ab.simulate(diagram, stop_time=3.0, sample_time=0.05, **settings)
+    since = result.time - np.floor(result.time + 1e-9)
+    np.testing.assert_allclose(result["sub/o"], np.minimum(since, 0.2), atol=1e-9)
 
 
 def test_no_event_sees_the_old_states_of_a_subsystem_when_it_is_enabled() -> None:
@@ -136,11 +136,11 @@ def test_no_event_sees_the_old_states_of_a_subsystem_when_it_is_enabled() -> Non
     control = builder.add("control", bl.PulseGenerator(period=1.0, width=50.0, delay=0.25))
     climbing = builder.add("sub", subsystem, builder.add("one", bl.Constant()), control)
     builder.add("hits", bl.HitCrossing(offset=0.1), climbing)
-    found = ab.simulate(builder.build(), stop_time=4.0, sample_time=0.05)
-    since = found.time - np.floor(found.time + 0.75 + 1e-9) + 0.75
-    on = (since < 0.5 - 1e-9) & (found.time > 0.24)
-    np.testing.assert_allclose(found["sub/o"], np.where(on, np.minimum(since, 0.2), -1.0), atol=1e-9)
-    assert found["hits/count"][-1] == 2.0 * 4
+    result = ab.simulate(builder.build(), stop_time=4.0, sample_time=0.05)
+    since = result.time - np.floor(result.time + 0.75 + 1e-9) + 0.75
+    on = (since < 0.5 - 1e-9) & (result.time > 0.24)
+    np.testing.assert_allclose(result["sub/o"], np.where(on, np.minimum(since, 0.2), -1.0), atol=1e-9)
+    assert result["hits/count"][-1] == 2.0 * 4
 
 
 @pytest.mark.parametrize("settings", RUNS, ids=lambda run: run["solver"])
@@ -150,9 +150,11 @@ def test_a_rate_limiter_that_is_reset_rises_again(settings: dict[str, Any]) -> N
     reset = builder.add("reset", bl.PulseGenerator(period=1.0, width=50.0, delay=0.25))
     limited = bl.ResettableSubsystem(diagram=inside(bl.RateLimiterContinuous()), edge="rising")
     builder.add("sub", limited, builder.add("level", bl.Constant(value=0.3)), reset)
-    found = ab.simulate(builder.build(), stop_time=3.0, sample_time=0.05, **settings)
-    since = np.where(found.time < 0.249, found.time, found.time - np.floor(found.time + 0.75 + 1e-9) + 0.75)
-    np.testing.assert_allclose(found["sub/o"], np.minimum(since, 0.3), atol=1e-9)
+    result = ab.simulate(builder.build(), stop_time=3.0, sample_time=0.05, **settings)
+    since = np.where(
+        result.time < 0.249, result.time, result.time - np.floor(result.time + 0.75 + 1e-9) + 0.75
+    )
+    np.testing.assert_allclose(result["sub/o"], np.minimum(since, 0.3), atol=1e-9)
 
 
 def test_events_in_a_disabled_subsystem_do_not_change_the_result() -> None:

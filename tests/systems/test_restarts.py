@@ -138,14 +138,14 @@ def test_a_subsystem_continues_after_a_reset_as_at_the_start_of_a_run(kind: str,
         b.build(), stop_time=PERIODS - 1.0 / SAMPLES, sample_time=1.0 / SAMPLES, rtol=1e-9, atol=1e-12
     )
     compared = SAMPLES if kind == "reset" else SAMPLES // 2
-    seen = 0
+    changes = 0
     for name in result.names:
         if name.startswith("sub/") and not name.endswith("/last"):
             course = np.asarray(result[name], dtype=np.float64).reshape(PERIODS, SAMPLES)[:, :compared]
             later = np.broadcast_to(course[0], course.shape)
             np.testing.assert_allclose(course, later, rtol=0.0, atol=1e-6, err_msg=name)
-            seen += np.ptp(course) > 0.0
-    assert seen > 40
+            changes += np.ptp(course) > 0.0
+    assert changes > 40
 
 
 def test_guards_of_a_sampled_block_fire_after_the_tick_that_changes_its_states() -> None:

@@ -53,8 +53,8 @@ def test_the_model_of_the_paper_gives_its_published_numbers(kr180: Robot) -> Non
     }
     for t, position in reference.items():
         row = int(np.argmin(np.abs(result.time - t)))
-        found = [result[f"T2xyz/{axis}"][row] for axis in "xyz"]
-        assert found == pytest.approx(position, abs=1e-9)  # the paper prints twelve decimals
+        actual = [result[f"T2xyz/{axis}"][row] for axis in "xyz"]
+        assert actual == pytest.approx(position, abs=1e-9)  # the paper prints twelve decimals
         assert result["plot/poses"][row][-1][:3, 3] == pytest.approx(position, abs=1e-9)
     peaks = np.degrees(np.abs(result["speeds/u"]).max(axis=0))
     assert peaks == pytest.approx([33.73, 0, 16.87, 0], abs=5e-3)  # the paper prints two decimals
@@ -63,10 +63,10 @@ def test_the_model_of_the_paper_gives_its_published_numbers(kr180: Robot) -> Non
 
 def test_friction_is_zero_while_the_robot_is_at_rest(kr180: Robot) -> None:
     result = run(figure_9(kr180), 10.0)
-    still = run(figure_9(kr180.nofriction()), 10.0)
+    without_friction = run(figure_9(kr180.nofriction()), 10.0)
     for row in (0, -1):
-        assert np.array_equal(result["torques/u"][row], still["torques/u"][row])
-    assert not np.array_equal(result["torques/u"][50], still["torques/u"][50])
+        assert np.array_equal(result["torques/u"][row], without_friction["torques/u"][row])
+    assert not np.array_equal(result["torques/u"][50], without_friction["torques/u"][50])
 
 
 def pendulum() -> Robot:

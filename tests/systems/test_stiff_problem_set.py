@@ -116,7 +116,7 @@ def pollution() -> tuple[str, ...]:
         "-21-22-24+23+25",
         "-25+24",
     )
-    terms = [f"({k!r}*" + "*".join(f"u[{j}]" for j in who) + ")" for k, who in zip(rates, of)]
+    terms = [f"({k!r}*" + "*".join(f"u[{j}]" for j in species) + ")" for k, species in zip(rates, of)]
     return tuple(
         "".join(sign + terms[int(number) - 1] for sign, number in re.findall(r"([+-])(\d+)", row))
         for row in balance
@@ -171,8 +171,8 @@ def test_end_values_agree_with_the_published_ones(
 ) -> None:
     """The mixed error of the test set is a small multiple of rtol = 1e-7 after some hundred steps."""
     rtol = 1e-7
-    found = ab.simulate(diagram, stop_time=stop, rtol=rtol, atol=atol, solver=solver)
-    error = np.abs(found["y"][-1] - np.array(end)) / (atol / rtol + np.abs(end))
+    result = ab.simulate(diagram, stop_time=stop, rtol=rtol, atol=atol, solver=solver)
+    error = np.abs(result["y"][-1] - np.array(end)) / (atol / rtol + np.abs(end))
     assert error.max() < 10 * rtol
 
 
@@ -193,6 +193,6 @@ def test_e5_is_integrated_until_only_rounding_errors_remain() -> None:
     assert early == pytest.approx(E5_AT_10, rel=1e-8)
     # y2 = y3 + y4 holds exactly, but rates of 1e-7 1/s have rounding errors of 1e-23 1/s, integrated over
     # steps of hundreds of seconds: about 1e-21 of y2 remains, with SciPy's Radau and BDF as well.
-    late = ab.simulate(diagram, stop_time=1e13, **settings)["y"][-1]
-    assert np.abs(late).max() < 1e-19
-    assert abs(late[1] - late[2] - late[3]) < 1e-19
+    final = ab.simulate(diagram, stop_time=1e13, **settings)["y"][-1]
+    assert np.abs(final).max() < 1e-19
+    assert abs(final[1] - final[2] - final[3]) < 1e-19

@@ -70,9 +70,9 @@ def run(request: pytest.FixtureRequest) -> Run:
     return request.param
 
 
-def close(found: np.ndarray, expected: np.ndarray, tolerance: float = 5e-9) -> None:
+def close(actual: np.ndarray, expected: np.ndarray, tolerance: float = 5e-9) -> None:
     # rtol 1e-10 over a few hundred steps; RK4 with h = 0.01 s on sines: h^4/120 = 1e-10
-    assert found == pytest.approx(expected, abs=tolerance)
+    assert actual == pytest.approx(expected, abs=tolerance)
 
 
 def ball(rest_speed: float = 1e-6, height: float = 1.0, speed: float = 0.0, keeps: float = 0.7) -> Diagram:
@@ -90,16 +90,16 @@ def test_a_spring_and_mass_with_a_second_order_integrator(run: Run) -> None:
     builder = DiagramBuilder("d")
     mass = builder.add("mass", SecondOrderIntegrator(initial=1.0, initial_speed=2.0))
     builder.connect(builder.add("spring", Gain(gain=-4.0), mass["x"]), mass["u"])
-    found = run(builder.build(), 10.0)
-    close(found["mass/x"], np.cos(2 * found["t"]) + np.sin(2 * found["t"]), 2e-7)
-    close(found["mass/dx"], 2 * np.cos(2 * found["t"]) - 2 * np.sin(2 * found["t"]), 4e-7)
+    result = run(builder.build(), 10.0)
+    close(result["mass/x"], np.cos(2 * result["t"]) + np.sin(2 * result["t"]), 2e-7)
+    close(result["mass/dx"], 2 * np.cos(2 * result["t"]) - 2 * np.sin(2 * result["t"]), 4e-7)
 
 
 @NATIVE
 def test_a_ball_bounces_and_comes_to_rest_while_the_run_continues(run: Run) -> None:
     """The bounces end at t1 (1 + e) / (1 - e); below the rest speed the ball is exactly at rest."""
-    found = run(ball(), 4.0)
-    t, first = found["t"], math.sqrt(2 / 9.81)
+    result = run(ball(), 4.0)
+    t, first = result["t"], math.sqrt(2 / 9.81)
     starts, speed, start = [], 9.81 * first, first
     while start < 4.0 and speed * 0.7 > 1e-6:
         speed *= 0.7
@@ -110,11 +110,11 @@ def test_a_ball_bounces_and_comes_to_rest_while_the_run_continues(run: Run) -> N
     for begins, v in starts:
         within = (t >= begins) & (t < begins + 2 * v / 9.81)
         expected = np.where(within, v * (t - begins) - 9.81 * (t - begins) ** 2 / 2, expected)
-    close(found["ball/x"], expected, 1e-8)
+    close(result["ball/x"], expected, 1e-8)
     rests = t > start + 1e-9
     assert rests.sum() > 30
-    assert not found["ball/x"][rests].any()
-    assert not found["ball/dx"][rests].any()
+    assert not result["ball/x"][rests].any()
+    assert not result["ball/dx"][rests].any()
 
 
 @NATIVE
@@ -123,14 +123,14 @@ def test_a_mass_at_rest_on_its_limit_is_accelerated_away(run: Run) -> None:
     motion = SecondOrderIntegratorLimited(initial=0.5, lower=0.0)
     push = builder.add("push", Step(time=1.0, initial=-1.0, final=2.0))
     builder.add("mass", motion, push)
-    found = run(builder.build(), 3.0)
-    t = found["t"]
-    close(found["mass/x"], np.where(t < 1.0, 0.5 - t**2 / 2, (t - 1.0) ** 2), 1e-9)
+    result = run(builder.build(), 3.0)
+    t = result["t"]
+    close(result["mass/x"], np.where(t < 1.0, 0.5 - t**2 / 2, (t - 1.0) ** 2), 1e-9)
     builder = DiagramBuilder("d")
     builder.add("mass", motion, builder.add("push", Step(time=2.0, initial=-1.0, final=2.0)))
-    found = run(builder.build(), 3.0)
-    t = found["t"]
-    close(found["mass/x"], np.where(t < 1.0, 0.5 - t**2 / 2, np.clip(t - 2.0, 0, None) ** 2), 1e-9)
+    result = run(builder.build(), 3.0)
+    t = result["t"]
+    close(result["mass/x"], np.where(t < 1.0, 0.5 - t**2 / 2, np.clip(t - 2.0, 0, None) ** 2), 1e-9)
 
 
 def test_speed_and_position_have_limits(run: Run) -> None:
@@ -138,12 +138,12 @@ def test_speed_and_position_have_limits(run: Run) -> None:
     builder = DiagramBuilder("d")
     mass = SecondOrderIntegratorLimited(upper=2.0, lower=-10.0, upper_speed=1.0, lower_speed=-0.5)
     builder.add("mass", mass, builder.add("u", Step(time=4.0, initial=1.0, final=-1.0)))
-    found = run(builder.build(), 6.0)
-    t = found["t"]
+    result = run(builder.build(), 6.0)
+    t = result["t"]
     rise = np.select([t < 1, t < 2.5, t < 4, t < 4.5], [t**2 / 2, t - 0.5, 2.0, 2 - (t - 4) ** 2 / 2])
-    close(found["mass/x"], np.where(t < 4.5, rise, 1.875 - 0.5 * (t - 4.5)), 1e-9)
+    close(result["mass/x"], np.where(t < 4.5, rise, 1.875 - 0.5 * (t - 4.5)), 1e-9)
     speed = np.select([t < 1, t < 2.5, t < 4, t < 4.5], [t, 1.0, 0.0, 4.0 - t], -0.5)
-    assert found["mass/dx"][(abs(t - 2.5) > 0.01)] == pytest.approx(speed[abs(t - 2.5) > 0.01], abs=1e-9)
+    assert result["mass/dx"][(abs(t - 2.5) > 0.01)] == pytest.approx(speed[abs(t - 2.5) > 0.01], abs=1e-9)
 
 
 def test_limits_of_the_speed_must_include_zero_if_the_position_is_limited() -> None:
@@ -165,20 +165,20 @@ def test_an_integrator_with_variable_limits(run: Run) -> None:
         upper = builder.add("upper", Sum(signs="++"), builder.add("two", Constant(value=2.0)), falling)
         lower = builder.add("lower", Constant(value=-5.0))
         builder.add("integral", Integrator(), builder.add(name, kind(), upper, t, lower))
-        found = run(builder.build(), 5.0)
-        time, meets = found["t"], 4.0 / 3.0
+        result = run(builder.build(), 5.0)
+        time, meets = result["t"], 4.0 / 3.0
         after = np.clip(time - meets, 0.0, None)
         held = np.minimum(time, meets) ** 2 / 2 + meets * after - after**2 / 4
         expected = held if kind is SaturationDynamic else time**2 / 2 - held
-        close(found["integral/y"], expected, 1e-10)
+        close(result["integral/y"], expected, 1e-10)
 
 
 def test_a_ramp_wraps_to_zero(run: Run) -> None:
     builder = DiagramBuilder("d")
     wrapped = builder.add("wrapped", WrapToZero(threshold=2.0), builder.add("t", Clock()))
     builder.add("integral", Integrator(), wrapped)
-    found = run(builder.build(), 5.0)
-    close(found["integral/y"], np.minimum(found["t"], 2.0) ** 2 / 2, 1e-11)
+    result = run(builder.build(), 5.0)
+    close(result["integral/y"], np.minimum(result["t"], 2.0) ** 2 / 2, 1e-11)
 
 
 def test_crossings_are_counted_and_timed(run: Run) -> None:
@@ -186,10 +186,10 @@ def test_crossings_are_counted_and_timed(run: Run) -> None:
         builder = DiagramBuilder("d")
         builder.add("hits", HitCrossing(offset=0.5, direction=direction), builder.add("u", SineWave()))
         builder.add("keeps the steps short", Integrator(), builder.add("v", SineWave()))
-        found = run(builder.build(), 6 * math.pi)
-        assert found["hits/count"][-1] == expected
+        result = run(builder.build(), 6 * math.pi)
+        assert result["hits/count"][-1] == expected
         last = 4 * math.pi + (math.pi / 6 if direction == "rising" else 5 * math.pi / 6)
-        assert found["hits/last"][-1] == pytest.approx(last, abs=1e-9)
+        assert result["hits/last"][-1] == pytest.approx(last, abs=1e-9)
 
 
 def test_a_sine_whose_rate_is_limited(run: Run) -> None:
@@ -199,7 +199,7 @@ def test_a_sine_whose_rate_is_limited(run: Run) -> None:
         "limited", RateLimiterContinuous(rising=0.5, falling=-0.5), builder.add("u", SineWave())
     )
     builder.add("integral", Integrator(), limited)
-    found = run(builder.build(), 6.0)
+    result = run(builder.build(), 6.0)
 
     def meets(start: float, value: float, rate: float, guess: float) -> float:
         for _ in range(60):
@@ -210,21 +210,21 @@ def test_a_sine_whose_rate_is_limited(run: Run) -> None:
     up = meets(0.0, 0.0, 0.5, 1.9)
     leaves = 2 * math.pi / 3  # cos = -0.5
     down = meets(leaves, math.sin(leaves), -0.5, 5.0)
-    t = found["t"]
+    t = result["t"]
     expected = np.select(
         [t < up, t < leaves, t < down], [0.5 * t, np.sin(t), math.sin(leaves) - 0.5 * (t - leaves)], np.sin(t)
     )
     # after it reaches sin t at `down`, sin t rises faster than 0.5: limited to 0.5 again
     value = math.sin(down)
     after = np.minimum(np.sin(t), value + 0.5 * (t - down)) if math.cos(down) > 0.5 else np.sin(t)
-    close(found["limited/y"], np.where(t < down, expected, after), 2e-6)
+    close(result["limited/y"], np.where(t < down, expected, after), 2e-6)
 
 
 def test_a_jump_becomes_a_ramp(run: Run) -> None:
     builder = DiagramBuilder("d")
     builder.add("limited", RateLimiterContinuous(rising=2.0), builder.add("u", Step(time=1.0, final=3.0)))
-    found = run(builder.build(), 4.0)
-    close(found["limited/y"], np.clip(2.0 * (found["t"] - 1.0), 0.0, 3.0), 1e-9)
+    result = run(builder.build(), 4.0)
+    close(result["limited/y"], np.clip(2.0 * (result["t"] - 1.0), 0.0, 3.0), 1e-9)
 
 
 def test_constant_limit_signals_agree_with_limit_parameters(run: Run) -> None:
@@ -233,8 +233,8 @@ def test_constant_limit_signals_agree_with_limit_parameters(run: Run) -> None:
     builder.add("fixed", RateLimiterContinuous(rising=0.5, falling=-0.3), u)
     rising, falling = builder.add("r", Constant(value=0.5)), builder.add("f", Constant(value=-0.3))
     builder.add("moving", RateLimiterDynamic(), rising, u, falling)
-    found = run(builder.build(), 6.0)
-    close(found["moving/y"], found["fixed/y"], 1e-9)
+    result = run(builder.build(), 6.0)
+    close(result["moving/y"], result["fixed/y"], 1e-9)
 
 
 def test_a_rate_limit_that_falls_below_the_rate_of_the_input_takes_effect(run: Run) -> None:
@@ -246,9 +246,9 @@ def test_a_rate_limit_that_falls_below_the_rate_of_the_input_takes_effect(run: R
     builder.add(
         "y", RateLimiterDynamic(), rising, builder.add("u", Clock()), builder.add("f", Constant(value=-1.0))
     )
-    found = run(builder.build(), 2.5)
-    t = found["t"]
-    close(found["y/y"], np.where(t < 1.0, t, 1.0 + (0.5 - (2.0 - t) ** 2 / 2)), 1e-8)
+    result = run(builder.build(), 2.5)
+    t = result["t"]
+    close(result["y/y"], np.where(t < 1.0, t, 1.0 + (0.5 - (2.0 - t) ** 2 / 2)), 1e-8)
 
 
 def test_after_a_jump_the_output_rises_with_a_growing_rate_limit(run: Run) -> None:
@@ -256,9 +256,9 @@ def test_after_a_jump_the_output_rises_with_a_growing_rate_limit(run: Run) -> No
     builder = DiagramBuilder("d")
     jump, clock = builder.add("u", Step(time=1.0, final=2.0)), builder.add("t", Clock())
     builder.add("y", RateLimiterDynamic(), clock, jump, builder.add("f", Constant(value=-1.0)))
-    found = run(builder.build(), 4.0)
-    t = found["t"]
-    close(found["y/y"], np.select([t < 1.0, t < math.sqrt(5.0)], [0.0 * t, (t**2 - 1.0) / 2], 2.0), 1e-8)
+    result = run(builder.build(), 4.0)
+    t = result["t"]
+    close(result["y/y"], np.select([t < 1.0, t < math.sqrt(5.0)], [0.0 * t, (t**2 - 1.0) / 2], 2.0), 1e-8)
 
 
 # -- sampled logic -----------------------------------------------------------------------------------------
@@ -299,19 +299,19 @@ def test_edges(edge: str, expected: list[float]) -> None:
 
 def test_flip_flops() -> None:
     S, R = [0, 1, 0, 0, 1, 0, 0], [0, 0, 0, 1, 1, 0, 0]
-    found = at_ticks(SRFlipFlop(sample_time=1.0), S, R)
-    assert found["Q"] == [0, 1, 1, 0, 0, 0, 0]
-    assert found["not_Q"] == [1, 0, 0, 1, 0, 1, 1]
+    result = at_ticks(SRFlipFlop(sample_time=1.0), S, R)
+    assert result["Q"] == [0, 1, 1, 0, 0, 0, 0]
+    assert result["not_Q"] == [1, 0, 0, 1, 0, 1, 1]
     D, clock = [3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0], [0, 1, 1, 0, 1, 0, 1]
-    found = at_ticks(DFlipFlop(sample_time=1.0), D, clock)
-    assert found["Q"] == [0, 4, 4, 4, 7, 7, 9]
-    assert found["not_Q"] == [1, 0, 0, 0, 0, 0, 0]
+    result = at_ticks(DFlipFlop(sample_time=1.0), D, clock)
+    assert result["Q"] == [0, 4, 4, 4, 7, 7, 9]
+    assert result["not_Q"] == [1, 0, 0, 0, 0, 0, 0]
     assert at_ticks(DFlipFlop(sample_time=1.0, trigger="level"), D, clock)["Q"] == [0, 4, 5, 5, 7, 7, 9]
     J, K = [1, 1, 0, 0, 1, 1, 1, 1], [0, 0, 1, 1, 1, 1, 1, 1]
     pulses = [1, 0, 1, 0, 1, 0, 1, 0]
-    found = at_ticks(JKFlipFlop(sample_time=1.0), J, pulses, K)
-    assert found["Q"] == [0, 1, 1, 0, 0, 1, 1, 0]
-    assert found["not_Q"] == [1, 0, 0, 1, 1, 0, 0, 1]
+    result = at_ticks(JKFlipFlop(sample_time=1.0), J, pulses, K)
+    assert result["Q"] == [0, 1, 1, 0, 0, 1, 1, 0]
+    assert result["not_Q"] == [1, 0, 0, 1, 1, 0, 0, 1]
 
 
 def test_counters_and_running_extremes() -> None:

@@ -107,9 +107,9 @@ def all_behind(blocks: Mapping[str, Block], *sources: Block) -> Diagram:
     return builder.build()
 
 
-def close(found: np.ndarray, expected: np.ndarray, tolerance: float = 5e-9) -> None:
+def close(actual: np.ndarray, expected: np.ndarray, tolerance: float = 5e-9) -> None:
     # rtol 1e-10 over a few hundred steps; RK4 with h = 0.01 s on sines: h^4/120 = 1e-10
-    assert found == pytest.approx(expected, abs=tolerance)
+    assert actual == pytest.approx(expected, abs=tolerance)
 
 
 def time_above(level: float, t: np.ndarray) -> np.ndarray:
@@ -126,17 +126,17 @@ def time_above(level: float, t: np.ndarray) -> np.ndarray:
 
 
 def test_the_absolute_value_of_a_sine(run: Run) -> None:
-    found = run(behind(Abs(), SineWave(amplitude=2.0)), 10.0)
-    whole = np.floor(found["t"] / math.pi)
-    close(found["integral/y"], 4.0 * whole + 2.0 * (1.0 - np.cos(found["t"] - math.pi * whole)), 2e-8)
+    result = run(behind(Abs(), SineWave(amplitude=2.0)), 10.0)
+    whole = np.floor(result["t"] / math.pi)
+    close(result["integral/y"], 4.0 * whole + 2.0 * (1.0 - np.cos(result["t"] - math.pi * whole)), 2e-8)
 
 
 def test_the_derivative_of_an_absolute_value_jumps_only_at_events(run: Run) -> None:
     builder = DiagramBuilder("d")
     absolute = builder.add("abs", Abs(), builder.add("sine", SineWave()))
     builder.add("integral", Integrator(), builder.add("rate", Derivative(), absolute))
-    found = run(builder.build(), 10.0)
-    close(found["integral/y"], np.abs(np.sin(found["t"])))
+    result = run(builder.build(), 10.0)
+    close(result["integral/y"], np.abs(np.sin(result["t"])))
 
 
 def test_the_durations_of_comparisons_are_exact(run: Run) -> None:
@@ -147,11 +147,11 @@ def test_the_durations_of_comparisons_are_exact(run: Run) -> None:
         for level in (0.3, -0.6)
     }
     blocks = {key: CompareToConstant(relation=relation, constant=c) for key, (relation, c) in cases.items()}
-    found = run(all_behind(blocks, SineWave()), 10.0)
+    result = run(all_behind(blocks, SineWave()), 10.0)
     for key, (relation, level) in cases.items():
-        above, t = time_above(level, found["t"]), found["t"]
+        above, t = time_above(level, result["t"]), result["t"]
         expected = {1.0: above, 0.0: t - above, None: 0.0 * t, 2.0: t}[parts[relation]]
-        close(found[f"integral {key}/y"], expected, 1e-9)
+        close(result[f"integral {key}/y"], expected, 1e-9)
 
 
 def test_the_maximum_of_equal_signals_is_correct_until_one_changes(run: Run) -> None:
@@ -160,20 +160,20 @@ def test_the_maximum_of_equal_signals_is_correct_until_one_changes(run: Run) -> 
     one = builder.add("one", Constant(value=1.0))
     most = builder.add("most", MinMax(function="max"), builder.add("clock", Clock()), one)
     builder.add("integral", Integrator(), builder.add("equal", RelationalOperator(relation="=="), most, one))
-    found = run(builder.build(), 2.0)
-    close(found["integral/y"], np.minimum(found["t"], 1.0), 1e-12)
+    result = run(builder.build(), 2.0)
+    close(result["integral/y"], np.minimum(result["t"], 1.0), 1e-12)
 
 
 def test_a_sign_and_an_interval(run: Run) -> None:
-    found = run(all_behind({"1": Sign(), "2": IntervalTest(lower=-0.6, upper=0.3)}, SineWave()), 10.0)
-    triangle = math.pi / 2 - np.abs(np.mod(found["t"], 2 * math.pi) - math.pi) + math.pi / 2
-    close(found["integral 1/y"], triangle, 1e-9)
-    close(found["integral 2/y"], time_above(-0.6, found["t"]) - time_above(0.3, found["t"]), 1e-9)
+    result = run(all_behind({"1": Sign(), "2": IntervalTest(lower=-0.6, upper=0.3)}, SineWave()), 10.0)
+    triangle = math.pi / 2 - np.abs(np.mod(result["t"], 2 * math.pi) - math.pi) + math.pi / 2
+    close(result["integral 1/y"], triangle, 1e-9)
+    close(result["integral 2/y"], time_above(-0.6, result["t"]) - time_above(0.3, result["t"]), 1e-9)
 
 
 def test_the_greater_of_sine_and_cosine(run: Run) -> None:
     cosine = SineWave(phase=math.pi / 2)
-    found = run(behind(MinMax(function="max"), SineWave(), cosine), 10.0)
+    result = run(behind(MinMax(function="max"), SineWave(), cosine), 10.0)
 
     def integral(t: float) -> float:
         edges = [0.0, *[e for e in (math.pi / 4, 5 * math.pi / 4, 9 * math.pi / 4) if e < t], t]
@@ -182,7 +182,7 @@ def test_the_greater_of_sine_and_cosine(run: Run) -> None:
             total += math.sin(b) - math.sin(a) if k % 2 == 0 else math.cos(a) - math.cos(b)
         return total
 
-    close(found["integral/y"], np.array([integral(t) for t in found["t"]]))
+    close(result["integral/y"], np.array([integral(t) for t in result["t"]]))
 
 
 def test_the_index_of_the_greatest_element(run: Run) -> None:
@@ -191,22 +191,22 @@ def test_the_index_of_the_greatest_element(run: Run) -> None:
     three = builder.add("three", Mux(inputs=3), *parts)
     greatest = builder.add("greatest", Extremum(function="max"), three)
     builder.add("integral", Integrator(), greatest["index"])
-    found = run(builder.build(), 2 * math.pi)
+    result = run(builder.build(), 2 * math.pi)
     # element 1 is greatest around pi/2, 2 around 7 pi/6, 3 around 11 pi/6, each for a third of the period
-    t, third = found["t"], 2 * math.pi / 3
+    t, third = result["t"], 2 * math.pi / 3
     first = math.pi / 6
     expected = (
         3 * np.minimum(t, first) + np.clip(t - first, 0, third) + 2 * np.clip(t - first - third, 0, third)
     )
-    close(found["integral/y"], expected + 3 * np.clip(t - first - 2 * third, 0, None), 1e-9)
+    close(result["integral/y"], expected + 3 * np.clip(t - first - 2 * third, 0, None), 1e-9)
 
 
 def test_a_growing_index_selects_the_inputs_of_a_multiport_switch(run: Run) -> None:
     values = [Constant(value=float(value)) for value in (5.0, -1.0, 2.0)]
-    found = run(behind(MultiportSwitch(), Clock(), *values), 5.0)
-    t = found["t"]
+    result = run(behind(MultiportSwitch(), Clock(), *values), 5.0)
+    t = result["t"]
     close(
-        found["integral/y"], 5 * np.minimum(t, 2) - np.clip(t - 2, 0, 1) + 2 * np.clip(t - 3, 0, None), 1e-11
+        result["integral/y"], 5 * np.minimum(t, 2) - np.clip(t - 2, 0, 1) + 2 * np.clip(t - 3, 0, None), 1e-11
     )
 
 
@@ -214,8 +214,8 @@ def test_roundings_of_a_sine(run: Run) -> None:
     """A rounded sine is a sum of comparisons, whose integrals are known."""
     functions = ("floor", "ceil", "round", "fix")
     blocks = {function: Rounding(function=function) for function in functions}
-    found = run(all_behind(blocks, SineWave(amplitude=2.5)), 10.0)
-    t = found["t"]
+    result = run(all_behind(blocks, SineWave(amplitude=2.5)), 10.0)
+    t = result["t"]
 
     def above(level: float) -> np.ndarray:
         return time_above(level / 2.5, t)
@@ -230,18 +230,18 @@ def test_roundings_of_a_sine(run: Run) -> None:
         "fix": above(1) + above(2) - below(-1) - below(-2),
     }
     for function in functions:
-        close(found[f"integral {function}/y"], expected[function], 2e-9)
+        close(result[f"integral {function}/y"], expected[function], 2e-9)
 
 
 def test_remainders_of_a_sine(run: Run) -> None:
     """The remainder is u - n v; the quotient n is a sum of comparisons, whose integrals are known."""
     for function, divisors in (("mod", (1.0, -0.7)), ("rem", (0.7, -1.0))):
-        found = run(
+        result = run(
             behind(Modulo(function=function), SineWave(amplitude=2.5), Constant(value=divisors)), 10.0
         )
         for k, divisor in enumerate(divisors):
-            integral = remainder_integral(function, divisor, found["t"])
-            close(found["integral/y"][:, k], integral, 1.5e-8)  # an amplitude of 2.5
+            integral = remainder_integral(function, divisor, result["t"])
+            close(result["integral/y"][:, k], integral, 1.5e-8)  # an amplitude of 2.5
 
 
 def remainder_integral(function: str, divisor: float, t: np.ndarray) -> np.ndarray:
@@ -260,10 +260,10 @@ def remainder_integral(function: str, divisor: float, t: np.ndarray) -> np.ndarr
 
 def test_the_difference_of_rotating_angles_jumps_when_they_are_opposite(run: Run) -> None:
     """3 t - 1, wrapped to a sawtooth between -pi and pi; its integral consists of parabolas."""
-    found = run(behind(AngleDifference(), Ramp(slope=3.0), Constant(value=1.0)), 10.0)
-    angle = 3 * found["t"] - 1
+    result = run(behind(AngleDifference(), Ramp(slope=3.0), Constant(value=1.0)), 10.0)
+    angle = 3 * result["t"] - 1
     wrapped = np.mod(angle + math.pi, 2 * math.pi) - math.pi
-    close(found["integral/y"], (wrapped**2 - 1) / 6, 1e-9)
+    close(result["integral/y"], (wrapped**2 - 1) / 6, 1e-9)
 
 
 METHODS = ("linear", "nearest", "flat")
@@ -280,8 +280,8 @@ def test_steps_end_at_every_cell_boundary_of_a_surface(count: int, run: Run) -> 
     surface = LookupTable2D(positions1=axes[0], positions2=axes[1], table=table)
     blocks = {method: surface.with_parameters(method=method) for method in METHODS}
     ramps = (Ramp(initial=a, slope=b) for a, b in zip(starts, slopes))
-    found = run(all_behind(blocks, *ramps), 4.0)
-    t = found["t"]
+    result = run(all_behind(blocks, *ramps), 4.0)
+    t = result["t"]
 
     def value(method: str, times: np.ndarray) -> np.ndarray:
         u = [np.clip(a + b * times, x[0], x[-1]) for a, b, x in zip(starts, slopes, axes)]
@@ -300,7 +300,7 @@ def test_steps_end_at_every_cell_boundary_of_a_surface(count: int, run: Run) -> 
         for node, weight in zip(nodes, weights):
             pieces += weight * h * value(method, middle + node * h)
         area = np.concatenate([[0.0], np.cumsum(pieces)])
-        close(found[f"integral {method}/y"], np.interp(t, fine, area), 1e-9)
+        close(result[f"integral {method}/y"], np.interp(t, fine, area), 1e-9)
 
 
 @pytest.mark.parametrize("count", [4, 40])
@@ -314,16 +314,16 @@ def test_the_index_of_a_prelookup_changes_at_events(count: int, run: Run) -> Non
         place = builder.add(extrapolation, Prelookup(positions=x, extrapolation=extrapolation), u)
         builder.add(f"k {extrapolation}", Integrator(), place["k"])
         builder.add(f"f {extrapolation}", Integrator(), place["f"])
-    found = run(builder.build(), 6.0)
-    t = found["t"]
+    result = run(builder.build(), 6.0)
+    t = result["t"]
     fine = np.unique(np.r_[t, x[x < 6.0]])
     middle, width = (fine[1:] + fine[:-1]) / 2, np.diff(fine)
     k = np.clip(np.searchsorted(x, middle) - 1, 0, count - 2)
     linear = (middle - x[k]) / (x[k + 1] - x[k])
     for extrapolation, f in (("clip", np.clip(linear, 0, 1)), ("linear", linear)):
-        close(found[f"k {extrapolation}/y"], np.maximum(t[:, None] - x[1:-1], 0).sum(axis=1), 1e-9)
+        close(result[f"k {extrapolation}/y"], np.maximum(t[:, None] - x[1:-1], 0).sum(axis=1), 1e-9)
         area = np.concatenate([[0.0], np.cumsum(f * width)])
-        close(found[f"f {extrapolation}/y"], np.interp(t, fine, area), 1e-9)
+        close(result[f"f {extrapolation}/y"], np.interp(t, fine, area), 1e-9)
 
 
 def test_the_kinks_of_a_curve_with_variable_points(run: Run) -> None:
@@ -338,14 +338,14 @@ def test_the_kinks_of_a_curve_with_variable_points(run: Run) -> None:
         builder.add("v", Constant(value=[0.0, 1.0])),
     )
     builder.add("integral", Integrator(), curve)
-    found = run(builder.build(), 6.0)
-    t = found["t"]
+    result = run(builder.build(), 6.0)
+    t = result["t"]
 
     def rising(s: np.ndarray) -> np.ndarray:  # integral of (s - 1) / (1 + s / 2) = 2 - 6 / (s + 2)
         return 2 * (s - 1) - 6 * np.log((s + 2) / 3)
 
     expected = np.select([t < 1, t < 4], [0 * t, rising(np.maximum(t, 1))], rising(np.array(4.0)) + t - 4)
-    close(found["integral/y"], expected, 2e-9)
+    close(result["integral/y"], expected, 2e-9)
 
 
 def test_the_kinks_and_steps_of_a_table(run: Run) -> None:
@@ -361,7 +361,7 @@ def test_the_kinks_and_steps_of_a_table(run: Run) -> None:
         block = table.with_parameters(method=method, extrapolation=extrapolation)
         read = builder.add(f"{method} {extrapolation}", block, shifted)
         builder.add(f"integral {method} {extrapolation}", Integrator(), read)
-    found = run(builder.build(), 5.0)
+    result = run(builder.build(), 5.0)
 
     def curve(u: float, method: str, extrapolation: str) -> float:
         if method == "flat":
@@ -384,8 +384,8 @@ def test_the_kinks_and_steps_of_a_table(run: Run) -> None:
         return total
 
     for case in cases:
-        wanted = np.array([integral(t - 1.0, *case) for t in found["t"]])
-        close(found[f"integral {' '.join(case)}/y"], wanted, 1e-10)
+        wanted = np.array([integral(t - 1.0, *case) for t in result["t"]])
+        close(result[f"integral {' '.join(case)}/y"], wanted, 1e-10)
 
 
 def test_the_limits_of_a_drive(run: Run) -> None:
@@ -394,11 +394,11 @@ def test_the_limits_of_a_drive(run: Run) -> None:
     speed = builder.add("w", Gain(gain=20.0), builder.add("t", Clock()))
     drive = builder.add("drive", MotorDrive(), builder.add("wanted", Constant(value=15.0)), speed)
     builder.add("integral", Integrator(), drive)
-    found = run(builder.build(), 9.0)
-    t = found["t"]
+    result = run(builder.build(), 9.0)
+    t = result["t"]
     falling = np.clip(t, 2.5, 7.5) - 2.5
     close(
-        found["integral/y"],
+        result["integral/y"],
         10 * np.minimum(t, 2.5) + 10 * falling - 2 * falling**2 - 10 * np.clip(t - 7.5, 0, None),
         1e-10,
     )
@@ -412,14 +412,14 @@ def test_a_mass_between_stops(run: Run) -> None:
     qd = builder.add("qd", Integrator(initial=1.0))
     builder.connect(qd, q["u"])
     builder.connect(builder.add("stops", stops, q, qd), qd["u"])
-    found = run(builder.build(), 3.6)
-    t, half = found["t"], math.pi / 10
+    result = run(builder.build(), 3.6)
+    t, half = result["t"], math.pi / 10
     inside = 1.0 + np.sin(10 * (t - 1.0)) / 10
     back = 1.0 - (t - 1.0 - half)
     final = -1.0 - np.sin(10 * (t - 3.0 - half)) / 10
     expected = np.select([t < 1, t < 1 + half, t < 3 + half], [t, inside, back], final)
     # RK4 with h = 0.01 s on a spring of 10 rad/s: (0.1)^4 / 120 of the amplitude 0.1 per radian
-    close(found["q/y"], expected, 2e-6)
+    close(result["q/y"], expected, 2e-6)
 
 
 def test_modes_of_a_chain_of_blocks_become_consistent(run: Run) -> None:
@@ -431,9 +431,9 @@ def test_modes_of_a_chain_of_blocks_become_consistent(run: Run) -> None:
     seven, one = builder.add("seven", Constant(value=7.0)), builder.add("one", Constant(value=1.0))
     out = builder.add("out", Switch(threshold=0.5), seven, large, one)
     builder.add("integral", Integrator(), builder.add("sign", Sign(), builder.add("abs", Abs(), out)))
-    found = run(builder.build(), 1.0)
-    assert found["out/y"].tolist() == [7.0] * (SAMPLES + 1)
-    close(found["integral/y"], found["t"], 1e-12)
+    result = run(builder.build(), 1.0)
+    assert result["out/y"].tolist() == [7.0] * (SAMPLES + 1)
+    close(result["integral/y"], result["t"], 1e-12)
 
 
 @pytest.mark.parametrize("run", [RUNS["adaptive"], RUNS["fixed"]], ids=["adaptive", "fixed"])
@@ -442,12 +442,12 @@ def test_a_square_root_of_an_absolute_value_is_integrated_across_its_zero(run: R
     builder = DiagramBuilder("d")
     root = builder.add("root", Sqrt(), builder.add("abs", Abs(), builder.add("sine", SineWave())))
     builder.add("integral", Integrator(), root)
-    found = run(builder.build(), 4.0)
-    assert np.isfinite(found["integral/y"]).all()
+    result = run(builder.build(), 4.0)
+    assert np.isfinite(result["integral/y"]).all()
     # Beta function: the integral of sqrt(sin) over half a period; its derivative is infinite at the ends
     half = math.gamma(0.75) * math.sqrt(math.pi) / math.gamma(1.25)
-    at = np.searchsorted(found["t"], math.pi)
-    assert found["integral/y"][at] == pytest.approx(half, abs=5e-3)
+    at = np.searchsorted(result["t"], math.pi)
+    assert result["integral/y"][at] == pytest.approx(half, abs=5e-3)
 
 
 def test_without_zero_crossings_there_are_no_events() -> None:
@@ -476,10 +476,10 @@ def test_a_sample_at_an_event_has_the_new_value(run: Run) -> None:
     for k, level in enumerate((0.5, 1.0, 1.5)):
         builder.add(f"c{k}", CompareToConstant(relation=">=", constant=level), t)
     builder.add("whole", Rounding(), t)
-    found = run(builder.build(), 2.0)
+    result = run(builder.build(), 2.0)
     for k, level in enumerate((0.5, 1.0, 1.5)):
-        assert found[f"c{k}/y"].tolist() == (found["t"] >= level).tolist()
-    assert found["whole/y"].tolist() == np.floor(found["t"]).tolist()
+        assert result[f"c{k}/y"].tolist() == (result["t"] >= level).tolist()
+    assert result["whole/y"].tolist() == np.floor(result["t"]).tolist()
 
 
 @pytest.mark.parametrize("run", [RUNS["adaptive"], RUNS["fixed"]], ids=["adaptive", "fixed"])
@@ -490,9 +490,9 @@ def test_a_tank_that_empties_through_a_hole(run: Run) -> None:
     zero = builder.add("zero", Constant(value=0.0))
     positive = builder.add("positive", MinMax(function="max"), level, zero)
     builder.connect(builder.add("out", Gain(gain=-2.0), builder.add("root", Sqrt(), positive)), level["u"])
-    found = run(builder.build(), 2.0)
+    result = run(builder.build(), 2.0)
     # the derivative of the root is unbounded towards the end
-    close(found["level/y"], np.clip(1.0 - found["t"], 0.0, None) ** 2, 1e-5)
+    close(result["level/y"], np.clip(1.0 - result["t"], 0.0, None) ** 2, 1e-5)
 
 
 def test_a_dip_that_is_shorter_than_a_step_is_detected() -> None:
