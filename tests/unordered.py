@@ -8,13 +8,13 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 
-def matched(actual: Any, wanted: Any, tolerance: float = 1e-8) -> bool:
-    """Return whether both have the same numbers in any order, each within ``tolerance * max(1, |wanted|)``.
+def matched(actual: Any, expected: Any, tolerance: float = 1e-8) -> bool:
+    """Return whether both have the same numbers in any order, each within ``tolerance * max(1, |expected|)``.
 
     The numbers are paired such that the sum of distances is least. Sorting is not enough: where two real
     parts are equal up to rounding, the last bits of LAPACK's result decide the order.
     """
-    left, right = (np.ravel(np.asarray(values, dtype=np.complex128)) for values in (actual, wanted))
+    left, right = (np.ravel(np.asarray(values, dtype=np.complex128)) for values in (actual, expected))
     if left.size != right.size:
         return False
     apart = np.abs(left[:, None] - right[None, :])

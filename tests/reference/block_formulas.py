@@ -72,9 +72,9 @@ def _switch(block: Any, u: Inputs, t: np.ndarray) -> np.ndarray:
 
 def _multiport(block: Any, u: Inputs, t: np.ndarray) -> np.ndarray:
     index, *candidates = u.values()
-    place = np.trunc(index) - (0.0 if block.counting == "zero-based" else 1.0)
-    place = np.clip(place, 0, len(candidates) - 1)
-    return np.choose(place.astype(int), np.broadcast_arrays(index, *candidates)[1:])
+    element = np.trunc(index) - (0.0 if block.counting == "zero-based" else 1.0)
+    element = np.clip(element, 0, len(candidates) - 1)
+    return np.choose(element.astype(int), np.broadcast_arrays(index, *candidates)[1:])
 
 
 def _table(block: Any, u: Inputs, t: np.ndarray) -> np.ndarray:
@@ -125,10 +125,10 @@ def _gate(block: Any, u: Inputs, t: np.ndarray) -> np.ndarray:
     names = {"AND": np.all, "NAND": np.all, "OR": np.any, "NOR": np.any}
     stacked = np.stack(np.broadcast_arrays(*values))
     if block.operator in names:
-        found = names[block.operator](stacked, axis=0)
+        result = names[block.operator](stacked, axis=0)
     else:
-        found = stacked.sum(axis=0) % 2 == 1
-    return ~found if block.operator in ("NAND", "NOR", "NXOR") else found
+        result = stacked.sum(axis=0) % 2 == 1
+    return ~result if block.operator in ("NAND", "NOR", "NXOR") else result
 
 
 FORMULAS: Mapping[str, Formula] = {
@@ -169,7 +169,7 @@ def broken_formulas(diagram: Diagram, actual: Any, t: np.ndarray) -> dict[str, t
     """Return by block the first row that contradicts its formula, the output, and the required output.
 
     ``actual`` gives signals (N, *shape) by path, at the times ``t`` (N,). Blocks inside conditional
-    subsystems are skipped: their outputs are undefined while the subsystem is off. """
+    subsystems are skipped: their outputs are undefined while the subsystem is off."""
     flat = flat_diagram(diagram)
     broken: dict[str, tuple[int, float, float]] = {}
     for name, block in flat.blocks.items():
@@ -179,9 +179,9 @@ def broken_formulas(diagram: Diagram, actual: Any, t: np.ndarray) -> dict[str, t
             continue
         inputs = {port.name: _array(actual[f"{name}/{port.name}"]) for port in block.input_ports()}
         y = _array(actual[f"{name}/y"])
-        wrong = contradictions(FORMULAS[kind], block, inputs, _array(t), y)
-        if wrong is not None:
-            broken[name] = wrong
+        contradiction = contradictions(FORMULAS[kind], block, inputs, _array(t), y)
+        if contradiction is not None:
+            broken[name] = contradiction
     return broken
 
 
@@ -197,18 +197,22 @@ def contradictions(
     def fits(moves: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
         moved = {k: v + move * (1.0 + np.abs(v)) for (k, v), move in zip(wide.items(), moves)}
         with np.errstate(all="ignore"):
-            wanted = np.broadcast_to(_array(formula(block, moved, t)), y.shape)
-        return (np.abs(y - wanted) <= 4 * BORDER * size) | ~np.isfinite(wanted), wanted
+            expected = np.broadcast_to(_array(formula(block, moved, t)), y.shape)
+        return (np.abs(y - expected) <= 4 * BORDER * size) | ~np.isfinite(expected), expected
 
-    exact, wanted = fits((0.0,) * len(wide))
+    exact, expected = fits((0.0,) * len(wide))
     near = exact.copy()
     for moves in itertools.product((0.0, BORDER, -BORDER), repeat=len(wide)):
         near |= fits(moves)[0]
     # A switching time may be located slightly late, which affects one row; longer deviations are errors.
-    wrong = np.pad(~exact, [(2, 2)] + [(0, 0)] * (rank - 1))
+    deviating = np.pad(~exact, [(2, 2)] + [(0, 0)] * (rank - 1))
     n = len(y)
     stays = np.any(
-        [wrong[k : k + n] & wrong[k + 1 : k + n + 1] & wrong[k + 2 : k + n + 2] for k in range(3)], axis=0
+        [
+            deviating[k : k + n] & deviating[k + 1 : k + n + 1] & deviating[k + 2 : k + n + 2]
+            for k in range(3)
+        ],
+        axis=0,
     )
     # Rounding may also leave an input next to a border, such as -0.15000000000000002 next to -0.15.
     rounded = np.zeros(y.shape, dtype=bool)
@@ -217,8 +221,8 @@ def contradictions(
     right = exact | (near & (~stays | rounded))
     if right.all():
         return None
-    place = tuple(np.argwhere(~right)[0])
-    return int(place[0]), float(y[place]), float(wanted[place])
+    entry = tuple(np.argwhere(~right)[0])
+    return int(entry[0]), float(y[entry]), float(expected[entry])
 
 
 def _has_rounding_error(value: np.ndarray) -> np.ndarray:

@@ -121,16 +121,16 @@ def rows_of(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def different(
-    actual: Signals, wanted: Signals, tolerance: float, excess: Mapping[str, np.ndarray] | None = None
+    actual: Signals, expected: Signals, tolerance: float, excess: Mapping[str, np.ndarray] | None = None
 ) -> Iterator[str]:
     """Yield every signal that differs by more than ``tolerance`` of its size plus its uncertainty."""
-    for name, values in wanted.items():
+    for name, values in expected.items():
         if name not in actual:
             yield f"'{name}' is missing"
             continue
         other = actual[name]
         if len(other) != len(values):
-            yield f"'{name}' has {len(other)} rows in the place of {len(values)}"
+            yield f"'{name}' has {len(other)} rows instead of {len(values)}"
             continue
         rows = rows_of(other, values)
         size = 1.0 + np.abs(values).max(initial=0.0)
@@ -139,27 +139,27 @@ def different(
             row = int(np.argmax(rows > bound))
             count = int((rows > bound).sum())
             values, other = (v.reshape(len(v), -1)[row] for v in (values, other))
-            yield f"'{name}' is {other} at row {row} in the place of {values} ({count} rows differ)"
+            yield f"'{name}' is {other} at row {row} instead of {values} ({count} rows differ)"
 
 
 def agrees_with_reference(case: Case) -> Iterator[str]:
     """The native run agrees with the reference simulator."""
-    wanted = {name: v for name, v in case.reference.items() if name in case.run}
-    if not any(different(case.run, wanted, 1e-6, case.uncertainty)):
+    expected = {name: v for name, v in case.reference.items() if name in case.run}
+    if not any(different(case.run, expected, 1e-6, case.uncertainty)):
         return
     # Long steps of the reference are unstable for a stiff block.
     shorter = case.converged(case.diagram, steps=(0.001, 0.0005))
-    wanted = {name: shorter[name] for name in wanted}
-    if not any(different(case.run, wanted, 1e-6, case.uncertainty)):
+    expected = {name: shorter[name] for name in expected}
+    if not any(different(case.run, expected, 1e-6, case.uncertainty)):
         return
     # Where a signal jumps at a recorded time, a single row may have the value just before or just after it.
     beside = case.converged(
         case.diagram, np.unique([0.0, *(case.times - 1e-7), *(case.times + 1e-7)]).clip(0.0)
     )
-    found = list(different(without_single_rows(case.run, wanted, beside), wanted, 1e-6, case.uncertainty))
-    if found:
+    texts = list(different(without_single_rows(case.run, expected, beside), expected, 1e-6, case.uncertainty))
+    if texts:
         expect_well_posed(case, case.run)
-    yield from found
+    yield from texts
 
 
 NUDGE, NEIGHBOURS = 1e-9, 8
@@ -173,22 +173,22 @@ def expect_well_posed(case: Case, run: Signals) -> None:
     error is raised if the run lies between the neighbours, or if the neighbours differ from each other where
     the run first leaves the reference.
     """
-    found = [case.reference]
+    results = [case.reference]
     for neighbour in neighbours(case.recipe):
         with contextlib.suppress(ArmblocksError, UnsupportedError, EndlessEventsError, np.linalg.LinAlgError):
-            found.append(run_reference(neighbour.diagram(), case.times, 0.004, most_events=300))
+            results.append(run_reference(neighbour.diagram(), case.times, 0.004, most_events=300))
     outside, first, scattered = False, len(case.times), False
     for name in sorted(case.reference.keys() & run.keys()):
-        values = np.stack([signals[name] for signals in found])
-        least, most = values.min(axis=0), values.max(axis=0)
+        values = np.stack([signals[name] for signals in results])
+        lowest, highest = values.min(axis=0), values.max(axis=0)
         margins = 1e-5 * (1.0 + np.abs(values).max(initial=0.0)) + 10.0 * case.uncertainty[name]
         near = margins.reshape(-1, *(1,) * (values.ndim - 2))
-        beyond = (run[name] < least - near) | (run[name] > most + near)
+        beyond = (run[name] < lowest - near) | (run[name] > highest + near)
         outside = outside or beyond.reshape(len(beyond), -1).any(axis=1).sum() > 2
         differs = rows_of(run[name], case.reference[name]) > margins
         row = int(np.argmax(differs)) if differs.any() else len(differs)
         if row <= first and row < len(differs):
-            scatters = bool((most - least > near)[row].any())
+            scatters = bool((highest - lowest > near)[row].any())
             first, scattered = row, scatters or (scattered and row == first)
     if outside and not scattered:
         return
@@ -204,18 +204,18 @@ def neighbours(recipe: Recipe) -> list[Recipe]:
 
 def nudged(nodes: tuple[Node, ...], random: np.random.Generator) -> tuple[Node, ...]:
     """Return the diagram with a small number added on each connection, including those in subsystems."""
-    found: list[Node] = []
+    changed: list[Node] = []
     for k, node in enumerate(nodes):
         inputs = dict(node.inputs)
         for port, source in node.inputs.items():
             if not is_action(node, source):
                 name = f"nudge {k} {port}"
-                found.append(
+                changed.append(
                     Node(name, "Bias", {"bias": float(random.choice((-NUDGE, NUDGE)))}, {"u": source})
                 )
                 inputs[port] = f"{name}/y"
-        found.append(replace(node, inputs=inputs, inside=nudged(node.inside, random)))
-    return tuple(found)
+        changed.append(replace(node, inputs=inputs, inside=nudged(node.inside, random)))
+    return tuple(changed)
 
 
 def is_action(node: Node, source: str) -> bool:
@@ -223,14 +223,14 @@ def is_action(node: Node, source: str) -> bool:
     return node.kind in ("Merge", "ActionSubsystem") or source.split("/")[0].startswith("if ")
 
 
-def without_single_rows(actual: Signals, wanted: Signals, beside: Signals) -> dict[str, np.ndarray]:
-    """Replace a single deviating row by the wanted one if it lies between its neighbours in time."""
+def without_single_rows(actual: Signals, expected: Signals, beside: Signals) -> dict[str, np.ndarray]:
+    """Replace a single deviating row by the expected one if it lies between its neighbours in time."""
     changed: dict[str, np.ndarray] = {}
-    for name, values in wanted.items():
+    for name, values in expected.items():
         rows = actual[name].copy()
-        wrong = rows_of(rows, values) > 1e-6 * (1.0 + np.abs(values).max(initial=0.0))
-        for k in np.flatnonzero(wrong):
-            alone = not wrong[max(k - 1, 0) : k].any() and not wrong[k + 1 : k + 2].any()
+        deviating = rows_of(rows, values) > 1e-6 * (1.0 + np.abs(values).max(initial=0.0))
+        for k in np.flatnonzero(deviating):
+            alone = not deviating[max(k - 1, 0) : k].any() and not deviating[k + 1 : k + 2].any()
             # The values of the signal just before, just after, and exactly at this time.
             near = np.concatenate([beside[name][2 * k : 2 * k + 2], values[k : k + 1]])
             margin = 1e-5 * (1.0 + np.abs(near).max(initial=0.0))
@@ -244,8 +244,8 @@ def without_single_rows(actual: Signals, wanted: Signals, beside: Signals) -> di
 def obeys_formulas(case: Case) -> Iterator[str]:
     """At every recorded time the output of a switching block agrees with the formula in NumPy."""
     broken = broken_formulas(case.diagram, case.result_of_run, case.times)
-    for name, (row, found, wanted) in broken.items():
-        yield f"'{name}' gives {found:.17g} at row {row}; its formula gives {wanted:.17g}"
+    for name, (row, actual, expected) in broken.items():
+        yield f"'{name}' gives {actual:.17g} at row {row}; its formula gives {expected:.17g}"
 
 
 def obeys_equations(case: Case) -> Iterator[str]:
@@ -276,11 +276,11 @@ def contradicted_rows(case: Case, numbers: BlockNumbers) -> Iterator[str]:
     ports = list(numbers.shapes)
     recorded = {port: np.asarray(case.result_of_run[f"{numbers.name}/{port}"]) for port in ports}
     for port in numbers.outputs:
-        given = np.asarray(case.result_of_run[f"{numbers.name}/{port}"])
+        values = np.asarray(case.result_of_run[f"{numbers.name}/{port}"])
         streak = 0
         for row, t in enumerate(case.times):
             inputs = {p: np.ravel(recorded[p][row]) for p in ports}
-            y = np.ravel(given[row])
+            y = np.ravel(values[row])
             exact = fits_equations(numbers, port, y, t, inputs, (0.0,))
             streak = 0 if exact else streak + 1
             # A switching time may be located slightly late, which affects one row; longer deviations are
@@ -303,9 +303,9 @@ def fits_equations(
             # Adding 0 would change the sign of -0, on which the angle of a point depends.
             numbers.arrays[f"u:{name}"][:] = u + move * (1.0 + np.abs(u)) if move else u
         numbers.update_modes()
-        wanted = numbers.value("out", port)
-        fits |= (np.abs(y - wanted) <= 4 * BORDER * size * (10.0 if any(moves) else 1.0)) | ~np.isfinite(
-            wanted
+        expected = numbers.value("out", port)
+        fits |= (np.abs(y - expected) <= 4 * BORDER * size * (10.0 if any(moves) else 1.0)) | ~np.isfinite(
+            expected
         )
         if fits.all():
             return True
@@ -315,20 +315,20 @@ def fits_equations(
 def obeys_formulas_at_default_tolerances(case: Case) -> Iterator[str]:
     """The law of ``obeys_formulas`` for a run at the default tolerances."""
     case.signals(case.diagram, rtol=1e-6, atol=1e-9)
-    for name, (row, found, wanted) in broken_formulas(case.diagram, case.result, case.times).items():
-        yield f"'{name}' gives {found:.17g} at row {row}; its formula gives {wanted:.17g}"
+    for name, (row, actual, expected) in broken_formulas(case.diagram, case.result, case.times).items():
+        yield f"'{name}' gives {actual:.17g} at row {row}; its formula gives {expected:.17g}"
 
 
-def rows_beyond(actual: np.ndarray, wanted: np.ndarray, tolerance: float) -> np.ndarray:
-    """Return by row whether it is outside the range of the wanted row and its neighbours, by ``tolerance``.
+def rows_beyond(actual: np.ndarray, expected: np.ndarray, tolerance: float) -> np.ndarray:
+    """Return by row whether it is outside the range of the expected row and its neighbours, by ``tolerance``.
 
     At the time of an event rounding errors decide which of these values a row has.
     """
-    if len(actual) != len(wanted):
-        return np.ones(len(wanted), dtype=bool)
-    near = tolerance * (1.0 + np.abs(wanted).max(initial=0.0))
-    rows = np.stack([np.roll(wanted, k, axis=0) for k in (-1, 0, 1)])
-    rows[0, -1:], rows[2, :1] = wanted[-1:], wanted[:1]
+    if len(actual) != len(expected):
+        return np.ones(len(expected), dtype=bool)
+    near = tolerance * (1.0 + np.abs(expected).max(initial=0.0))
+    rows = np.stack([np.roll(expected, k, axis=0) for k in (-1, 0, 1)])
+    rows[0, -1:], rows[2, :1] = expected[-1:], expected[:1]
     outside = (actual < rows.min(axis=0) - near) | (actual > rows.max(axis=0) + near)
     return outside.reshape(len(outside), -1).any(axis=1)
 
@@ -337,25 +337,28 @@ def converges(case: Case) -> Iterator[str]:
     """A run at the default tolerances is close to one at tight tolerances, except at shifted event times."""
     loose = case.signals(case.diagram, rtol=1e-6, atol=1e-9)
     for name, values in case.run.items():
-        wrong = rows_beyond(loose[name], values, 2e-3)
-        if wrong.sum() > max(2, len(wrong) // 10):
+        deviating = rows_beyond(loose[name], values, 2e-3)
+        if deviating.sum() > max(2, len(deviating) // 10):
             expect_well_posed(case, loose)
-            row = int(np.argmax(wrong))
-            yield f"'{name}' differs in {wrong.sum()} rows between tolerances, first at row {row}"
+            row = int(np.argmax(deviating))
+            yield f"'{name}' differs in {deviating.sum()} rows between tolerances, first at row {row}"
 
 
 def agrees_with_fixed_steps(case: Case) -> Iterator[str]:
     """The fixed-step solver, which also locates events, agrees up to the error of its steps."""
-    wrong: dict[str, np.ndarray] = {}
+    deviating: dict[str, np.ndarray] = {}
     for step in (0.002, 0.0004):  # jumps through a variable delay have errors of first order
         fixed = case.signals(case.diagram, solver="rk4", step=step)
         rows = {name: rows_beyond(fixed[name], values, 1e-3) for name, values in case.run.items()}
-        wrong = {name: found for name, found in rows.items() if found.sum() > max(2, len(found) // 10)}
-        if not wrong:
+        deviating = {
+            name: differs for name, differs in rows.items() if differs.sum() > max(2, len(differs) // 10)
+        }
+        if not deviating:
             return
     expect_well_posed(case, fixed)
-    for name, found in wrong.items():
-        yield f"'{name}' differs in {found.sum()} rows with fixed steps, first at row {int(np.argmax(found))}"
+    for name, differs in deviating.items():
+        row = int(np.argmax(differs))
+        yield f"'{name}' differs in {differs.sum()} rows with fixed steps, first at row {row}"
 
 
 def repeats(case: Case) -> Iterator[str]:
@@ -375,10 +378,10 @@ def repeats(case: Case) -> Iterator[str]:
             yield from same_bits(f"compiled with {effort} effort", case.signals(case.diagram), case.run)
 
 
-def same_bits(what: str, actual: Signals, wanted: Signals) -> Iterator[str]:
-    for name, values in wanted.items():
+def same_bits(change: str, actual: Signals, expected: Signals) -> Iterator[str]:
+    for name, values in expected.items():
         if name not in actual or not np.array_equal(actual[name], values):
-            yield f"{what}: '{name}' has other bits"
+            yield f"{change}: '{name}' has other bits"
 
 
 def continues(case: Case) -> Iterator[str]:
@@ -399,20 +402,20 @@ def continues(case: Case) -> Iterator[str]:
 
 def is_invariant(case: Case) -> Iterator[str]:
     """Renaming, reordering, wrapping, dead blocks, unit gains and added zeros do not change the signals."""
-    for what, change in CHANGES.items():
+    for title, change in CHANGES.items():
         recipe, names = change(case.recipe)
         try:
             diagram = recipe.diagram()
         except ArmblocksError as error:
-            yield f"{what}: refused, {error}"
+            yield f"{title}: refused, {error}"
             continue
-        found = case.signals(diagram)
-        kept = {name: found[names(name)] for name in case.run if names(name) in found}
-        wanted = {name: case.run[name] for name in kept}
-        texts = list(different(kept, wanted, 1e-6))
+        changed = case.signals(diagram)
+        renamed = {name: changed[names(name)] for name in case.run if names(name) in changed}
+        expected = {name: case.run[name] for name in renamed}
+        texts = list(different(renamed, expected, 1e-6))
         if texts:
             expect_well_posed(case, case.run)
-        yield from (f"{what}: {text}" for text in texts)
+        yield from (f"{title}: {text}" for text in texts)
 
 
 Change = Callable[[Recipe], tuple[Recipe, Callable[[str], str]]]
@@ -505,13 +508,13 @@ def failure(recipe: Recipe, message: str) -> dict[str, list[str]]:
     """
     times = np.concatenate([recipe.times, recipe.times[-1] + RECORD * np.arange(1, 6)])
     try:
-        found, finer = (
+        result, finer = (
             run_reference(recipe.diagram(), times, step, most_events=300) for step in (0.004, 0.0011)
         )
     except (UnsupportedError, EndlessEventsError, np.linalg.LinAlgError) as error:
         raise InconclusiveError(f"{message}; reference: {error}") from None
-    for name, values in found.items():
-        if name.endswith("/angle") and not found.get(name[:-5] + "r", np.ones(1)).all():
+    for name, values in result.items():
+        if name.endswith("/angle") and not result.get(name[:-5] + "r", np.ones(1)).all():
             raise InconclusiveError(f"'{name}' is the angle of the origin, which has no derivative")
         if not np.isfinite(values).all():
             raise InconclusiveError(f"'{name}' is not finite in the reference either")
@@ -549,13 +552,13 @@ def findings(recipe: Recipe, laws: Sequence[str] = tuple(LAWS)) -> dict[str, lis
         case = Case(recipe)
     except SimulationError as error:
         return failure(recipe, str(error))
-    found: dict[str, list[str]] = {}
+    texts_by_law: dict[str, list[str]] = {}
     for name in laws:
         try:
             texts = list(failing(case, LAWS[name]))
         except InconclusiveError as error:
-            found.setdefault("inconclusive", []).append(f"{name}: {error}")
+            texts_by_law.setdefault("inconclusive", []).append(f"{name}: {error}")
             continue
         if texts:
-            found[name] = texts
-    return found
+            texts_by_law[name] = texts
+    return texts_by_law

@@ -117,15 +117,15 @@ def reduced(
     """Return the smallest diagram found that still contradicts the law, and the text of the contradiction."""
     laws = [law] if law in LAWS else list(LAWS)[:1]
     text = ""
-    again = True
-    while again and time.monotonic() < until:
-        again = False
+    progress = True
+    while progress and time.monotonic() < until:
+        progress = False
         for smaller in reductions(recipe):
             if time.monotonic() > until:
                 break
-            found = judge(smaller, laws)
-            if law in found:
-                recipe, text, again = smaller, found[law][0], True
+            findings = judge(smaller, laws)
+            if law in findings:
+                recipe, text, progress = smaller, findings[law][0], True
                 break
     return recipe, text
 
@@ -142,10 +142,10 @@ def fuzz(
     with Judge(seconds) as judge:
         for seed in seeds:
             recipe = random_recipe(seed)
-            found = judge.judge(recipe, laws)
+            findings = judge.judge(recipe, laws)
             counts["diagrams"] += 1
             counts["blocks"] += len(recipe.nodes)
-            for law, texts in found.items():
+            for law, texts in findings.items():
                 counts[law] += 1
                 if law in NO_FINDING:
                     counts[f"{law}: {kind_of(texts[0])}"] += 1

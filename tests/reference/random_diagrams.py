@@ -123,13 +123,13 @@ class Maker:
         return Recipe(nodes, float(self.random.choice([1.0, 2.0, 3.0])))
 
     def level(
-        self, size: int, depth: int, given: Sequence[Signal] = (), calm: bool = False
+        self, size: int, depth: int, sources: Sequence[Signal] = (), calm: bool = False
     ) -> tuple[Node, ...]:
         """Generate the nodes of one level. ``calm``: only blocks that a triggered subsystem may have."""
         self_nodes: list[Node] = []
-        signals = list(given)
+        signals = list(sources)
         loops = [] if calm or self.random.random() < 0.4 else self.begin_feedback(self_nodes, signals)
-        if not given:
+        if not sources:
             for _ in range(int(self.random.integers(1, 4))):
                 self.add(self_nodes, signals, *self.source())
         for _ in range(size):
@@ -162,15 +162,15 @@ class Maker:
         )
         try:
             block = block_of(node)
-            given = {name: signal.shape for name, signal in inputs.items()}
+            input_shapes = {name: signal.shape for name, signal in inputs.items()}
             shapes = {p.name: p.shape for p in block.output_ports() if p.shape is not None}
-            shapes |= dict(block.output_shapes(given))
+            shapes |= dict(block.output_shapes(input_shapes))
         except (ArmblocksError, ValueError, KeyError):
             return False
         nodes.append(node)
         steady = block.sampled or all(s.steady for s in inputs.values())
         steady = steady and (bool(inputs) or block.sampled or kind == "Constant")
-        steady = steady and not (block.states(given) or block.delay_lines(given) or inside)
+        steady = steady and not (block.states(input_shapes) or block.delay_lines(input_shapes) or inside)
         ports = block.output_ports()
         signals += [Signal(f"{node.name}/{port.name}", shapes.get(port.name, ()), steady) for port in ports]
         return True
@@ -295,16 +295,16 @@ class Maker:
         """Return signals whose shapes the block accepts."""
         ports = block.input_ports()
         for attempt in range(6):
-            wanted = () if attempt < 4 else (2,)
+            default_shape = () if attempt < 4 else (2,)
             inputs: dict[str, Signal] = {}
             for port in ports:
                 shape = port.shape
-                fitting = [s for s in signals if s.shape == (wanted if shape is None else shape)]
+                fitting = [s for s in signals if s.shape == (default_shape if shape is None else shape)]
                 if not fitting:
                     break
                 # prefer later signals, so that chains are formed
-                place = int(len(fitting) * math.sqrt(self.random.random()))
-                inputs[port.name] = fitting[place]
+                index = int(len(fitting) * math.sqrt(self.random.random()))
+                inputs[port.name] = fitting[index]
             if len(inputs) < len(ports):
                 continue
             different = len({signal.ref for signal in inputs.values()}) == len(ports)
@@ -320,23 +320,23 @@ class Maker:
     def parameters(self, name: str) -> dict[str, Any]:
         """Return parameters of the worked example with random changes."""
         kind = BLOCKS[name]
-        found = (
+        values = (
             {k: v for k, v in kind.example.parameters.items() if k != "robot"}
             if self.random.random() < 0.5
             else {}
         )
         for rule in kind.parameters():
             if rule.name == "sample_time":
-                found[rule.name] = self.period()
+                values[rule.name] = self.period()
             elif self.random.random() < 0.4:
                 value = self.altered(rule)
                 if value is not None:
-                    found[rule.name] = value
+                    values[rule.name] = value
         try:
-            kind(**found) if not _needs_robot(name) else None
+            kind(**values) if not _needs_robot(name) else None
         except (ArmblocksError, ValueError):
-            found = {k: v for k, v in found.items() if k == "sample_time"}
-        return found
+            values = {k: v for k, v in values.items() if k == "sample_time"}
+        return values
 
     def altered(self, rule: Parameter) -> Any:
         """Return another value of one parameter, or None if it must not change."""
@@ -409,8 +409,8 @@ class Maker:
     def inside(self, fed: Sequence[Signal], depth: int, calm: bool) -> tuple[Node, ...] | None:
         """Return In blocks, some other blocks, and one or two Out blocks."""
         entries = [Node(f"in{k}", "Inport") for k in range(len(fed))]
-        given = [Signal(f"in{k}/y", s.shape, False) for k, s in enumerate(fed)]
-        inner = self.level(int(self.random.integers(1, 4)), depth + 1, given, calm)
+        sources = [Signal(f"in{k}/y", s.shape, False) for k, s in enumerate(fed)]
+        inner = self.level(int(self.random.integers(1, 4)), depth + 1, sources, calm)
         if not inner:
             return None
         ends: list[Node] = []
@@ -469,13 +469,15 @@ class Maker:
         )
         weight = signals[-1]
         self.add(nodes, signals, "Bias", {"bias": 0.0}, {"u": weight})
-        place = {"lower": 0.0, "initial": float(r.choice([0.0, 0.3, 1.0])), "reinitialize": True}
+        parameters = {"lower": 0.0, "initial": float(r.choice([0.0, 0.3, 1.0])), "reinitialize": True}
         self.count += 1
         name = f"ball {self.count}"
         back = Node(
             f"bounce {self.count}", "Gain", {"gain": -float(r.uniform(0.1, 0.95))}, {"u": f"{name}/dx"}
         )
-        ball = Node(name, "SecondOrderIntegratorLimited", place, {"u": weight.ref, "dx0": f"{back.name}/y"})
+        ball = Node(
+            name, "SecondOrderIntegratorLimited", parameters, {"u": weight.ref, "dx0": f"{back.name}/y"}
+        )
         nodes += [back, ball]
         signals += [Signal(f"{name}/x", ()), Signal(f"{name}/dx", ())]
 
@@ -490,15 +492,15 @@ class Maker:
         if not scalars:
             return
         fed = scalars[int(r.integers(len(scalars)))]
-        found: list[Signal] = []
+        operands: list[Signal] = []
         for _ in range(2):
             kind = str(r.choice(HYSTERESIS.split() if r.random() < 0.6 else SWITCHING.split()))
             if len(BLOCKS[kind]().input_ports()) == 1 and self.add(
                 nodes, signals, kind, self.parameters(kind), {"u": fed}
             ):
-                found.append(signals[-1])
+                operands.append(signals[-1])
                 fed = signals[-1] if r.random() < 0.5 else fed
-        inputs = dict(zip(("u1", "u2"), [*found, fed, fed]))
+        inputs = dict(zip(("u1", "u2"), [*operands, fed, fed]))
         if self.add(nodes, signals, "Sum", {"signs": "+-"}, inputs):
             difference = signals[-1]
             for kind, limit in (("HitCrossing", "offset"), ("Relay", "on_point")):
@@ -589,17 +591,17 @@ def _smaller(nodes: tuple[Node, ...]) -> Iterator[tuple[Node, ...]]:
             )
     for k, node in enumerate(nodes):
         for name in node.parameters:
-            kept = {key: value for key, value in node.parameters.items() if key != name}
-            yield (*nodes[:k], replace(node, parameters=kept), *nodes[k + 1 :])
+            remaining = {key: value for key, value in node.parameters.items() if key != name}
+            yield (*nodes[:k], replace(node, parameters=remaining), *nodes[k + 1 :])
         for inside in _smaller(node.inside):
             yield (*nodes[:k], replace(node, inside=inside), *nodes[k + 1 :])
 
 
 def _fed_instead(nodes: tuple[Node, ...], name: str, source: str) -> tuple[Node, ...]:
-    def other(given: str) -> str:
-        return source if given.rpartition("/")[0] == name else given
+    def other(ref: str) -> str:
+        return source if ref.rpartition("/")[0] == name else ref
 
-    return tuple(replace(n, inputs={port: other(given) for port, given in n.inputs.items()}) for n in nodes)
+    return tuple(replace(n, inputs={port: other(ref) for port, ref in n.inputs.items()}) for n in nodes)
 
 
 def _to_constant(inputs: Mapping[str, str], name: str) -> dict[str, str]:

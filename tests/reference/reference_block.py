@@ -110,7 +110,7 @@ class BlockNumbers:
         """Collect all equations as flat columns by kind and name."""
         block, t = self.block, self.symbols["t"]
         shape_of_state = {s.name: s.shape for s in (*self.states, *self.discrete)}
-        given = block.outputs(t, x, u, p)
+        outputs = block.outputs(t, x, u, p)
         self.expressions: dict[tuple[str, str], SX] = {}
 
         def add(kind: str, values: Mapping[str, Any], shape_by_name: Mapping[str, Shape]) -> None:
@@ -120,16 +120,16 @@ class BlockNumbers:
 
         out_shapes = {port.name: port.shape for port in block.output_ports() if port.shape is not None}
         out_shapes |= dict(block.output_shapes(self.shapes))
-        add("out", given, out_shapes)
+        add("out", outputs, out_shapes)
         add("xdot", block.derivatives(t, x, u, p), {s.name: s.shape for s in self.states})
         add("update", block.updates(t, x, u, p), {s.name: s.shape for s in self.discrete})
         add("guard", block.guard_values(t, x, u, p), {g.name: g.shape for g in self.guards})
         earlier = x | {mode.name: x[mode.before] for mode in self.remembered}
-        wanted = dict(block.mode_values(t, earlier, u, p)) | own_modes(block, x, u, p)
+        mode_values = dict(block.mode_values(t, earlier, u, p)) | own_modes(block, x, u, p)
         for condition in self.conditions:
             quantity = block.condition_values(t, x, u, p)[condition.name]
-            wanted[condition.name] = quantity >= 0.0 if condition.closed else quantity > 0.0
-        add("mode", wanted, {m.name: m.shape for m in self.modes})
+            mode_values[condition.name] = quantity >= 0.0 if condition.closed else quantity > 0.0
+        add("mode", mode_values, {m.name: m.shape for m in self.modes})
         mode_shapes = {m.name: m.shape for m in self.modes}
         resets = block.resets(t, x, u, p, e) if self.guards and not isinstance(block, RateLimiting) else {}
         add("reset", resets, shape_of_state | mode_shapes)
@@ -173,16 +173,16 @@ class BlockNumbers:
             seeds = [SX.sym(f"{key}'", symbol.numel()) for key, symbol in zip(rates, along)]
             direction = vertcat(1.0, *seeds)
             total = jtimes(expression, vertcat(self.symbols["t"], *along), direction)
-            more = {f"rate of {key}": (seed, rates[key]) for key, seed in zip(rates, seeds)}
-            self.functions["rate", port] = self._function(total, more)
+            rate_inputs = {f"rate of {key}": (seed, rates[key]) for key, seed in zip(rates, seeds)}
+            self.functions["rate", port] = self._function(total, rate_inputs)
         run, result = self.functions["rate", port]
         run()
         return result
 
     def _function(
-        self, expression: SX, more: Mapping[str, tuple[SX, np.ndarray]] | None = None
+        self, expression: SX, extra: Mapping[str, tuple[SX, np.ndarray]] | None = None
     ) -> tuple[Callable[[], None], np.ndarray]:
-        ends = {key: (symbol, self.arrays[key]) for key, symbol in self.symbols.items()} | dict(more or {})
+        ends = {key: (symbol, self.arrays[key]) for key, symbol in self.symbols.items()} | dict(extra or {})
         read = read_symbols(expression, {key: symbol for key, (symbol, _) in ends.items()})
         used = [end for key, end in ends.items() if key in read]
         function = Function("f", [symbol for symbol, _ in used], [densify(expression)])

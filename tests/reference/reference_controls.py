@@ -109,17 +109,17 @@ class Enable(_ControlBlock):
     def value(self, kind: str, port: str) -> np.ndarray:
         on = self.arrays["x:side"][0] * self.u("outer")
         begins = bool(on and self.arrays["x:seen"][0] == 0.0)
-        found = {
+        values = {
             "on": on,
             "works": on if self.ticking else on * (not begins),
             "restart": float((begins and self.block.restarts) or bool(self.u("anew", 0.0))),
         }
-        return np.array([found[port]])
+        return np.array([values[port]])
 
     def act(self, t: float) -> bool:
-        on, seen = self.value("out", "on")[0], self.arrays["x:seen"][0]
+        on, previous = self.value("out", "on")[0], self.arrays["x:seen"][0]
         self.arrays["x:seen"][:] = on
-        return bool(on != seen)
+        return bool(on != previous)
 
 
 class Trigger(_ControlBlock):
@@ -135,20 +135,20 @@ class Trigger(_ControlBlock):
         self.arrays["x:seen"][:] = -1.0
 
     def value(self, kind: str, port: str) -> np.ndarray:
-        side, seen = self.arrays["x:side"][0], self.arrays["x:seen"][0]
-        rises, falls = side == 1.0 and seen == 0.0, side == 0.0 and seen == 1.0
+        side, previous = self.arrays["x:side"][0], self.arrays["x:seen"][0]
+        rises, falls = side == 1.0 and previous == 0.0, side == 0.0 and previous == 1.0
         fires = {"rising": rises, "falling": falls, "either": rises or falls}[self.block.edge]
         anew = bool(self.u("anew", 0.0))
         fires = fires and bool(self.u("outer")) and not anew and not self.begun
-        found = {
+        values = {
             "fire": float(fires),
             "restart": float(fires or anew),
             "elapsed": self.arrays["t"][0] - self.arrays["x:last"][0],
         }
-        return np.array([found[port]])
+        return np.array([values[port]])
 
     def act(self, t: float) -> bool:
-        side, seen = self.arrays["x:side"][0], self.arrays["x:seen"][0]
+        side, previous = self.arrays["x:side"][0], self.arrays["x:seen"][0]
         if t <= 0.0:
             self.arrays["x:seen"][:] = side
             return False
@@ -156,7 +156,7 @@ class Trigger(_ControlBlock):
             self.arrays["x:last"][:] = t
         self.begun = self.begun or bool(self.u("anew", 0.0))
         self.arrays["x:seen"][:] = side
-        return bool(side != seen)
+        return bool(side != previous)
 
 
 class Held(_ControlBlock):

@@ -38,11 +38,11 @@ class Network:
             for port in block.input_ports()
         }
         for name, gate in flat.gates.items():
-            found = self.blocks[name]
-            found.gate = {key: self.blocks[ref.block].outputs[ref.port] for key, ref in gate.items()}
-            if "?elapsed" in gate and "p:T" in found.arrays:
-                found.arrays["p:T"] = found.gate["?elapsed"]
-        self._place_states()
+            block_numbers = self.blocks[name]
+            block_numbers.gate = {key: self.blocks[ref.block].outputs[ref.port] for key, ref in gate.items()}
+            if "?elapsed" in gate and "p:T" in block_numbers.arrays:
+                block_numbers.arrays["p:T"] = block_numbers.gate["?elapsed"]
+        self._locate_states()
         self.clocks = assign_clocks(flat, self.blocks, self.drivers)
         self.order = EvaluationOrder(self.blocks, self.drivers, flat.gates)
         self.links = {b.name: [self._link(b, port) for port in b.fed] for b in self.blocks.values()}
@@ -53,18 +53,18 @@ class Network:
 
     # -- structure -----------------------------------------------------------------------------------------
 
-    def _place_states(self) -> None:
+    def _locate_states(self) -> None:
         """Allocate one vector x of all continuous states; the arrays of the blocks are views of it."""
-        places = [(b, s) for b in self.blocks.values() for s in b.states]
-        self.x = np.zeros(sum(math.prod(state.shape) for _, state in places))
+        states = [(b, s) for b in self.blocks.values() for s in b.states]
+        self.x = np.zeros(sum(math.prod(state.shape) for _, state in states))
         self.xdot = np.zeros_like(self.x)
-        self.places: list[tuple[Any, str, slice]] = []
+        self.state_parts: list[tuple[Any, str, slice]] = []
         start = 0
-        for block, state in places:
-            here = slice(start, start + math.prod(state.shape))
-            block.arrays[f"x:{state.name}"] = self.x[here]
-            self.places.append((block, state.name, here))
-            start = here.stop
+        for block, state in states:
+            part = slice(start, start + math.prod(state.shape))
+            block.arrays[f"x:{state.name}"] = self.x[part]
+            self.state_parts.append((block, state.name, part))
+            start = part.stop
 
     # -- numbers -------------------------------------------------------------------------------------------
 
@@ -116,7 +116,7 @@ class Network:
             changed = False
             for work in plan:
                 changed = work() or changed
-            if frozen or not (changed and self.order.late):
+            if frozen or not (changed and self.order.two_passes):
                 return
         raise UnsupportedError(f"modes and signals have no consistent values at {t}")
 
@@ -243,7 +243,7 @@ class Network:
             raise UnsupportedError("a loop through derivatives")
 
         def residual(v: np.ndarray) -> np.ndarray:
-            found = []
+            residuals = []
             start = 0
             for array in outs:
                 array[:] = v[start : start + array.size]
@@ -251,14 +251,16 @@ class Network:
             for kind, name, port in loop:
                 block = self.blocks[name]
                 if block.clock is not None and block.clock not in self.ticking:
-                    found.append(block.outputs[port].copy())
+                    residuals.append(block.outputs[port].copy())
                     continue
                 self._feed_some(block, (kind, name, port))
                 self._read_histories(block)
                 result = block.value("out", port).copy()
                 # For an implicit output the equation returns the residual, which must be zero.
-                found.append(result + block.outputs[port] if port in block.block.implicit_outputs else result)
-            return np.concatenate(found) - v
+                residuals.append(
+                    result + block.outputs[port] if port in block.block.implicit_outputs else result
+                )
+            return np.concatenate(residuals) - v
 
         v = np.concatenate(outs)
         if not np.isfinite(v).all():
@@ -278,8 +280,8 @@ class Network:
     def _read_histories(self, block: Any) -> None:
         """Read the delayed signals of a block from their histories."""
         for line in block.lines:
-            needed = block.needs("delay", line.name)
-            for key in needed:
+            keys = block.needs("delay", line.name)
+            for key in keys:
                 if key.startswith("u:"):
                     target, source = self._link(block, key[2:])
                     target[:] = source
@@ -292,12 +294,12 @@ class Network:
     def derivative(self, t: float) -> np.ndarray:
         """Return dx/dt with the modes of the start of the step."""
         self.evaluate(t, frozen=True, flowing=True)
-        for block, name, here in self.places:
+        for block, name, part in self.state_parts:
             if not block.on:
-                self.xdot[here] = 0.0
+                self.xdot[part] = 0.0
                 continue
             self._feed_all(block)
-            self.xdot[here] = block.value("xdot", name)
+            self.xdot[part] = block.value("xdot", name)
         return self.xdot.copy()
 
     def modes_differ(self) -> bool:
@@ -318,18 +320,18 @@ class Network:
 
     def fired(self) -> dict[tuple[str, str], np.ndarray]:
         """Return guards whose sign has changed in their direction, with +1 (rising) or -1 (falling)."""
-        found: dict[tuple[str, str], np.ndarray] = {}
+        events: dict[tuple[str, str], np.ndarray] = {}
         for (name, guard), before in self.signs.items():
             block = self.blocks[name]
             if not block.on or block.begun:
                 continue
             self._feed_all(block)
-            now = np.sign(block.value("guard", guard))
+            sign = np.sign(block.value("guard", guard))
             direction = next(g.direction for g in block.guards if g.name == guard)
-            e = np.where((now * before < 0.0) & (now * direction >= 0.0), now, 0.0)
+            e = np.where((sign * before < 0.0) & (sign * direction >= 0.0), sign, 0.0)
             if e.any():
-                found[name, guard] = e
-        return found
+                events[name, guard] = e
+        return events
 
     def take_signs(self, only: Iterable[tuple[str, str]] | None = None) -> None:
         for key in self.signs if only is None else only:
@@ -337,9 +339,9 @@ class Network:
             if not block.on:
                 continue
             self._feed_all(block)
-            now = np.sign(block.value("guard", key[1]))
-            kept = self.signs[key] if only is None else 0.0 * now
-            self.signs[key] = np.where(now != 0.0, now, kept)
+            sign = np.sign(block.value("guard", key[1]))
+            fallback = self.signs[key] if only is None else 0.0 * sign
+            self.signs[key] = np.where(sign != 0.0, sign, fallback)
 
     # -- instants ------------------------------------------------------------------------------------------
 
@@ -351,8 +353,8 @@ class Network:
         for block in self.blocks.values():
             if block.on:
                 self._feed_all(block)
-                kept = {name: block.value("capture", name).copy() for name in block.names("capture")}
-                for name, value in kept.items():
+                captured = {name: block.value("capture", name).copy() for name in block.names("capture")}
+                for name, value in captured.items():
                     block.arrays[f"x:{name}"][:] = value
 
     def tick(self, t: float, clocks: list[int]) -> None:
@@ -389,7 +391,7 @@ class Network:
         Guards and resets of a block use consistent signals at its inputs, but its previous modes: an event is
         the end of the previous mode.
         """
-        before = self.kept()
+        before = self.fingerprint()
         eventful = [block for block in self.blocks.values() if block.has_events]
         old = {block.name: block.mode_values() for block in eventful}
         self.evaluate(t)
@@ -414,7 +416,7 @@ class Network:
         self.evaluate(t)
         if fired:
             self.take_signs(fired)
-        return bool(fired) or acted or self.kept() != before
+        return bool(fired) or acted or self.fingerprint() != before
 
     def _reset(
         self, block: Any, fired: Mapping[tuple[str, str], np.ndarray], without: set[str]
@@ -483,18 +485,18 @@ class Network:
     def record_delays(self, x: Mapping[float, np.ndarray], t: float, h: float) -> None:
         """Store the inputs of delays for a step, from the states at four points of it (0, 1/3, 2/3, 1)."""
         lines = [(block, line) for block in self.blocks.values() for line in block.lines]
-        found: dict[int, list[np.ndarray]] = {k: [] for k in range(len(lines))}
+        samples: dict[int, list[np.ndarray]] = {k: [] for k in range(len(lines))}
         end = self.x.copy()
-        for place, state in x.items():
+        for fraction, state in x.items():
             self.x[:] = state
-            time = t + place * h
-            self.evaluate(time if place < 1.0 else float(np.nextafter(time, 0.0)), True, flowing=True)
+            time = t + fraction * h
+            self.evaluate(time if fraction < 1.0 else float(np.nextafter(time, 0.0)), True, flowing=True)
             for k, (block, line) in enumerate(lines):
                 wide = np.zeros(math.prod(line.shape)) + self._link(block, line.input)[1]
-                found[k].append(wide)
+                samples[k].append(wide)
         self.x[:] = end
         for k, (block, line) in enumerate(lines):
-            block.history[line.name].add(t, h, np.array(found[k]))
+            block.history[line.name].add(t, h, np.array(samples[k]))
 
     def select_segments(self) -> None:
         """Select the segment of each history that is read after this instant."""
@@ -503,20 +505,20 @@ class Network:
                 when = self.t - float(block.value("delay", line.name)[0])
                 block.history[line.name].segment = block.history[line.name].segment_at(when)
 
-    def kept(self) -> tuple[bytes, ...]:
+    def fingerprint(self) -> tuple[bytes, ...]:
         """Return states, modes and held outputs for comparison."""
-        found = [self.x]
+        arrays = [self.x]
         for block in self.blocks.values():
-            found += [block.arrays[f"x:{s.name}"] for s in (*block.discrete, *block.modes)]
-            found += list(block.outputs.values()) if block.clock is not None else []
-        return tuple(array.tobytes() for array in found)
+            arrays += [block.arrays[f"x:{s.name}"] for s in (*block.discrete, *block.modes)]
+            arrays += list(block.outputs.values()) if block.clock is not None else []
+        return tuple(array.tobytes() for array in arrays)
 
     def ended(self) -> bool:
         """Return whether a block ends the run."""
-        found = False
+        has_ended = False
         for block in self.blocks.values():
             for guard in block.guards:
                 if guard.action in ("stop", "fail") and block.on:
                     self._feed_all(block)
-                    found = found or bool((block.value("guard", guard.name) > 0.0).any())
-        return found
+                    has_ended = has_ended or bool((block.value("guard", guard.name) > 0.0).any())
+        return has_ended

@@ -33,7 +33,7 @@ def assign_clocks(
     stated = dict(clock_of)
     for name in sampled:
         for step in (sources, targets):
-            if name not in clock_of and (near := _reached(name, step, stated)):
+            if name not in clock_of and (near := _reached_clocks(name, step, stated)):
                 clock_of[name] = min(near)
         if name not in clock_of:
             raise UnsupportedError(f"'{name}' has no clock")
@@ -45,21 +45,21 @@ def assign_clocks(
     return clocks
 
 
-def _reached(
+def _reached_clocks(
     name: str, step: Mapping[str, Iterable[str]], stated: Mapping[str, tuple[float, float]]
 ) -> set[tuple[float, float]]:
-    found: set[tuple[float, float]] = set()
-    seen, pending = {name}, list(step[name])
+    clocks: set[tuple[float, float]] = set()
+    visited, pending = {name}, list(step[name])
     while pending:
         entry = pending.pop()
-        if entry in seen:
+        if entry in visited:
             continue
-        seen.add(entry)
+        visited.add(entry)
         if entry in stated:
-            found.add(stated[entry])
+            clocks.add(stated[entry])
         else:
             pending.extend(step[entry])
-    return found
+    return clocks
 
 
 class EvaluationOrder:
@@ -68,7 +68,7 @@ class EvaluationOrder:
     ``groups``: nodes that are evaluated together, either a single node or all nodes of an algebraic loop.
     ``flowing``: the groups on which states, modes, guards, delays and gates depend, and all loops, whose
     solutions are tracked; only these are evaluated between instants. ``loops``: the groups that are algebraic
-    loops. ``late``: whether a mode is used before it is evaluated, so that a second pass is necessary.
+    loops. ``two_passes``: whether a mode is used before it is evaluated, so that a second pass is necessary.
     """
 
     def __init__(
@@ -101,10 +101,12 @@ class EvaluationOrder:
         order = list(TopologicalSorter(groups).static_order())
         self.loops = [loop for loop in order if len(loop) > 1 or loop[0] in graph[loop[0]]]
         done: set[Node] = set()
-        self.late = False  # whether a mode is used before it is evaluated
+        self.two_passes = False  # whether a mode is used before it is evaluated
         for loop in order:
             for node in loop:
-                self.late = self.late or bool(soft[node] - done - set(loop)) or bool(soft[node] & set(loop))
+                self.two_passes = (
+                    self.two_passes or bool(soft[node] - done - set(loop)) or bool(soft[node] & set(loop))
+                )
             done |= set(loop)
         self.groups = order
         read = self._read_between_instants() | {node for loop in self.loops for node in loop}
@@ -113,12 +115,12 @@ class EvaluationOrder:
 
     def _read_between_instants(self) -> set[Node]:
         """Return the inputs of blocks with states, modes, guards or delays, and all gates."""
-        found = {("out", ref.block, ref.port) for gate in self.gates.values() for ref in gate.values()}
+        nodes = {("out", ref.block, ref.port) for gate in self.gates.values() for ref in gate.values()}
         for block in self.blocks.values():
             if block.states or block.modes or block.guards or block.lines:
                 ports = {*block.fed, *(line.input for line in block.lines)}
-                found |= self._inputs_of(block, {f"u:{port}" for port in ports})
-        return found
+                nodes |= self._inputs_of(block, {f"u:{port}" for port in ports})
+        return nodes
 
     def needs(self, node: Node) -> tuple[set[Node], set[Node]]:
         """Return the required predecessors of a node, and the preferred ones (its modes, a restart)."""
@@ -150,9 +152,9 @@ class EvaluationOrder:
                     raise UnsupportedError(f"the time since '{name}' is differentiated")
                 rates = {self._rate_of(name, entry) for entry in block.inputs_followed(port)}
                 return {("out", name, port)} | rates, soft
-            needed = block.needs("out", port)
-            hard = self._inputs_of(block, needed) | {("out", name, port)}
-            for key in needed:
+            keys = block.needs("out", port)
+            hard = self._inputs_of(block, keys) | {("out", name, port)}
+            for key in keys:
                 letter, _, entry = key.partition(":")
                 if letter == "u":
                     if entry.endswith("'"):
@@ -167,16 +169,16 @@ class EvaluationOrder:
         ref = self.drivers[name, port]
         return ("rate", ref.block, ref.port)
 
-    def _inputs_of(self, block: Any, needed: set[str]) -> set[Node]:
-        found: set[Node] = set()
-        for key in needed:
+    def _inputs_of(self, block: Any, keys: set[str]) -> set[Node]:
+        nodes: set[Node] = set()
+        for key in keys:
             letter, _, port = key.partition(":")
             if letter == "u" and port.endswith("'"):
-                found.add(self._rate_of(block.name, port[:-1]))
+                nodes.add(self._rate_of(block.name, port[:-1]))
             elif letter == "u":
                 ref = self.drivers[block.name, port]
-                found.add(("out", ref.block, ref.port))
-        return found
+                nodes.add(("out", ref.block, ref.port))
+        return nodes
 
 
 def _closure(graph: Mapping[Node, set[Node]]) -> dict[Node, set[Node]]:
@@ -186,11 +188,11 @@ def _closure(graph: Mapping[Node, set[Node]]) -> dict[Node, set[Node]]:
 
 def _closure_of(node: Node, graph: Mapping[Node, set[Node]]) -> set[Node]:
     """Return all nodes that are reachable from a node."""
-    reached: set[Node] = set()
+    closure: set[Node] = set()
     pending = list(graph[node])
     while pending:
         entry = pending.pop()
-        if entry not in reached:
-            reached.add(entry)
+        if entry not in closure:
+            closure.add(entry)
             pending += graph[entry]
-    return reached
+    return closure

@@ -103,18 +103,18 @@ class ReferenceRun:
             count = int((self.stop - offset) / period) + 2
             marks += [(offset + k * period, "tick", number) for k in range(count)]
         marks += [(t, "jump", 0) for t in self.network.breakpoints() if t > 0.0]
-        found: list[tuple[float, list[int], bool, bool]] = []
-        for t, what, number in sorted(marks):
+        merged: list[tuple[float, list[int], bool, bool]] = []
+        for t, event, number in sorted(marks):
             if t > self.stop * (1.0 + SAME):
                 break
-            if not found or t > found[-1][0] * (1.0 + SAME) + 1e-300:
-                found.append((t, [], False, False))
-            time, clocks, recorded, jumps = found[-1]
-            clocks = [*clocks, number] if what == "tick" else clocks
+            if not merged or t > merged[-1][0] * (1.0 + SAME) + 1e-300:
+                merged.append((t, [], False, False))
+            time, clocks, recorded, jumps = merged[-1]
+            clocks = [*clocks, number] if event == "tick" else clocks
             # The latest time of an instant is used for a jump, so that the source has already jumped.
-            time = max(time, t) if what == "jump" else time
-            found[-1] = (time, clocks, recorded or what == "record", jumps or what == "jump")
-        return found
+            time = max(time, t) if event == "jump" else time
+            merged[-1] = (time, clocks, recorded or event == "record", jumps or event == "jump")
+        return merged
 
     # -- flow ----------------------------------------------------------------------------------------------
 
@@ -141,8 +141,8 @@ class ReferenceRun:
             self.stepped(x, h, latest)
         if network.delays:
             network.record_delays(self.thirds(x, h), self.t, h)
-        reached = end if h >= end - self.t else self.t + h
-        self.t = reached
+        target = end if h >= end - self.t else self.t + h
+        self.t = target
         if calm:
             network.evaluate(min(self.t, latest), frozen=True, flowing=True)
             network.take_signs()
@@ -164,12 +164,12 @@ class ReferenceRun:
         network, t = self.network, self.t
         calm = True
 
-        def rate(place: float, change: np.ndarray | float) -> np.ndarray:
+        def rate(offset: float, change: np.ndarray | float) -> np.ndarray:
             nonlocal calm
             network.x[:] = start + change
-            found = network.derivative(min(t + place, latest))
-            calm = calm and (place == 0.0 or not network.modes_differ())
-            return found
+            derivative = network.derivative(min(t + offset, latest))
+            calm = calm and (offset == 0.0 or not network.modes_differ())
+            return derivative
 
         # The right limit: a signal may differ at the instant itself, as the height does at a bounce.
         a = rate(0.0, min(h, JUST_AFTER) * rate(0.0, 0.0))
@@ -189,11 +189,11 @@ class ReferenceRun:
         """Return the states at 0, 1/3, 2/3 and 1 of the last step by cubic Hermite interpolation."""
         end = self.network.x.copy()
         a, d = self.slopes
-        found: dict[float, np.ndarray] = {}
+        states: dict[float, np.ndarray] = {}
         for s in (0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0):
             cubic = (1 + 2 * s) * (1 - s) ** 2 * start + s * s * (3 - 2 * s) * end
-            found[s] = cubic + h * s * (1 - s) * ((1 - s) * a - s * d)
-        return found
+            states[s] = cubic + h * s * (1 - s) * ((1 - s) * a - s * d)
+        return states
 
     # -- instants ------------------------------------------------------------------------------------------
 

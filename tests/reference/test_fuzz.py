@@ -23,11 +23,11 @@ def test_a_random_diagram_obeys_the_laws(number: int, seed: int) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            found = findings(random_recipe(seed), (*ALWAYS, *dict.fromkeys(turn)))
+            contradictions = findings(random_recipe(seed), (*ALWAYS, *dict.fromkeys(turn)))
         except InconclusiveError:
             return
-    found.pop("inconclusive", None)
-    assert found == {}
+    contradictions.pop("inconclusive", None)
+    assert contradictions == {}
 
 
 def test_a_seed_always_gives_the_same_diagram() -> None:
@@ -55,7 +55,7 @@ def test_a_loop_without_a_solution_contradicts_the_equations() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            found = findings(recipe, ("equations",))
+            contradictions = findings(recipe, ("equations",))
         except (InconclusiveError, ValueError):
             return  # the diagram is refused, which is correct
-    assert "equations" in found
+    assert "equations" in contradictions

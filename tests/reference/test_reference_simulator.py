@@ -144,11 +144,11 @@ def test_a_native_run_agrees_with_the_reference(kind: str) -> None:
     raise AssertionError({name: value for name, value in worst.items() if not value < 1e-6})
 
 
-def distance(actual: np.ndarray, wanted: np.ndarray) -> float:
+def distance(actual: np.ndarray, expected: np.ndarray) -> float:
     """Return the largest difference, relative to 1 + the largest value."""
-    if actual.shape != wanted.shape:
+    if actual.shape != expected.shape:
         return math.inf
-    return float(np.abs(actual - wanted).max(initial=0.0) / (1.0 + np.abs(wanted).max(initial=0.0)))
+    return float(np.abs(actual - expected).max(initial=0.0) / (1.0 + np.abs(expected).max(initial=0.0)))
 
 
 @pytest.mark.parametrize("kind", FORMULAS)

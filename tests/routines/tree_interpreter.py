@@ -143,43 +143,43 @@ class _Call:
             case tree.Compute(result, operation, operands):
                 values = list(map(self.value, operands))
                 if operation is Operation.SPREAD:
-                    found = (values[0],) * self.interpreter.program.lanes
+                    outcome = (values[0],) * self.interpreter.program.lanes
                 elif result.kind in LANES:
-                    found = tuple(OPERATIONS[operation](*lane) for lane in zip(*values, strict=True))
+                    outcome = tuple(OPERATIONS[operation](*lane) for lane in zip(*values, strict=True))
                 else:
-                    found = OPERATIONS[operation](*values)
-                self.values[result] = _wrapped(found) if result.kind is Kind.INTEGER else found
+                    outcome = OPERATIONS[operation](*values)
+                self.values[result] = _wrapped(outcome) if result.kind is Kind.INTEGER else outcome
             case tree.Locate(result, base, index, element):
-                memory, place = self.value(base)
+                memory, offset = self.value(base)
                 step = self.value(index) / 8 if element is Kind.BYTE else self.value(index)
-                self.values[result] = (memory, place + step)
+                self.values[result] = (memory, offset + step)
             case tree.Load(result, address):
-                memory, place = self.value(address)
-                found = memory[int(place)]
+                memory, offset = self.value(address)
+                outcome = memory[int(offset)]
                 if result.kind is Kind.INT32:
-                    found = OPERATIONS[Operation.TO_INT32](found >> 32 * (place != int(place)))
-                self.values[result] = found
+                    outcome = OPERATIONS[Operation.TO_INT32](outcome >> 32 * (offset != int(offset)))
+                self.values[result] = outcome
             case tree.FetchAdd(result, address, value):
-                memory, place = self.value(address)
-                self.values[result] = memory[place]
-                memory[place] = _wrapped(memory[place] + self.value(value))
+                memory, offset = self.value(address)
+                self.values[result] = memory[offset]
+                memory[offset] = _wrapped(memory[offset] + self.value(value))
             case tree.Store(value, address):
-                memory, place = self.value(address)
-                memory[int(place)] = self.value(value)
+                memory, offset = self.value(address)
+                memory[int(offset)] = self.value(value)
             case tree.Copy(source, target, size):
-                (given, first), (taken, place) = self.value(source), self.value(target)
+                (source_memory, first), (target_memory, offset) = self.value(source), self.value(target)
                 count = self.value(size) // 8
-                taken[place : place + count] = given[first : first + count]
+                target_memory[offset : offset + count] = source_memory[first : first + count]
             case tree.Call(results, called, arguments):
                 values = list(map(self.value, arguments))
                 if isinstance(called, str):
-                    found = self.interpreter.call(called, *values)
+                    outcome = self.interpreter.call(called, *values)
                 else:
-                    found = self.value(called)(*values)
-                self.values.update(zip(results, found if len(results) > 1 else (found,)))
+                    outcome = self.value(called)(*values)
+                self.values.update(zip(results, outcome if len(results) > 1 else (outcome,)))
             case tree.Return(values):
-                found = tuple(map(self.value, values))
-                raise Returned(found if len(found) > 1 else found[0] if found else None)
+                outcome = tuple(map(self.value, values))
+                raise Returned(outcome if len(outcome) > 1 else outcome[0] if outcome else None)
             case tree.Jump(mark):
                 raise Jumped(mark)
             case tree.When(condition, yes, no, _):

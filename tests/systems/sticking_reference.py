@@ -57,8 +57,8 @@ class StickingArm:
     def run(self, q: np.ndarray, qd: np.ndarray, times: np.ndarray) -> np.ndarray:
         """Integrate from event to event; return q and qd (N, 2n) at the times."""
         n, t, x = len(q), float(times[0]), np.concatenate([q, qd])
-        found = [x]
-        while len(found) < len(times):
+        states = [x]
+        while len(states) < len(times):
             # evaluated slightly later, when a torque that has just reached the friction limit exceeds it
             modes = self.modes(t + 1e-10, x[:n], x[n:])
 
@@ -81,11 +81,11 @@ class StickingArm:
 
                 event.terminal, event.direction = True, -1.0
                 events.append(event)
-            left = times[len(found) :]
+            left = times[len(states) :]
             run = solve_ivp(
                 flow, (t, left[-1]), x, "DOP853", left, events=events, rtol=1e-11, atol=1e-13, max_step=0.01
             )
-            found += list(np.reshape(run.y, (2 * n, -1)).T)
+            states += list(np.reshape(run.y, (2 * n, -1)).T)
             if run.status == 0:
                 break
             fired = next(k for k in range(n) if len(run.t_events[k]))
@@ -93,4 +93,4 @@ class StickingArm:
             x[n:][np.array(modes) == 0] = 0.0
             if modes[fired]:
                 x[n + fired] = 0.0
-        return np.array(found)
+        return np.array(states)
