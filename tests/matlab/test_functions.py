@@ -53,7 +53,7 @@ def literal(array: np.ndarray) -> str:
     return "[" + "; ".join(" ".join(map(repr, row)) for row in array.tolist()) + "]"
 
 
-@pytest.mark.parametrize("name", [name for name in TABLE if TABLE[name].most])
+@pytest.mark.parametrize("name", [name for name in TABLE if TABLE[name].max_arguments])
 def test_numbers_constants_and_symbols_have_the_same_values(name: str) -> None:
     draw = random.Random(name)
     arguments = ARGUMENTS.get(name) or ("v", "w")[: TABLE[name].arguments.count(",") + 1]
@@ -221,8 +221,10 @@ def test_every_entry_is_documented() -> None:
     for name, function in TABLE.items():
         assert name.isidentifier()
         assert function.meaning and function.group, name
-        assert function.most == 0 or function.arguments.count(",") + 1 == function.most, name
-        assert function.fewest <= function.most
+        assert function.max_arguments == 0 or function.arguments.count(",") + 1 == function.max_arguments, (
+            name
+        )
+        assert function.min_arguments <= function.max_arguments
         assert function.elementwise or name not in FUNCTIONS_OF_NUMBERS or name in ("any", "all")
     assert {"sin", "pi", "sum"} <= RESERVED
     assert not {"length", "round", "mean", "size", "eps"} & RESERVED

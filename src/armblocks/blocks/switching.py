@@ -92,10 +92,10 @@ def cell_of(target: SX, before: SX, guards: Signals, up: str = "up", down: str =
     return if_else(guards[up] > 0.0, fmax(target, before + 1.0), left)
 
 
-def counted(target: SX, before: SX, reached: SX) -> SX:
-    """The number of past edges: ``before`` + 1, or ``target`` (by the time), where ``reached`` (the next
-    edge) is 1."""
-    return if_else(reached, fmax(target, before + 1.0), before)
+def edge_count(target: SX, before: SX, next_edge: SX) -> SX:
+    """The number of past edges: ``before``, but at the ``next_edge`` (1) ``before + 1``, or ``target`` (the
+    number by the time) if that is larger."""
+    return if_else(next_edge, fmax(target, before + 1.0), before)
 
 
 def zone_after(mode: SX, e: Signals) -> SX:

@@ -42,13 +42,13 @@ def call_function(
 
 
 def _check_count(location: Location, name: str, function: Function, count: int) -> None:
-    if function.fewest <= count <= function.most:
+    if function.min_arguments <= count <= function.max_arguments:
         return
     if count == 0:
         raise location.error(
             f"the function '{name}' has no arguments", allowed=f"{name}({function.arguments})"
         )
-    minimum, maximum = function.fewest, function.most
+    minimum, maximum = function.min_arguments, function.max_arguments
     allowed = f"{minimum}" if minimum == maximum else f"{minimum} to {maximum}"
     raise location.error(
         f"{name} is called with {count} argument{'s' * (count != 1)}",

@@ -110,4 +110,4 @@ def _needs_value(name: str, called: bool) -> bool:
     function = TABLE.get(name)
     if function is None:
         return True
-    return not called and function.fewest > 0 and not function.reserved
+    return not called and function.min_arguments > 0 and not function.reserved

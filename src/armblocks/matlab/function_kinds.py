@@ -145,14 +145,14 @@ Compute = (
 
 @dataclass(frozen=True, kw_only=True)
 class Function:
-    """A function of ``fewest`` to ``most`` arguments, or a constant (none)."""
+    """A function of ``min_arguments`` to ``max_arguments`` arguments, or a constant (none)."""
 
     arguments: str
     """The arguments in the documentation, ``x, y``."""
     meaning: str
     group: str
-    fewest: int
-    most: int
+    min_arguments: int
+    max_arguments: int
     compute: Callable[..., Any]
     """From :class:`Arithmetic` and the arguments; with ``creates``, from plain numbers to an array."""
     elementwise: bool = False
@@ -171,7 +171,7 @@ class Function:
 
     def may_be_text(self, position: int) -> bool:
         """Whether the argument at a position, counted from 0, may be text."""
-        return self.takes_text and position >= self.fewest
+        return self.takes_text and position >= self.min_arguments
 
 
 def constant(value: float, meaning: str, *, reserved: bool = False) -> Function:
@@ -184,8 +184,8 @@ def constant(value: float, meaning: str, *, reserved: bool = False) -> Function:
         arguments="",
         meaning=meaning,
         group=CONSTANTS,
-        fewest=0,
-        most=0,
+        min_arguments=0,
+        max_arguments=0,
         compute=compute,
         reserved=reserved,
     )
@@ -221,8 +221,8 @@ def whole(
         arguments=arguments,
         meaning=meaning,
         group=group,
-        fewest=count - optional,
-        most=count,
+        min_arguments=count - optional,
+        max_arguments=count,
         compute=compute,
         **options,
     )

@@ -362,7 +362,7 @@ class Symbols:
         return _oriented_like(_plain(result), *arguments) if function.elementwise else _plain(result)
 
     def _known(self) -> set[str]:
-        return {*self._names, *(name for name, function in TABLE.items() if function.most == 0)}
+        return {*self._names, *(name for name, function in TABLE.items() if function.max_arguments == 0)}
 
 
 def _symbol(location: Location, value: Symbol) -> SX:

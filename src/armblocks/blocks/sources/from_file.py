@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from casadi import SX, fmax, fmin, if_else, logic_and, logic_or, vertcat
 
-from armblocks.blocks.switching import counted, since
+from armblocks.blocks.switching import edge_count, since
 from armblocks.diagram import (
     Block,
     Guard,
@@ -100,7 +100,7 @@ class FromFile(Block):
         count, width = self._size
         row = last_at_or_below(p["data"].T, t, count=count, stride=width)
         passed = self.guard_values(t, x, u, p)["next"] > 0.0
-        return {"row": counted(row, if_else(self._early(t, x, p), -1.0, x["row"]), passed)}
+        return {"row": edge_count(row, if_else(self._early(t, x, p), -1.0, x["row"]), passed)}
 
     def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         passed = self.guard_values(t, x, u, p)["next"] > 0.0

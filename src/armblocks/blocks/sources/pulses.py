@@ -9,7 +9,7 @@ from casadi import SX, floor, if_else
 from numpy.typing import ArrayLike
 
 from armblocks.blocks.switching import (
-    counted,
+    edge_count,
     since,
 )
 from armblocks.diagram import (
@@ -70,7 +70,7 @@ class PulseGenerator(Block):
         pulses = floor(periods)
         ended = (periods - pulses) * 100.0 >= p["width"] * (1.0 - 1e-12)
         passed = if_else(t < p["delay"], 0.0, 2.0 * pulses + 1.0 + ended)
-        return {"edges": counted(passed, x["edges"], self.contradictions(t, x, u, p)["edges"])}
+        return {"edges": edge_count(passed, x["edges"], self.contradictions(t, x, u, p)["edges"])}
 
     def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"edges": self.guard_values(t, x, u, p)["edge"] > 0.0}

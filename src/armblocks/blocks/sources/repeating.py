@@ -16,7 +16,7 @@ from casadi import SX, dot, floor, fmax, if_else, sin, vertcat
 from numpy.typing import ArrayLike
 
 from armblocks.blocks.interpolation import cells, weights
-from armblocks.blocks.switching import counted, since
+from armblocks.blocks.switching import edge_count, since
 from armblocks.blocks.table_axes import ascending_positions
 from armblocks.diagram import (
     Block,
@@ -95,7 +95,7 @@ class SignalGenerator(Block):
         if self.waveform == "sine":
             return {}
         passed = floor(t / self._spacing(p) * _ROUNDED)
-        return {"edges": counted(passed, x["edges"], self.contradictions(t, x, u, p)["edges"])}
+        return {"edges": edge_count(passed, x["edges"], self.contradictions(t, x, u, p)["edges"])}
 
     def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         if self.waveform == "sine":
@@ -162,7 +162,7 @@ class RepeatingSequence(Block):
         into = (t - periods * times[-1]) + 1e-14 * t
         passed = sum((into >= corner for corner in times[1:-1]), SX(0.0))
         passed = periods * (len(times) - 1) + passed
-        return {"pieces": counted(passed, x["pieces"], self.contradictions(t, x, u, p)["pieces"])}
+        return {"pieces": edge_count(passed, x["pieces"], self.contradictions(t, x, u, p)["pieces"])}
 
     def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"pieces": self.guard_values(t, x, u, p)["corner"] > 0.0}
