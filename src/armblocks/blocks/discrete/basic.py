@@ -105,17 +105,17 @@ class DiscreteIntegrator(Block):
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         share = {"forward_euler": 0.0, "backward_euler": 1.0, "trapezoidal": 0.5}[self.method]
-        free = self._begun(x, u, p)
+        unlimited = self._state_after_reset(x, u, p)
         if share:
-            free = free + share * p["gain"] * p["T"] * u["u"]
-        y = self._limited(free, p) if share or self._has_resets else free
+            unlimited = unlimited + share * p["gain"] * p["T"] * u["u"]
+        y = self._limited(unlimited, p) if share or self._has_resets else unlimited
         values = {"y": y}
         if self.saturation_port:
             values["saturated"] = if_else(y >= p["upper"], 1.0, if_else(y <= p["lower"], -1.0, 0.0))
         return values | ({"state": x["x"]} if self.state_port else {})
 
     def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        after = {"x": self._limited(self._begun(x, u, p) + p["gain"] * p["T"] * u["u"], p)}
+        after = {"x": self._limited(self._state_after_reset(x, u, p) + p["gain"] * p["T"] * u["u"], p)}
         if self._has_resets:
             untriggered = self.external_reset == "none"
             after["seen"] = SX(0.0) if untriggered else side_of(self.external_reset, u["reset"])
@@ -131,7 +131,7 @@ class DiscreteIntegrator(Block):
     def _has_resets(self) -> bool:
         return self.external_reset != "none" or self.initial_condition_source != "internal"
 
-    def _begun(self, x: Signals, u: Signals, p: Signals) -> SX:
+    def _state_after_reset(self, x: Signals, u: Signals, p: Signals) -> SX:
         """The state at this tick, after a possible reset."""
         if not self._has_resets:
             return x["x"]

@@ -60,8 +60,8 @@ class MinMaxRunningResettable(Block):
         return (State("extreme", self.output_shapes(inputs)["y"], "the output at the previous tick"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        further = (fmin if self.function == "min" else fmax)(u["u"], x["extreme"])
-        return {"y": if_else(u["reset"] != 0.0, p["initial"], further)}
+        extreme = (fmin if self.function == "min" else fmax)(u["u"], x["extreme"])
+        return {"y": if_else(u["reset"] != 0.0, p["initial"], extreme)}
 
     def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"extreme": self.outputs(t, x, u, p)["y"]}
