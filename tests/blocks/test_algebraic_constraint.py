@@ -117,7 +117,7 @@ ACTIONS = ((1.0, 10.0), (2.0, 20.0), (3.0, 30.0), (4.0, 40.0))
 
 def decided(conditions: tuple[int, ...]) -> tuple[float, ...]:
     for row, action in zip(DECISIONS, ACTIONS):
-        if all(want in (-1.0, float(condition)) for want, condition in zip(row, conditions)):
+        if all(required in (-1.0, float(condition)) for required, condition in zip(row, conditions)):
             return action
     raise AssertionError("the last row decides")
 

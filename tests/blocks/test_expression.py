@@ -103,9 +103,9 @@ def test_a_long_sum_does_not_exceed_the_nesting_limit() -> None:
     ],
 )
 def test_other_syntax_is_refused(formula: str) -> None:
-    with pytest.raises(ArmblocksError) as found:
+    with pytest.raises(ArmblocksError) as caught:
         evaluate(Expression(formula=formula), U)
-    assert "Allowed: " in str(found.value)
+    assert "Allowed: " in str(caught.value)
 
 
 def test_messages_name_the_position_and_a_fix() -> None:

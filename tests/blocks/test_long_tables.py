@@ -80,7 +80,7 @@ def test_a_large_table_of_several_axes_agrees_with_scipy(
         lookups = [
             evaluate(Prelookup(positions=x, zero_crossing=zero_crossing), u) for x, u in zip(axes, points)
         ]
-        pairs = [place[name] for place in lookups for name in ("k", "f")]
+        pairs = [lookup[name] for lookup in lookups for name in ("k", "f")]
         actual = evaluate(InterpolationUsingPrelookup(table=table), *pairs)["y"]
         np.testing.assert_allclose(actual, expected, rtol=1e-11, atol=1e-13)
 

@@ -183,17 +183,17 @@ def test_a_block_with_other_name_and_other_parameter_is_a_new_block() -> None:
 
 
 def test_a_changed_connection_is_reported_with_its_subsystem() -> None:
-    def inner(twice: bool) -> Diagram:
+    def inner(doubled: bool) -> Diagram:
         builder = DiagramBuilder("inner")
         entry = builder.add("in", Inport())
         gain = builder.add("gain", Gain(gain=2.0), entry)
         builder.add("scope", Scope(), gain)
-        builder.add("out", Outport(), gain if twice else entry)
+        builder.add("out", Outport(), gain if doubled else entry)
         return builder.build()
 
-    def outer(twice: bool) -> Diagram:
+    def outer(doubled: bool) -> Diagram:
         builder = DiagramBuilder("outer")
-        builder.add("sub", Subsystem(diagram=inner(twice)), builder.add("u", Constant()))
+        builder.add("sub", Subsystem(diagram=inner(doubled)), builder.add("u", Constant()))
         return builder.build()
 
     difference = diagram_difference(outer(False), outer(True))

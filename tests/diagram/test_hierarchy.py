@@ -273,11 +273,13 @@ def test_thousands_of_blocks_in_fifty_levels_are_flattened() -> None:
 # -- tags ------------------------------------------------------------------------------------------
 
 
-def with_goto(visibility: str, place: Callable[[DiagramBuilder, DiagramBuilder], DiagramBuilder]) -> Diagram:
+def with_goto(
+    visibility: str, diagram_of: Callable[[DiagramBuilder, DiagramBuilder], DiagramBuilder]
+) -> Diagram:
     builder = DiagramBuilder("top")
     with builder.subsystem("sub") as sub:
         builder.add("goto", Goto(tag="speed", visibility=visibility), builder.add("sine", SineWave()))
-        where = place(builder, sub)
+        where = diagram_of(builder, sub)
         where.add("gain", Gain(gain=2.0), where.add("from", From(tag="speed")))
     return builder.build()
 

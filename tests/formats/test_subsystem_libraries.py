@@ -120,9 +120,9 @@ def test_the_shipped_servo_is_used_six_times() -> None:
     assert ab.list_libraries() == ("joint_servos",)
     model = ab.compile_diagram(diagram)
     slow, quick = (ab.simulate(model, parameters={"w": w}) for w in (10.0, 40.0))
-    late = [float(np.abs(run["error"]).max()) for run in (slow, quick)]
+    errors = [float(np.abs(run["error"]).max()) for run in (slow, quick)]
     # Gravity acts as a disturbance torque; the position error that it causes is proportional to w**-3.
-    assert late[1] < late[0] / 8
+    assert errors[1] < errors[0] / 8
     assert np.abs(quick["q"][-1] - [0.8, 0.6, -1.0, 0.5, 0.4, -0.6]).max() < 1e-4
 
 

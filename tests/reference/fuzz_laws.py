@@ -285,8 +285,8 @@ def contradicted_rows(case: Case, numbers: BlockNumbers) -> Iterator[str]:
             streak = 0 if exact else streak + 1
             # A switching time may be located slightly late, which affects one row; longer deviations are
             # errors.
-            late = streak < 3 and fits_equations(numbers, port, y, t, inputs, (BORDER, -BORDER, 0.0))
-            if not exact and not late:
+            is_late = streak < 3 and fits_equations(numbers, port, y, t, inputs, (BORDER, -BORDER, 0.0))
+            if not exact and not is_late:
                 yield f"'{numbers.name}/{port}' is {y} at row {row}, not what its equations give for {inputs}"
                 break
 

@@ -363,11 +363,11 @@ class Network:
         self.evaluate(t)
         restarted: set[str] = set()
         for _ in range(2):  # a restart at this tick changes the values that are read
-            again = [b for b in self.blocks.values() if b.clock in (None, *self.ticking) and b.restarts]
-            again = [block for block in again if block.name not in restarted]
-            if not again:
+            restarting = [b for b in self.blocks.values() if b.clock in (None, *self.ticking) and b.restarts]
+            restarting = [block for block in restarting if block.name not in restarted]
+            if not restarting:
                 break
-            for block in again:
+            for block in restarting:
                 block.restart()
                 restarted.add(block.name)
             self.evaluate(t)

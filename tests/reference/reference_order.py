@@ -22,9 +22,9 @@ def assign_clocks(
     sampled = [n for n, b in flat.blocks.items() if b.sampled and "?fire" not in flat.gates.get(n, {})]
     clock_of: dict[str, tuple[float, float]] = {}
     for name in sampled:
-        given = np.atleast_1d(flat.blocks[name].parameter_value("sample_time"))
-        if given.tolist() != [-1.0]:
-            clock_of[name] = (float(given[0]), float(given[1]) if given.size > 1 else 0.0)
+        declared = np.atleast_1d(flat.blocks[name].parameter_value("sample_time"))
+        if declared.tolist() != [-1.0]:
+            clock_of[name] = (float(declared[0]), float(declared[1]) if declared.size > 1 else 0.0)
     sources: dict[str, set[str]] = {name: set() for name in flat.blocks}
     targets: dict[str, set[str]] = {name: set() for name in flat.blocks}
     for (name, _), ref in drivers.items():

@@ -53,8 +53,8 @@ def test_a_hysteresis_has_a_memory() -> None:
 def test_a_ball_bounces() -> None:
     """A fall from 1 m with e = 0.5: the intervals between bounces form a geometric series."""
     builder = DiagramBuilder("ball")
-    place = bl.SecondOrderIntegratorLimited(initial=1.0, lower=0.0, reinitialize=True)
-    ball = builder.add("ball", place, builder.add("weight", bl.Constant(value=-9.81)))
+    position = bl.SecondOrderIntegratorLimited(initial=1.0, lower=0.0, reinitialize=True)
+    ball = builder.add("ball", position, builder.add("weight", bl.Constant(value=-9.81)))
     builder.connect(builder.add("bounce", bl.Gain(gain=-0.5), ball["dx"]), ball["dx0"])
     actual = run_reference(builder.build(), TIMES)
     fall = math.sqrt(2 / 9.81)
@@ -137,8 +137,8 @@ def test_a_native_run_agrees_with_the_reference(kind: str) -> None:
         result = ab.simulate(diagram, stop_time=float(times[-1]), sample_time=0.1, rtol=1e-9, atol=1e-12)
     worst: dict[str, float] = {}
     for step, count in TRIALS:
-        wanted = run_reference(diagram, times[:count], step)
-        worst = {name: distance(result[name][:count], values) for name, values in wanted.items()}
+        expected = run_reference(diagram, times[:count], step)
+        worst = {name: distance(result[name][:count], values) for name, values in expected.items()}
         if all(value < 1e-6 for value in worst.values()):
             return
     raise AssertionError({name: value for name, value in worst.items() if not value < 1e-6})

@@ -203,23 +203,23 @@ def test_break_and_continue_in_a_loop() -> None:
 
 
 def test_an_outer_region_is_left_from_a_nested_one() -> None:
-    def run(r: Routine, x: Reals, wanted: Real) -> Integer:
-        place = r.integer(-1)
+    def run(r: Routine, x: Reals, value: Real) -> Integer:
+        index = r.integer(-1)
         with r.part() as search:
             for row in r.range(0, 3):
                 for column in r.range(row, 3):
-                    with r.when(x[row * 3 + column] == wanted):
-                        place.value = row * 3 + column
+                    with r.when(x[row * 3 + column] == value):
+                        index.value = row * 3 + column
                         search.leave()
-            place.value = -2
-        with r.when(place.value >= 0), r.when(wanted < 0.0):
-            r.return_(place.value * 100)
+            index.value = -2
+        with r.when(index.value >= 0), r.when(value < 0.0):
+            r.return_(index.value * 100)
         with r.otherwise():
-            place.value = place.value * 10
-        return place.value
+            index.value = index.value * 10
+        return index.value
 
     x = [1.0, 5.0, -2.0, 9.0, 4.0, 7.0, 9.0, 9.0, 8.0]
-    assert [both(run, x, wanted, result=int) for wanted in (5.0, -2.0, 9.0, 8.0)] == [1, 200, -20, 8]
+    assert [both(run, x, value, result=int) for value in (5.0, -2.0, 9.0, 8.0)] == [1, 200, -20, 8]
 
 
 def test_stages_can_be_entered_at_each_stage_and_continue_with_the_next() -> None:
@@ -254,8 +254,8 @@ def test_stages_can_be_entered_at_each_stage_and_continue_with_the_next() -> Non
 def test_functions_call_one_another_and_read_tables() -> None:
     def run(r: Routine, x: Reals, n: Integer) -> Real:
         def weighted(r: Routine, x: Reals, flip: Boolean) -> Real:
-            weights, places = r.reals("weights", [2.0, 3.0]), r.integers("places", [1, 0])
-            first = fma(weights[0], x[places[0]], weights[1] * x[places[1]])
+            weights, indices = r.reals("weights", [2.0, 3.0]), r.integers("places", [1, 0])
+            first = fma(weights[0], x[indices[0]], weights[1] * x[indices[1]])
             return select(flip, -first, first)
 
         def store(r: Routine, x: Reals, value: Real) -> None:
@@ -311,9 +311,9 @@ def test_functions_with_many_arrays_divide_the_work_by_a_shared_counter() -> Non
 
     def run(r: Routine, job: Integers, out: Reals, x: Reals) -> Integer:
         def add(r: Routine, start: Integer, *arrays: Reals) -> None:
-            out, given = arrays[0], arrays[1:]
+            out, inputs = arrays[0], arrays[1:]
             for i in r.range(start, start + 5, 2):
-                for array in given:
+                for array in inputs:
                     out[0] = out[0] + array[i]
 
         summed = r.program.define(add, distinct=True, rest=("out", "a", "b"))

@@ -27,12 +27,12 @@ def test_a_transform_times_its_inverse_is_the_identity():
 
 
 def test_transforms_are_equal_and_hashable_by_content():
-    again = Transform.from_matrix(A.matrix)
-    assert again == A
-    assert hash(again) == hash(A)
+    copy = Transform.from_matrix(A.matrix)
+    assert copy == A
+    assert hash(copy) == hash(A)
     assert A != B
-    assert_allclose(again.R, A.rotation)
-    assert_allclose(again.p, A.translation)
+    assert_allclose(copy.R, A.rotation)
+    assert_allclose(copy.p, A.translation)
 
 
 def test_quarter_turns_stay_exact_through_products():
@@ -63,7 +63,7 @@ def test_roll_pitch_yaw_reproduce_the_rotation_and_equal_the_symbolic_angles():
     turns += [troty(np.pi / 2 - 1e-9) @ trotx(0.7), Transform()]
     for turn in turns:
         roll, pitch, yaw = turn.rpy
-        again = trotz(yaw) @ troty(pitch) @ trotx(roll)
-        assert_allclose(again.R, turn.R, rtol=0, atol=4e-15)
+        product = trotz(yaw) @ troty(pitch) @ trotx(roll)
+        assert_allclose(product.R, turn.R, rtol=0, atol=4e-15)
         assert_allclose(turn.rpy, [float(angle) for angle in to_rpy(SX(turn.R), "zyx")], rtol=0, atol=4e-15)
     assert (trotz(0.5) @ troty(np.pi / 2)).rpy[0] == 0.0

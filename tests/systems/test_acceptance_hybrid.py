@@ -30,9 +30,9 @@ def run(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[..., ab.Simu
         options = {**SOLVERS[request.param], "sample_time": stop_time / 97.0, **settings}
         result = ab.simulate(diagram, stop_time=stop_time, **options)
         ab.save_diagram(diagram, tmp_path / "saved.json")
-        again = ab.simulate(ab.load_diagram(tmp_path / "saved.json"), stop_time=stop_time, **options)
+        reloaded = ab.simulate(ab.load_diagram(tmp_path / "saved.json"), stop_time=stop_time, **options)
         for name in result.names:
-            assert np.array_equal(result[name], again[name]), name
+            assert np.array_equal(result[name], reloaded[name]), name
         return result
 
     return by_solver
@@ -132,17 +132,17 @@ def test_two_rates_with_offsets_around_a_plant(run: Run) -> None:
     builder.connect(builder.add("gain", bl.Gain(gain=-1.5), control), x["u"])
     result = run(builder.build(), 3.0)
     ticks = sorted([(0.07 + 0.25 * j, 0) for j in range(12)] + [(0.02 + 0.1 * j, 1) for j in range(30)])
-    value, seen, held, begin = 1.0, 0.0, 0.0, 0.0
+    value, sampled, held, begin = 1.0, 0.0, 0.0, 0.0
     expected = np.empty_like(result.time)
     pieces = [(0.0, 1.0, 0.0)]
     for time, clock in ticks:
         value += -1.5 * held * (time - begin)
         begin = time
         if clock == 0:
-            seen = value
+            sampled = value
         # both clocks tick at 0.32 + 0.5 j: the sensor is evaluated first, because the control depends on it
         else:
-            held = seen
+            held = sampled
         pieces.append((time, value, held))
     for start, level, hold in pieces:
         after = result.time >= start - 1e-12
@@ -160,14 +160,14 @@ def test_a_relay_with_hysteresis_in_a_double_integrator_loop(run: Run) -> None:
     builder.connect(relay, v["u"])
     result = run(builder.build(), 6.0)
     t, expected = result.time, np.empty_like(result.time)
-    begin, place, speed, push = 0.0, 0.0, 1.0, 1.0
+    begin, position, speed, push = 0.0, 0.0, 1.0, 1.0
     while begin < 6.0:
         edge = h if push > 0 else -h
-        # place + speed s + push s^2/2 = edge, the last crossing in the direction of the switch
-        s = (-speed + push * math.sqrt(speed**2 + 2 * push * (edge - place))) / push
+        # position + speed s + push s^2/2 = edge, the last crossing in the direction of the switch
+        s = (-speed + push * math.sqrt(speed**2 + 2 * push * (edge - position))) / push
         inside = (t >= begin) & (t <= begin + s)
-        expected[inside] = place + speed * (t[inside] - begin) + push * (t[inside] - begin) ** 2 / 2
-        begin, place, speed, push = begin + s, edge, speed + push * s, -push
+        expected[inside] = position + speed * (t[inside] - begin) + push * (t[inside] - begin) ** 2 / 2
+        begin, position, speed, push = begin + s, edge, speed + push * s, -push
     np.testing.assert_allclose(result["x"], expected, atol=2e-8)
 
 
@@ -195,11 +195,11 @@ def test_a_sampled_pi_with_a_delay_of_one_tick(run: Run) -> None:
     control = builder.add("control", bl.DiscretePID(P=kp, I=ki, sample_time=T), error)
     builder.connect(builder.add("late", bl.UnitDelay(sample_time=T), control), plant["u"])
     result = run(builder.build(), 6.0, sample_time=T)
-    x, total, waiting, expected = 0.0, 0.0, 0.0, []
+    x, total, pending, expected = 0.0, 0.0, 0.0, []
     for _ in range(31):
         e = 1.0 - x
         expected.append(x)
-        u, waiting = waiting, kp * e + total
+        u, pending = pending, kp * e + total
         total += ki * T * e
         x = x * math.exp(-T) + 2.0 * u * (1.0 - math.exp(-T))
     np.testing.assert_allclose(result["plant/y"], expected, atol=2e-9)

@@ -77,8 +77,8 @@ def test_hires(solver: str, tmp_path: Path) -> None:
     result = ab.simulate(diagram, **settings)
     np.testing.assert_allclose(ends(result, 8), HIRES_END, rtol=2e-6)
     ab.save_diagram(diagram, tmp_path / "hires.json")
-    again = ab.simulate(ab.load_diagram(tmp_path / "hires.json"), **settings)
-    assert ends(again, 8).tolist() == ends(result, 8).tolist()
+    reloaded = ab.simulate(ab.load_diagram(tmp_path / "hires.json"), **settings)
+    assert ends(reloaded, 8).tolist() == ends(result, 8).tolist()
 
 
 @pytest.mark.parametrize("solver", ["auto", "rodas5p"])
@@ -97,8 +97,8 @@ def test_a_diode_rectifier_agrees_with_scipy() -> None:
     def rate(t: float, v: Array) -> Array:
         return (1e-9 * (np.exp((5 * np.sin(314.159265358979 * t) - v) / 0.0259) - 1) - v / 1000) / 1e-5
 
-    want = solve_ivp(rate, (0, 0.04), [0.0], "Radau", t_eval=result.time, rtol=1e-11, atol=1e-13)
-    np.testing.assert_allclose(result["y1"], want.y[0], atol=2e-6)
+    expected = solve_ivp(rate, (0, 0.04), [0.0], "Radau", t_eval=result.time, rtol=1e-11, atol=1e-13)
+    np.testing.assert_allclose(result["y1"], expected.y[0], atol=2e-6)
     assert result["y1"].max() > 4.0
 
 
@@ -106,10 +106,10 @@ def test_a_brusselator_on_a_line_as_two_vectors() -> None:
     """u' = 1 + u^2 v - 4 u + D u, v' = 3 u - u^2 v + D v on 20 points with fixed boundary values."""
     n, spread = 20, 0.02 * 21**2
     D = spread * (np.diag(np.full(n, -2.0)) + np.diag(np.ones(n - 1), 1) + np.diag(np.ones(n - 1), -1))
-    place = np.arange(1, n + 1) / (n + 1)
+    position = np.arange(1, n + 1) / (n + 1)
     edge = spread * (np.arange(n) % (n - 1) == 0)
     builder = ab.DiagramBuilder("brusselator")
-    u = builder.add("u", bl.Integrator(initial=1.0 + np.sin(2 * np.pi * place)))
+    u = builder.add("u", bl.Integrator(initial=1.0 + np.sin(2 * np.pi * position)))
     v = builder.add("v", bl.Integrator(initial=np.full(n, 3.0)))
     for name, own, reaction, border in (
         ("du", u, "1 + u1^2*u2 - 4*u1", 1.0),
@@ -125,9 +125,9 @@ def test_a_brusselator_on_a_line_as_two_vectors() -> None:
         a, b = y[:n], y[n:]
         return np.concatenate([1 + a * a * b - 4 * a + D @ a + edge, 3 * a - a * a * b + D @ b + 3 * edge])
 
-    y0 = np.concatenate([1.0 + np.sin(2 * np.pi * place), np.full(n, 3.0)])
-    want = solve_ivp(rate, (0, 10), y0, "Radau", rtol=1e-10, atol=1e-12)
-    np.testing.assert_allclose(result["u"][-1], want.y[:n, -1], rtol=1e-6)
+    y0 = np.concatenate([1.0 + np.sin(2 * np.pi * position), np.full(n, 3.0)])
+    expected = solve_ivp(rate, (0, 10), y0, "Radau", rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(result["u"][-1], expected.y[:n, -1], rtol=1e-6)
 
 
 # -- loops -------------------------------------------------------------------------------------------------
@@ -158,8 +158,8 @@ def test_the_solution_of_a_loop_with_three_solutions_stays_on_its_branch(
     def root(t: float) -> float:
         return brentq(lambda w: w - 0.9 * math.tanh(3 * w) - 0.05 * math.sin(t) - 0.3, -0.4, 0.0, xtol=1e-15)
 
-    want = np.array([root(t) for t in result.time])
-    np.testing.assert_allclose(result["loop"], want, atol=1e-12)
+    expected = np.array([root(t) for t in result.time])
+    np.testing.assert_allclose(result["loop"], expected, atol=1e-12)
 
 
 @RUNS
@@ -180,8 +180,8 @@ def test_a_vector_loop_through_a_matrix_solve(settings: Mapping[str, object]) ->
     result = ab.simulate(builder.build(), stop_time=3.0, sample_time=0.1, **settings)
     t = result.time
     inverse = np.linalg.inv(A + 0.3 * np.eye(2))
-    want = np.stack([np.cos(t), np.sin(t)], axis=1) @ inverse.T
-    np.testing.assert_allclose(result["solve"].reshape(-1, 2), want, atol=1e-13)
+    expected = np.stack([np.cos(t), np.sin(t)], axis=1) @ inverse.T
+    np.testing.assert_allclose(result["solve"].reshape(-1, 2), expected, atol=1e-13)
     area = np.stack([np.sin(t), 1 - np.cos(t)], axis=1) @ inverse.T
     np.testing.assert_allclose(result["integral"].reshape(-1, 2), area, atol=1e-9)
 
@@ -291,8 +291,10 @@ def test_the_motion_of_a_planar_arm_agrees_with_lagranges_equations(settings: Ma
     def rate(_: float, y: Array) -> Array:
         return np.concatenate([y[2:], planar_acceleration(y[:2], y[2:], np.array([1.0, -0.5]))])
 
-    want = solve_ivp(rate, (0, 1.5), [0.4, -0.9, 0, 0], "DOP853", t_eval=result.time, rtol=1e-12, atol=1e-13)
-    np.testing.assert_allclose(result["arm/q"], want.y[:2].T, atol=2e-7)
+    expected = solve_ivp(
+        rate, (0, 1.5), [0.4, -0.9, 0, 0], "DOP853", t_eval=result.time, rtol=1e-12, atol=1e-13
+    )
+    np.testing.assert_allclose(result["arm/q"], expected.y[:2].T, atol=2e-7)
 
 
 def test_the_torque_with_a_payload_agrees_with_lagranges_equations() -> None:
@@ -349,9 +351,11 @@ def test_two_tanks_in_subsystems_on_a_bus(settings: Mapping[str, object], tmp_pa
     diagram = builder.build()
     result = ab.simulate(diagram, stop_time=4.0, sample_time=0.1, **settings)
     A = np.array([[-1.0, 0.0, 0.0, 1.0], [2.0, -2.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0] * 4])
-    want = np.array([expm(A * max(t - 0.5, 0.0)) @ [0, 0, 0, 2.0] for t in result.time])
-    np.testing.assert_allclose(result["total"], want[:, 2], atol=3e-8)
-    np.testing.assert_allclose(result["second/level"], want[:, 1], atol=3e-8)
+    expected = np.array([expm(A * max(t - 0.5, 0.0)) @ [0, 0, 0, 2.0] for t in result.time])
+    np.testing.assert_allclose(result["total"], expected[:, 2], atol=3e-8)
+    np.testing.assert_allclose(result["second/level"], expected[:, 1], atol=3e-8)
     ab.save_diagram(diagram, tmp_path / "tanks.json")
-    again = ab.simulate(ab.load_diagram(tmp_path / "tanks.json"), stop_time=4.0, sample_time=0.1, **settings)
-    assert np.array_equal(again["total"], result["total"])
+    reloaded = ab.simulate(
+        ab.load_diagram(tmp_path / "tanks.json"), stop_time=4.0, sample_time=0.1, **settings
+    )
+    assert np.array_equal(reloaded["total"], result["total"])

@@ -60,8 +60,8 @@ def test_sensor_noise_has_the_given_deviations_and_is_uncorrelated() -> None:
     result = sensed()
     noise = np.hstack([result["sensor/q_measured"] - 0.5, result["sensor/qd_measured"]])
     assert not noise[:, 2].any(), "a deviation of 0 gives no noise"
-    wanted = np.array([0.01, 0.02, 0.1, 0.1, 0.1])
-    noise = np.delete(noise, 2, axis=1) / wanted
+    expected = np.array([0.01, 0.02, 0.1, 0.1, 0.1])
+    noise = np.delete(noise, 2, axis=1) / expected
     # 10 001 samples; standard errors: mean 1e-2, deviation 7e-3, correlation 1e-2; bounds of 4 sigma
     assert np.abs(noise.mean(axis=0)).max() < 0.04
     assert np.abs(noise.std(axis=0) - 1.0).max() < 0.03
@@ -71,8 +71,8 @@ def test_sensor_noise_has_the_given_deviations_and_is_uncorrelated() -> None:
 
 
 def test_equal_seeds_give_equal_noise_and_other_seeds_other_noise() -> None:
-    one, again, other = sensed(seed=7.0), sensed(seed=7.0), sensed(seed=8.0)
-    np.testing.assert_array_equal(one["sensor/qd_measured"], again["sensor/qd_measured"])
+    one, repeated, other = sensed(seed=7.0), sensed(seed=7.0), sensed(seed=8.0)
+    np.testing.assert_array_equal(one["sensor/qd_measured"], repeated["sensor/qd_measured"])
     assert (one["sensor/qd_measured"] != other["sensor/qd_measured"]).mean() > 0.99
 
 

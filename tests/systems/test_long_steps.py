@@ -63,8 +63,8 @@ def test_turns_just_before_the_event_of_a_step_are_found() -> None:
     for divisor_value, *values in parabolas():
         tuned = {"parabola.values": values, "divisor.value": divisor_value}
         result = ab.simulate(diagram, stop_time=2.0, sample_time=5e-4, parameters=tuned)
-        wanted = np.mod(result["parabola"], divisor_value)
-        differs = np.abs(result["rest"] - wanted) > 1e-8
+        expected = np.mod(result["parabola"], divisor_value)
+        differs = np.abs(result["rest"] - expected) > 1e-8
         # In a row at the time of an event rounding decides between 0 and the divisor.
         assert not (differs[1:] & differs[:-1]).any(), (divisor_value, values)
 

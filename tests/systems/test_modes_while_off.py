@@ -67,8 +67,8 @@ def test_modes_are_consistent_with_a_jump_before_the_first_enabling(settings: di
     diagram = all_enabled(blocks, bl.Step(time=0.2, initial=-1.0), bl.Step(time=0.5))
     result = ab.simulate(diagram, stop_time=1.0, sample_time=0.1, **settings)
     for kind, (_, expected) in zip(blocks, SWITCHING):
-        wanted = pytest.approx([0.0] * 5 + [expected] * 6, abs=1e-12)
-        assert result[f"sub {kind}/o"].tolist() == wanted, kind
+        expected_values = pytest.approx([0.0] * 5 + [expected] * 6, abs=1e-12)
+        assert result[f"sub {kind}/o"].tolist() == expected_values, kind
         assert result[f"total {kind}"][-1] == pytest.approx(0.5 * expected, abs=1e-9), kind
 
 

@@ -384,8 +384,8 @@ def test_the_kinks_and_steps_of_a_table(run: Run) -> None:
         return total
 
     for case in cases:
-        wanted = np.array([integral(t - 1.0, *case) for t in result["t"]])
-        close(result[f"integral {' '.join(case)}/y"], wanted, 1e-10)
+        expected = np.array([integral(t - 1.0, *case) for t in result["t"]])
+        close(result[f"integral {' '.join(case)}/y"], expected, 1e-10)
 
 
 def test_the_limits_of_a_drive(run: Run) -> None:
