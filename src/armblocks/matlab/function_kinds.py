@@ -145,7 +145,7 @@ Compute = (
 
 @dataclass(frozen=True, kw_only=True)
 class Function:
-    """A function of ``min_arguments`` to ``max_arguments`` arguments, or a constant (none)."""
+    """A function of ``min_arguments`` to ``max_arguments`` values, or a constant (none)."""
 
     arguments: str
     """The arguments in the documentation, ``x, y``."""

@@ -26,7 +26,7 @@ from armblocks.errors import InputError, UnknownNameError
 from armblocks.matlab.formula import Formula
 from armblocks.matlab.functions import RESERVED, TABLE
 
-_RESERVED = frozenset(name for name in RESERVED if TABLE[name].most == 0 or TABLE[name].elementwise)
+_RESERVED = frozenset(name for name in RESERVED if TABLE[name].max_arguments == 0 or TABLE[name].elementwise)
 """Names that no constant may have; a constant may hide a function of whole arrays, such as ``sum``."""
 
 
