@@ -13,7 +13,7 @@ from armblocks.pictures.text_width import text_width
 from armblocks.pictures.thinning import thin_out
 from armblocks.report.charts.path_chart import path_chart
 from armblocks.report.charts.scale import padded
-from armblocks.report.charts.time_chart import Panel, Trace, spread, time_chart
+from armblocks.report.charts.time_chart import Panel, Trace, separated, time_chart
 
 
 def boxes(picture: Picture) -> list[tuple[float, float, float, float]]:
@@ -56,13 +56,13 @@ def test_texts_do_not_overlap_and_are_inside_the_picture(scale: float) -> None:
 
 @given(st.lists(st.floats(0, 150), min_size=1, max_size=9))
 def test_labels_are_spread_within_their_panel(wanted: list[float]) -> None:
-    places = spread(sorted(wanted), 15.0, 0.0, 150.0)
+    places = separated(sorted(wanted), 15.0, 0.0, 150.0)
     assert all(b - a >= 15.0 - 1e-9 for a, b in itertools.pairwise(places))
     assert places[0] >= 0.0 and places[-1] <= 150.0 + 1e-9
 
 
 def test_labels_that_do_not_overlap_are_not_moved() -> None:
-    assert spread([10.0, 60.0, 120.0], 15.0, 0.0, 150.0) == [10.0, 60.0, 120.0]
+    assert separated([10.0, 60.0, 120.0], 15.0, 0.0, 150.0) == [10.0, 60.0, 120.0]
 
 
 def test_thinning_keeps_the_ends_and_every_peak() -> None:

@@ -31,7 +31,7 @@ from armblocks.diagram import DiagramBuilder
 from armblocks.equations import SimulationOptions
 from armblocks.errors import FormatError, LimitWarning, UnknownNameError
 from armblocks.report import write_report
-from armblocks.report.figures import file_name, for_people
+from armblocks.report.figures import file_name, in_shown_unit
 from armblocks.robot import JointLimits, Robot, serial_chain, standard_dh
 
 VOID = {"meta", "br", "img", "link", "rect", "path", "circle", "image"}
@@ -264,7 +264,7 @@ def test_file_names_of_figures_are_sanitised(name: str, expected: str) -> None:
 def test_quantities_are_shown_in_display_units(
     value: float, unit: str, shown: float, shown_unit: str
 ) -> None:
-    values, found = for_people(np.array([value]), unit)
+    values, found = in_shown_unit(np.array([value]), unit)
     assert (values[0], found) == (pytest.approx(shown, rel=1e-3), shown_unit)
 
 

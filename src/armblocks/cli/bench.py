@@ -27,7 +27,7 @@ METHODS: dict[str, tuple[str, ...]] = {
 """The measured functions, with their inputs."""
 
 _REPEATS = 5
-"""The minimum of the repeats is reported, which is least affected by other load."""
+"""Number of repeats. Their minimum is reported, because other load affects it least."""
 
 
 def bench(
@@ -70,16 +70,16 @@ def _row(arm: Arm, method: str, inputs: int, samples: int, threads: int) -> list
             call(*single)
 
     times = (
-        _least(many_single_calls) / calls,
-        _least(lambda: call(*batch, out=out)) / samples,
-        _least(lambda: call(*batch, out=out, threads=threads)) / samples,
+        _fastest(many_single_calls) / calls,
+        _fastest(lambda: call(*batch, out=out)) / samples,
+        _fastest(lambda: call(*batch, out=out, threads=threads)) / samples,
     )
     others = count.divisions + count.square_roots + count.comparisons + count.others + count.function_calls
     counts = (count.multiplies, count.adds, count.fused_multiply_adds, others)
     return [*(f"{seconds * 1e9:,.1f}" for seconds in times), *(str(number) for number in counts)]
 
 
-def _least(work: Callable[[], object]) -> float:
+def _fastest(work: Callable[[], object]) -> float:
     """Time of the fastest repeat, s."""
     best = float("inf")
     for _ in range(_REPEATS):

@@ -49,12 +49,12 @@ def describe_blocks(
     if name is None:
         _list(console, search)
     elif save is not None:
-        _save(console, _found(name), save)
+        _save(console, _block_type(name), save)
     else:
-        _show(console, _found(name))
+        _show(console, _block_type(name))
 
 
-def _found(name: str) -> type[Block]:
+def _block_type(name: str) -> type[Block]:
     """The block of this type name or title, in any case."""
     from armblocks.blocks import BLOCKS
     from armblocks.errors import UnknownNameError
@@ -87,8 +87,8 @@ def _mentions(kind: type[Block], search: str) -> bool:
     from armblocks.blocks import BLOCKS
 
     words = (kind.type_name(), kind.title, BLOCKS.family_of(kind), inspect.cleandoc(kind.__doc__ or ""))
-    wanted = " ".join(search.casefold().split())
-    return any(wanted in " ".join(text.casefold().split()) for text in words)
+    query = " ".join(search.casefold().split())
+    return any(query in " ".join(text.casefold().split()) for text in words)
 
 
 def blocks_table(kinds: list[type[Block]]) -> Table:
@@ -143,12 +143,12 @@ def _show(console: Console, kind: type[Block]) -> None:
 
 
 def _paragraphs(docstring: str) -> list[Text]:
-    """The docstring for a terminal: paragraphs are refilled, indented formulas are kept."""
-    found: list[Text] = []
+    """The docstring for a terminal: paragraphs are refilled, indented formulas are unchanged."""
+    paragraphs: list[Text] = []
     for paragraph in docstring.replace("::\n", ":\n").replace("``", "").split("\n\n"):
-        kept = paragraph.startswith("    ")
-        found.append(Text("\n" + (paragraph if kept else " ".join(paragraph.split()))))
-    return found
+        is_formula = paragraph.startswith("    ")
+        paragraphs.append(Text("\n" + (paragraph if is_formula else " ".join(paragraph.split()))))
+    return paragraphs
 
 
 def _ports(title: str, ports: tuple[Port, ...]) -> Table:

@@ -37,8 +37,7 @@ def _beginning(typed: str, names: tuple[str, ...]) -> list[str]:
 
 
 def _files(typed: str) -> list[str]:
-    """Folders and files in the typed folder that have a suffix of robots, which include ``.json`` of
-    diagrams."""
+    """Folders, and files with a suffix of robots or diagrams, in the typed folder."""
     from armblocks.formats import ROBOT_SUFFIXES
 
     folder, slash, beginning = typed.rpartition("/")

@@ -41,50 +41,49 @@ def diff(
     import armblocks as ab
 
     old, new = ab.load_diagram(before, trust=trust), ab.load_diagram(after, trust=trust)
-    found = ab.diagram_difference(old, new)
+    difference = ab.diagram_difference(old, new)
     if as_json:
-        typer.echo(json.dumps(difference_document(found), indent=2, ensure_ascii=False))
+        typer.echo(json.dumps(difference_document(difference), indent=2, ensure_ascii=False))
     else:
-        print_difference(found, before, after, results_console())
-    if found:
+        print_difference(difference, before, after, results_console())
+    if difference:
         raise typer.Exit(DIFFERENT)
 
 
-# -- text output
-# ----------------------------------------------------------------------------------------------
+# -- text output --------------------------------------------------------------------------------------------
 
 
-def print_difference(found: DiagramDifference, before: str, after: str, console: Console) -> None:
+def print_difference(difference: DiagramDifference, before: str, after: str, console: Console) -> None:
     """A heading, then grouped differences, one per line; leading signs repeat the colours."""
-    if not found:
+    if not difference:
         console.print(f"{before} and {after} are the same, layout aside", style=STRONG, soft_wrap=True)
         return
-    noun = "difference" if found.count == 1 else "differences"
-    console.print(f"{before} -> {after}: {found.count} {noun}", style=STRONG, soft_wrap=True)
-    added = [f"{entry.path}: {_block_text(entry.block)}" for entry in found.added]
-    removed = [f"{entry.path}: {_block_text(entry.block)}" for entry in found.removed]
-    renamed = [f"{entry.before} -> {entry.after} ({entry.block.type_name()})" for entry in found.renamed]
-    types = [f"{entry.path}: {entry.before} -> {entry.after}" for entry in found.types]
+    noun = "difference" if difference.count == 1 else "differences"
+    console.print(f"{before} -> {after}: {difference.count} {noun}", style=STRONG, soft_wrap=True)
+    added = [f"{entry.path}: {_block_text(entry.block)}" for entry in difference.added]
+    removed = [f"{entry.path}: {_block_text(entry.block)}" for entry in difference.removed]
+    renamed = [f"{entry.before} -> {entry.after} ({entry.block.type_name()})" for entry in difference.renamed]
+    types = [f"{entry.path}: {entry.before} -> {entry.after}" for entry in difference.types]
     settings, about, parameters, masks, comments, signals = (
         [_change_text(entry, "." if entry.path else "") for entry in entries]
         for entries in (
-            found.settings,
-            found.descriptions,
-            found.parameters,
-            found.masks,
-            found.comments,
-            found.signal_names,
+            difference.settings,
+            difference.descriptions,
+            difference.parameters,
+            difference.masks,
+            difference.comments,
+            difference.signal_names,
         )
     )
-    notes = [_change_text(entry, "") for entry in found.notes]
+    notes = [_change_text(entry, "") for entry in difference.notes]
     _print_group("Blocks", (("-", removed), ("+", added), ("~", [*renamed, *types])), console)
     _print_group("Parameters", (("~", parameters),), console)
     _print_group("Masks", (("~", masks),), console)
     _print_group("Comments", (("~", comments),), console)
     _print_group("Signal names", (("~", signals),), console)
-    wires = (("-", _wires(found.wires_removed)), ("+", _wires(found.wires_added)))
+    wires = (("-", _wires(difference.wires_removed)), ("+", _wires(difference.wires_added)))
     _print_group("Wires", wires, console)
-    logged = (("-", _ports(found.logged_removed)), ("+", _ports(found.logged_added)))
+    logged = (("-", _ports(difference.logged_removed)), ("+", _ports(difference.logged_added)))
     _print_group("Logged", logged, console)
     _print_group("Settings", (("~", settings),), console)
     _print_group("Description", (("~", about),), console)
@@ -101,9 +100,9 @@ def _print_group(title: str, entries: Sequence[tuple[str, Sequence[str]]], conso
         for line in lines:
             wrapped = Text(line).wrap(console, max(20, console.width - 4))
             for index, part in enumerate(wrapped):
-                lead = Text(f"  {sign} ", styles[sign]) if index == 0 else Text("      ")
+                prefix = Text(f"  {sign} ", styles[sign]) if index == 0 else Text("      ")
                 part.rstrip()
-                console.print(Text.assemble(lead, part), soft_wrap=True)
+                console.print(Text.assemble(prefix, part), soft_wrap=True)
 
 
 def _wires(wires: Sequence[PlacedWire]) -> list[str]:
@@ -212,28 +211,32 @@ def _object_text(value: object) -> str:
 # -- JSON output --------------------------------------------------------------------------------------------
 
 
-def difference_document(found: DiagramDifference) -> dict[str, object]:
+def difference_document(difference: DiagramDifference) -> dict[str, object]:
     """The differences as a JSON object: all lists are present, possibly empty."""
     return {
-        "same": not found,
-        "added": [_placed(entry.path, entry.block) for entry in found.added],
-        "removed": [_placed(entry.path, entry.block) for entry in found.removed],
+        "same": not difference,
+        "added": [_placed(entry.path, entry.block) for entry in difference.added],
+        "removed": [_placed(entry.path, entry.block) for entry in difference.removed],
         "renamed": [
             {"before": entry.before, "after": entry.after, "type": entry.block.type_name()}
-            for entry in found.renamed
+            for entry in difference.renamed
         ],
-        "types": [_change(entry) for entry in found.types],
-        "parameters": [_change(entry) for entry in found.parameters],
-        "masks": [_change(entry) for entry in found.masks],
-        "comments": [_change(entry) for entry in found.comments],
-        "signal_names": [_change(entry) for entry in found.signal_names],
-        "wires_added": [{"path": entry.path, "wire": str(entry.wire)} for entry in found.wires_added],
-        "wires_removed": [{"path": entry.path, "wire": str(entry.wire)} for entry in found.wires_removed],
-        "logged_added": [{"path": entry.path, "port": str(entry.port)} for entry in found.logged_added],
-        "logged_removed": [{"path": entry.path, "port": str(entry.port)} for entry in found.logged_removed],
-        "settings": [_change(entry) for entry in found.settings],
-        "descriptions": [_change(entry) for entry in found.descriptions],
-        "notes": [_change(entry) for entry in found.notes],
+        "types": [_change(entry) for entry in difference.types],
+        "parameters": [_change(entry) for entry in difference.parameters],
+        "masks": [_change(entry) for entry in difference.masks],
+        "comments": [_change(entry) for entry in difference.comments],
+        "signal_names": [_change(entry) for entry in difference.signal_names],
+        "wires_added": [{"path": entry.path, "wire": str(entry.wire)} for entry in difference.wires_added],
+        "wires_removed": [
+            {"path": entry.path, "wire": str(entry.wire)} for entry in difference.wires_removed
+        ],
+        "logged_added": [{"path": entry.path, "port": str(entry.port)} for entry in difference.logged_added],
+        "logged_removed": [
+            {"path": entry.path, "port": str(entry.port)} for entry in difference.logged_removed
+        ],
+        "settings": [_change(entry) for entry in difference.settings],
+        "descriptions": [_change(entry) for entry in difference.descriptions],
+        "notes": [_change(entry) for entry in difference.notes],
     }
 
 

@@ -46,11 +46,11 @@ def docs(
     """Open the documentation in the browser, without network access."""
     console = messages_console()
     folder = built_pages(lambda text: console.print(text, soft_wrap=True), INSTALLED, BUILD)
-    found = pages(folder)
-    if page not in found:
-        raise UnknownNameError("page of the documentation", page, found)
-    if path or not webbrowser.open(found[page].as_uri()):
-        results_console().print(str(found[page]), soft_wrap=True)
+    known_pages = pages(folder)
+    if page not in known_pages:
+        raise UnknownNameError("page of the documentation", page, known_pages)
+    if path or not webbrowser.open(known_pages[page].as_uri()):
+        results_console().print(str(known_pages[page]), soft_wrap=True)
 
 
 def pages(folder: Path) -> dict[str, Path]:
@@ -60,11 +60,10 @@ def pages(folder: Path) -> dict[str, Path]:
 
 
 def built_pages(notify: Callable[[str], None], installed_pages: Path, script: Path) -> Path:
-    """The folder of the built pages, which are built first in a checkout without pages.
+    """The folder of the built pages; a checkout without pages builds them first.
 
-    ``notify`` is called with a line before the build.
-
-    Raises ``FormatError`` if there are no pages and they cannot be built.
+    ``notify`` is called with one line of text before the build. Raises ``FormatError`` if there are
+    no pages and they cannot be built.
     """
     if (installed_pages / "index.html").is_file():
         return installed_pages
@@ -86,8 +85,10 @@ def built_pages(notify: Callable[[str], None], installed_pages: Path, script: Pa
             fix=f'{sys.executable} -m pip install --editable "{script.parents[1]}[docs]"',
         )
     notify("Building the documentation of this checkout, once (about a minute).")
-    done = subprocess.run([sys.executable, str(script)], stdin=subprocess.DEVNULL, stdout=sys.stderr.fileno())
-    if done.returncode != 0:
+    completed = subprocess.run(
+        [sys.executable, str(script)], stdin=subprocess.DEVNULL, stdout=sys.stderr.fileno()
+    )
+    if completed.returncode != 0:
         raise FormatError(
             "the documentation could not be built; the reason is printed above",
             where=str(script),

@@ -17,7 +17,7 @@ from armblocks.errors import InputError
 if TYPE_CHECKING:
     from armblocks import LinearSystem, OperatingPoint
 
-SECTION = 12
+MOST_POLES = 12
 """Maximum number of listed poles."""
 
 
@@ -72,14 +72,14 @@ def linearize(
         )
     diagram = ab.load_diagram(model)
     parameters = parse_assignments(assignments or [])
-    place: float | OperatingPoint = at
+    point: float | OperatingPoint = at
     if trimmed:
-        place = ab.trim(diagram, free=free or (), at=at, parameters=parameters).point
+        point = ab.trim(diagram, free=free or (), at=at, parameters=parameters).point
     system: LinearSystem = ab.linearize(
         diagram,
         inputs or (),
         outputs or (),
-        at=place,
+        at=point,
         open=opened or (),
         delay_order=delay_order,
         parameters=parameters,
@@ -111,7 +111,7 @@ def print_system(system: LinearSystem, console: Console, *, loop: bool, hertz: b
     if system.order:
         _print_poles(system, console, hertz=hertz)
     if system.inputs and system.outputs:
-        zeros = ", ".join(complex_number(zero) for zero in shown_zeros(system).tolist()[:SECTION])
+        zeros = ", ".join(complex_number(zero) for zero in shown_zeros(system).tolist()[:MOST_POLES])
         console.print(f"zeros: {zeros or 'none'}", soft_wrap=True)
     if not system.is_siso:
         return
@@ -134,7 +134,7 @@ def _print_poles(system: LinearSystem, console: Console, *, hertz: bool) -> None
         ("pole", "left"), (f"frequency, {unit}", "right"), ("damping", "right"), ("time constant, s", "right")
     )
     modes = shown_modes(system)
-    for mode in modes[:SECTION]:
+    for mode in modes[:MOST_POLES]:
         rows.add_row(
             complex_number(mode.pole),
             f"{mode.frequency / (2 * math.pi if hertz else 1.0):.5g}",
@@ -143,30 +143,30 @@ def _print_poles(system: LinearSystem, console: Console, *, hertz: bool) -> None
         )
     console.print()
     console.print(rows)
-    if len(modes) > SECTION:
-        console.print(f"and {len(modes) - SECTION} more, faster ones")
+    if len(modes) > MOST_POLES:
+        console.print(f"and {len(modes) - MOST_POLES} more, faster ones")
     console.print()
 
 
 def _print_margins(system: LinearSystem, console: Console, *, hertz: bool) -> None:
     from armblocks.analysis.margins import shown_margins
 
-    found = shown_margins(system)
+    margins = shown_margins(system)
     rows = table(("margin of 1 + L", "left"), ("", "right"), ("at", "right"))
-    if math.isfinite(found.gain):
-        text = f"{found.gain_decibels:.4g} dB (factor {found.gain:.4g})"
-        rows.add_row("gain", text, _frequency(found.gain_frequency, hertz))
+    if math.isfinite(margins.gain):
+        text = f"{margins.gain_decibels:.4g} dB (factor {margins.gain:.4g})"
+        rows.add_row("gain", text, _frequency(margins.gain_frequency, hertz))
     else:
         rows.add_row("gain", "infinite", "")
-    if math.isfinite(found.phase):
-        rows.add_row("phase", f"{found.phase:.4g} deg", _frequency(found.phase_frequency, hertz))
-        rows.add_row("delay", f"{found.delay:.4g} s", _frequency(found.delay_frequency, hertz))
+    if math.isfinite(margins.phase):
+        rows.add_row("phase", f"{margins.phase:.4g} deg", _frequency(margins.phase_frequency, hertz))
+        rows.add_row("delay", f"{margins.delay:.4g} s", _frequency(margins.delay_frequency, hertz))
     else:
         rows.add_row("phase", "infinite", "")
-    rows.add_row("distance from -1", f"{found.modulus:.4g}", _frequency(found.modulus_frequency, hertz))
+    rows.add_row("distance from -1", f"{margins.modulus:.4g}", _frequency(margins.modulus_frequency, hertz))
     console.print()
     console.print(rows)
-    console.print("closed loop: " + ("stable" if found.stable else "unstable"))
+    console.print("closed loop: " + ("stable" if margins.stable else "unstable"))
 
 
 def _frequency(value: float, hertz: bool) -> str:

@@ -40,13 +40,13 @@ def _robots() -> Table:
     import armblocks as ab
 
     rows = table(("robot", "left"), ("joints", "left"), ("description", "left"))
-    # Loaded for its name only: warnings about inertias are for users of the robot.
+    # Only names and descriptions are printed, so warnings about inertias are suppressed.
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", InertiaWarning)
         for name in ab.list_robots():
             robot = ab.load_robot(name).robot
-            about = "; ".join(text for text in (robot.manufacturer, robot.comment) if text)
-            rows.add_row(name, robot.joint_letters, about)
+            description = "; ".join(text for text in (robot.manufacturer, robot.comment) if text)
+            rows.add_row(name, robot.joint_letters, description)
     return rows
 
 
@@ -75,9 +75,9 @@ def _libraries() -> Table:
     rows = table(("library", "left"), ("subsystem", "left"), ("parameters", "left"), ("description", "left"))
     for library in ab.list_libraries():
         for name, subsystem in ab.load_library(library).items():
-            inside = subsystem.diagram
+            inner = subsystem.diagram
             rows.add_row(
-                library, name, ", ".join(parameter.name for parameter in inside.mask), inside.description
+                library, name, ", ".join(parameter.name for parameter in inner.mask), inner.description
             )
     return rows
 

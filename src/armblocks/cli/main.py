@@ -29,7 +29,7 @@ from armblocks.cli import (
 from armblocks.cli.terminal import debugging, messages_console, show_error, tidy_warnings
 from armblocks.errors import ArmblocksError
 
-REFUSED = 2
+INVALID_INPUT = 2
 INTERRUPTED = 130
 GARBAGE_THRESHOLD = 50_000
 """Number of new objects between runs of Python's cyclic garbage collector."""
@@ -47,7 +47,7 @@ class Commands(TyperGroup):
             if debugging():
                 raise
             show_error(error)
-            raise typer.Exit(REFUSED) from None
+            raise typer.Exit(INVALID_INPUT) from None
         except KeyboardInterrupt:
             messages_console().print("interrupted")
             raise typer.Exit(INTERRUPTED) from None
@@ -75,7 +75,7 @@ app.command("bench")(bench.bench)
 app.command("studio")(studio.studio)
 
 
-def _say_version(requested: bool) -> None:
+def _print_version(requested: bool) -> None:
     if requested:
         from importlib.metadata import version
 
@@ -87,7 +87,7 @@ def _say_version(requested: bool) -> None:
 def options(
     version: Annotated[
         bool,
-        typer.Option("--version", help="Print the version and exit.", callback=_say_version, is_eager=True),
+        typer.Option("--version", help="Print the version and exit.", callback=_print_version, is_eager=True),
     ] = False,
 ) -> None:
     """Options before the command."""

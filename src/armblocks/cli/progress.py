@@ -12,7 +12,7 @@ from armblocks.cli.terminal import ACCENT
 
 _FIRST_LINE, _LINE_EVERY = 0.5, 5.0
 """Seconds before the first plain line, and between lines; short runs print none."""
-_WORTH_TELLING = 2.0
+_REMAINING_SHOWN = 2.0
 """Seconds after which the remaining time is shown."""
 
 
@@ -47,12 +47,12 @@ class RunProgress:
             self._bar.stop()
 
     def __call__(self, simulated: float, fraction: float, real_time_factor: float) -> None:
-        reached = f"{simulated:,.0f}" if simulated >= 1000 else f"{simulated:.4g}"
-        where = f"t = {reached} s, {factor_text(real_time_factor)} x real time"
+        time_text = f"{simulated:,.0f}" if simulated >= 1000 else f"{simulated:.4g}"
+        where = f"t = {time_text} s, {factor_text(real_time_factor)} x real time"
         now = time.perf_counter()
-        left = (now - self._began) * (1.0 / fraction - 1.0) if fraction > 0.0 else 0.0
-        if left >= _WORTH_TELLING:
-            where += f", {_duration(left)} left"
+        remaining = (now - self._began) * (1.0 / fraction - 1.0) if fraction > 0.0 else 0.0
+        if remaining >= _REMAINING_SHOWN:
+            where += f", {_duration(remaining)} left"
         if self._bar is not None and self._task is not None:
             self._bar.update(self._task, total=1.0, completed=fraction, where=where)
         elif now >= self._next_line and fraction < 1.0:

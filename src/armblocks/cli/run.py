@@ -90,15 +90,15 @@ def run(
 
     parameters = parse_assignments(assignments or [])
     diagram = ab.load_diagram(model, trust=trust)
-    settings = _stated(stop_time=stop_time, solver=solver, step=step, sample_time=sample_time)
-    settings |= _stated(rtol=rtol, atol=atol, record_jumps=jumps)
+    settings = _given_settings(stop_time=stop_time, solver=solver, step=step, sample_time=sample_time)
+    settings |= _given_settings(rtol=rtol, atol=atol, record_jumps=jumps)
     _check_files(diagram, formats or [])
     folder = out or Path(f"{diagram.name}-report")
-    made = [place for place in (folder, *folder.parents) if not place.exists()]
+    new_folders = [path for path in (folder, *folder.parents) if not path.exists()]
     _check_writable(folder)
     signals = [name.strip() for name in log_signals.split(",")] if log_signals else []
     settings.update(parameters=parameters, initial_state=from_state, log=log, log_signals=signals)
-    with _empty_folders_removed(made):
+    with _empty_folders_removed(new_folders):
         result, failure = _simulate(diagram, settings)
     files = _report(folder, diagram, result, figures, formats or [])
     if save_state is not None and result.final_state is not None:
@@ -118,8 +118,8 @@ def run(
         raise KeyboardInterrupt
 
 
-def _stated(**settings: Any) -> dict[str, Any]:
-    """The settings: those of the command line, otherwise those of the model."""
+def _given_settings(**settings: Any) -> dict[str, Any]:
+    """The settings that the command line gives; the model has the others."""
     return {name: value for name, value in settings.items() if value is not None}
 
 
@@ -180,12 +180,12 @@ def _check_writable(folder: Path) -> None:
 
 
 @contextmanager
-def _empty_folders_removed(made: Sequence[Path]) -> Generator[None]:
+def _empty_folders_removed(new_folders: Sequence[Path]) -> Generator[None]:
     """If the run is refused, remove the folders that were created for it, if they are empty."""
     try:
         yield
     except BaseException:
         with suppress(OSError):
-            for folder in made:
+            for folder in new_folders:
                 folder.rmdir()
         raise

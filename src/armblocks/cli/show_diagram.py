@@ -70,10 +70,10 @@ def _count(diagram: Diagram) -> str:
     """``"12 blocks (80 with those inside), 14 wires"``."""
     from armblocks.diagram import block_count
 
-    here, all_in_all = len(diagram.blocks), block_count(diagram)
-    inside = f" ({all_in_all} with those inside)" if all_in_all > here else ""
+    count, total = len(diagram.blocks), block_count(diagram)
+    inside = f" ({total} with those inside)" if total > count else ""
     wires = len(diagram.connections)
-    return f"{here} block{'' if here == 1 else 's'}{inside}, {wires} wire{'' if wires == 1 else 's'}"
+    return f"{count} block{'' if count == 1 else 's'}{inside}, {wires} wire{'' if wires == 1 else 's'}"
 
 
 def _mask_lines(diagram: Diagram) -> Iterator[Text]:

@@ -71,4 +71,4 @@ def studio(
         console.print(f"The studio is at {link}", soft_wrap=True, highlight=False)
         console.print("The link is valid once. Ctrl-C ends the studio.")
 
-    serve(root, model, port=port, open_browser=browser, announce=announce, afresh=new_session)
+    serve(root, model, port=port, open_browser=browser, announce=announce, new_session=new_session)

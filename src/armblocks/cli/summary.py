@@ -17,13 +17,13 @@ from armblocks.diagram import ViewKind, diagram_views
 from armblocks.extras import installed
 from armblocks.pictures.numbers import wall_time
 from armblocks.report.motion import motions
-from armblocks.report.motion_summary import JointSummary, LimitKind, people_unit, shown_summary, summarise
+from armblocks.report.motion_summary import JointSummary, LimitKind, shown_summary, shown_unit_of, summarise
 
 if TYPE_CHECKING:
     from armblocks import Diagram, SimulationResult
     from armblocks.report.writing import ReportFiles
 
-BEYOND = "!"
+LIMIT_MARK = "!"
 """Marks values beyond a limit, for output without colours."""
 
 
@@ -31,11 +31,11 @@ def print_run(result: SimulationResult, console: Console) -> None:
     """One line: model, solver and speed."""
     run = result.run
     end = f"{result.time[-1]:,.10g} s" if result.time.size else "nothing"
-    how = "evaluated at" if run.solver == "none" else f"{run.solver}, {run.steps:,} steps, recorded at"
+    method = "evaluated at" if run.solver == "none" else f"{run.solver}, {run.steps:,} steps, recorded at"
     text = Text.assemble(
         (f"{result.name}: ", STRONG),
         f"{end} in {' '.join(wall_time(run.wall_time))}, {factor_text(run.real_time_factor)} x real time; ",
-        f"{how} {result.time.size:,} samples",
+        f"{method} {result.time.size:,} samples",
     )
     console.print(text)
     if not run.complete:
@@ -71,22 +71,22 @@ def print_motions(diagram: Diagram, result: SimulationResult, console: Console) 
     if not result.time.size:
         return
     for motion in motions(diagram, result):
-        whole = shown_summary(
+        summary = shown_summary(
             summarise(motion.robot, motion.time, motion.q, motion.qd, motion.qdd, motion.tau, motion.tool)
         )
-        exceeded = {(finding.joint, finding.kind) for finding in whole.findings}
+        exceeded = {(finding.joint, finding.kind) for finding in summary.findings}
         console.print()
         console.print(Text(motion.robot.name, STRONG))
-        console.print(_joint_table(whole.joints, exceeded))
-        for finding in whole.findings:
-            console.print(Text.assemble((f"{BEYOND} ", ERROR), finding.text))
+        console.print(_joint_table(summary.joints, exceeded))
+        for finding in summary.findings:
+            console.print(Text.assemble((f"{LIMIT_MARK} ", ERROR), finding.text))
 
 
 def _joint_table(joints: Sequence[JointSummary], exceeded: set[tuple[str, LimitKind]]) -> Table:
     units = {joint.unit for joint in joints}
     mixed = len(units) != 1
     limited = any(joint.torque_limit is not None for joint in joints)
-    headings = {kind: "" if mixed else f"\n{people_unit(kind, joints[0].unit)[1]}" for kind in LimitKind}
+    headings = {kind: "" if mixed else f"\n{shown_unit_of(kind, joints[0].unit)[1]}" for kind in LimitKind}
     rows = table(
         ("joint", "left"),
         *((("unit", "left"),) if mixed else ()),
@@ -99,8 +99,8 @@ def _joint_table(joints: Sequence[JointSummary], exceeded: set[tuple[str, LimitK
         *((("allowed", "right"),) if limited else ()),
     )
     for joint in joints:
-        position, angle = people_unit(LimitKind.POSITION, joint.unit)
-        speed, _ = people_unit(LimitKind.SPEED, joint.unit)
+        position, angle = shown_unit_of(LimitKind.POSITION, joint.unit)
+        speed, _ = shown_unit_of(LimitKind.SPEED, joint.unit)
         ends = joint.position_limits
         rows.add_row(
             joint.name,
@@ -119,9 +119,9 @@ def _joint_table(joints: Sequence[JointSummary], exceeded: set[tuple[str, LimitK
     return rows
 
 
-def _limit_cell(text: str, beyond: bool) -> Text:
+def _limit_cell(text: str, is_exceeded: bool) -> Text:
     """A cell; a value beyond a limit has a mark and a colour."""
-    return Text(f"{BEYOND} {text}", ERROR) if beyond else Text(text)
+    return Text(f"{LIMIT_MARK} {text}", ERROR) if is_exceeded else Text(text)
 
 
 def _span(low: float, high: float) -> str:

@@ -87,7 +87,7 @@ def debugging() -> bool:
 def tidy_warnings(console: Console) -> Generator[None]:
     """Show each armblocks warning once, as one line on ``console``; others as Python does."""
     shown: set[str] = set()
-    pythons_own = warnings.showwarning
+    default_show = warnings.showwarning
 
     def show(
         message: Warning | str,
@@ -98,7 +98,7 @@ def tidy_warnings(console: Console) -> Generator[None]:
         line: str | None = None,
     ) -> None:
         if not issubclass(category, ArmblocksWarning):
-            pythons_own(message, category, filename, lineno, file, line)
+            default_show(message, category, filename, lineno, file, line)
         elif str(message) not in shown:
             shown.add(str(message))
             console.print(

@@ -71,31 +71,31 @@ def trim(
     parameters = parse_assignments(assignments or [])
     console = results_console()
 
-    bare = not any((fixed, free, outputs, moving, guess, bounds, save))
-    if names or (bare and not ab.compile_diagram(diagram).system.states.size):
+    only_model = not any((fixed, free, outputs, moving, guess, bounds, save))
+    if names or (only_model and not ab.compile_diagram(diagram).system.states.size):
         _list_names(diagram, model, at, parameters, console)
         return
     try:
-        found = ab.trim(
+        result = ab.trim(
             diagram,
             states=_pairs(fixed, "--fix"),
             free=free or (),
             outputs=_pairs(outputs, "--output"),
             moving=moving or (),
             guess=_pairs(guess, "--guess"),
-            bounds={name: _ends(name, value) for name, value in _pairs(bounds, "--bound").items()},
+            bounds={name: _bounds(name, value) for name, value in _pairs(bounds, "--bound").items()},
             at=at,
             parameters=parameters,
         )
     except SimulationError:
-        if bare:
+        if only_model:
             _list_names(diagram, model, at, parameters, console)
         raise
-    print_trim(found, console)
+    print_trim(result, console)
     if save is not None:
         from armblocks.face.model import state_at
 
-        state_at(diagram, found.point).save(save)
+        state_at(diagram, result.point).save(save)
         console.print(f"saved: {save}", soft_wrap=True)
 
 
@@ -135,7 +135,7 @@ def _pairs(texts: Sequence[str] | None, option: str) -> dict[str, Any]:
     return values
 
 
-def _ends(name: str, value: object) -> tuple[float, float]:
+def _bounds(name: str, value: object) -> tuple[float, float]:
     import numpy as np
 
     numbers = np.atleast_1d(np.asarray(value, dtype=np.float64))
@@ -149,28 +149,28 @@ def _ends(name: str, value: object) -> tuple[float, float]:
     return float(numbers[0]), float(numbers[1])
 
 
-def print_trim(found: TrimResult, console: Console) -> None:
+def print_trim(result: TrimResult, console: Console) -> None:
     """The residual, then the values of all unknowns."""
     import numpy as np
 
     console.print(
-        f"{found.point.name} at {found.point.time:g} s: at rest, {len(found.residuals)} equations to "
-        f"{found.largest_residual:.2g} in {found.iterations} iterations",
+        f"{result.point.name} at {result.point.time:g} s: at rest, {len(result.residuals)} equations to "
+        f"{result.largest_residual:.2g} in {result.iterations} iterations",
         style=STRONG,
     )
     for title, values in (
-        ("free parameter", found.free),
-        ("state", found.point.states),
-        ("discrete", found.point.discrete),
-        ("unknown", found.point.algebraic),
+        ("free parameter", result.free),
+        ("state", result.point.states),
+        ("discrete", result.point.discrete),
+        ("unknown", result.point.algebraic),
     ):
         if not values:
             continue
         rows = table((title, "left"), ("value", "left"))
         for name, value in values.items():
-            numbers = np.ravel(found.shown(name, value)).tolist()
+            numbers = np.ravel(result.shown(name, value)).tolist()
             rows.add_row(name, " ".join(f"{number:.9g}" for number in numbers))
         console.print()
         console.print(rows)
-    if found.at_bounds:
-        console.print(f"at an end of the range: {', '.join(found.at_bounds)}", soft_wrap=True)
+    if result.at_bounds:
+        console.print(f"at an end of the range: {', '.join(result.at_bounds)}", soft_wrap=True)

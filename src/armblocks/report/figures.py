@@ -35,8 +35,7 @@ _FIRST_ENTRIES = 12
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Figure:
-    """One picture of the report, with the ``name`` of its files, the ``section`` of the report, and a
-    caption."""
+    """One picture of the report: ``name`` of its files, ``section`` of the report, and caption."""
 
     name: str
     section: str
@@ -104,11 +103,11 @@ def view_figures(diagram: Diagram, result: SimulationResult, width: float = FIGU
 
 def file_name(name: str) -> str:
     """A file name, made from a block's name, that is valid on every file system."""
-    kept = "".join(c if c.isascii() and c.isalnum() else "-" for c in name.lower()).strip("-")
-    return kept[:48] or "unnamed"
+    name = "".join(c if c.isascii() and c.isalnum() else "-" for c in name.lower()).strip("-")
+    return name[:48] or "unnamed"
 
 
-def for_people(values: _Array, unit: str) -> tuple[_Array, str]:
+def in_shown_unit(values: _Array, unit: str) -> tuple[_Array, str]:
     """Values and unit for display: degrees for radians, SI prefixes for very large or small values."""
     if unit.startswith("rad"):
         unit = "deg" + unit.removeprefix("rad")
@@ -176,11 +175,11 @@ def _joint_panel(
     motion: Motion, quantity: str, joint_unit: str, unit: str, values: _Array, limit: str
 ) -> Panel:
     robot = motion.robot
-    chosen = [j for j, own in enumerate(robot.joint_units) if own == joint_unit]
-    shown, shown_unit = for_people(values[:, chosen], unit)
-    factor = _factor(unit, shown_unit, values[:, chosen])
+    joints = [j for j, own in enumerate(robot.joint_units) if own == joint_unit]
+    shown, shown_unit = in_shown_unit(values[:, joints], unit)
+    factor = _factor(unit, shown_unit, values[:, joints])
     traces: list[Trace] = []
-    for column, j in enumerate(chosen):
+    for column, j in enumerate(joints):
         limits = robot.joints[j].limits
         bounds: tuple[float, float] | None = None
         if limit == "position":
@@ -195,7 +194,7 @@ def _joint_panel(
 
 
 def _factor(unit: str, shown_unit: str, values: _Array) -> float:
-    """The factor that :func:`for_people` applied."""
+    """The factor that :func:`in_shown_unit` applied."""
     if unit.startswith("rad"):
         return _DEGREES
     if shown_unit == _SPELLED.get(unit, unit):
@@ -205,7 +204,7 @@ def _factor(unit: str, shown_unit: str, values: _Array) -> float:
 
 def _scope(diagram: Diagram, block: str, view: View, result: SimulationResult, width: float) -> Picture:
     panels: list[Panel] = []
-    for numbers in _compared(block, view, result):
+    for numbers in _panel_groups(block, view, result):
         names: list[str] = []
         columns: list[_Array] = []
         labels: list[str] = []
@@ -217,7 +216,7 @@ def _scope(diagram: Diagram, block: str, view: View, result: SimulationResult, w
             unit = slot.unit
             entries = list(np.ndindex(*slot.shape))[:_FIRST_ENTRIES]
             columns.append(result[path].reshape(len(result.time), -1)[:, : len(entries)])
-            joined = () if label else _joined(diagram, path, result)[: len(entries)]
+            joined = () if label else _mux_labels(diagram, path, result)[: len(entries)]
             label = label or slot.title
             joined = () if label else joined
             name = label or (", ".join(joined) if 0 < len(joined) <= 3 else path)
@@ -231,7 +230,7 @@ def _scope(diagram: Diagram, block: str, view: View, result: SimulationResult, w
                 continue
             labels += [f"{short}[{','.join(map(str, index))}]" if index else short for index in entries]
         # One prefix for all signals of a panel, so that they can be compared.
-        values, unit = for_people(np.hstack(columns), unit)
+        values, unit = in_shown_unit(np.hstack(columns), unit)
         first = numbers[0] if len(labels) == 1 else 0
         traces = tuple(
             Trace(label=label, values=values[:, k], index=first + k) for k, label in enumerate(labels)
@@ -247,7 +246,7 @@ def _scope(diagram: Diagram, block: str, view: View, result: SimulationResult, w
     )
 
 
-def _joined(diagram: Diagram, path: str, result: SimulationResult) -> tuple[str, ...]:
+def _mux_labels(diagram: Diagram, path: str, result: SimulationResult) -> tuple[str, ...]:
     """The names of the source blocks of the entries of a Mux's output; empty for other blocks."""
     flat = flat_diagram(diagram)
     name = path.rpartition("/")[0]
@@ -264,7 +263,7 @@ def _joined(diagram: Diagram, path: str, result: SimulationResult) -> tuple[str,
     return tuple(names)
 
 
-def _compared(block: str, view: View, result: SimulationResult) -> list[list[int]]:
+def _panel_groups(block: str, view: View, result: SimulationResult) -> list[list[int]]:
     """Group the signals into panels: scalars of one unit share a panel, other signals have their own."""
     panels: list[list[int]] = []
     by_unit: dict[str, list[int]] = {}
@@ -308,7 +307,7 @@ def _spectra(
         slot = result.signals_layout[path]
         columns = result[path].reshape(len(result.time), -1)
         for element, column in list(zip(slot.elements, columns.T))[:_FIRST_ENTRIES]:
-            found = signal_spectrum(
+            spectrum = signal_spectrum(
                 result.time,
                 column,
                 quantity=settings.quantity,
@@ -318,7 +317,7 @@ def _spectra(
                 begin=settings.begin,
                 remove_mean=settings.remove_mean,
             )
-            lines.append((element, _SPELLED.get(slot.unit, slot.unit), found))
+            lines.append((element, _SPELLED.get(slot.unit, slot.unit), spectrum))
     return lines, settings
 
 
@@ -327,10 +326,10 @@ def _xy_graph(block: str, view: View, result: SimulationResult) -> Picture:
     flats = [result[path].reshape(len(result.time), -1)[:, 0] for path in paths]
     units = [result.units[path] for path in paths]
     if units[0] == units[1]:  # one prefix for both axes, so that a unit has the same length on both axes
-        both, x_unit = for_people(np.stack(flats), units[0])
+        both, x_unit = in_shown_unit(np.stack(flats), units[0])
         (x, y), y_unit = both, x_unit
     else:
-        (x, x_unit), (y, y_unit) = (for_people(flat, unit) for flat, unit in zip(flats, units))
+        (x, x_unit), (y, y_unit) = (in_shown_unit(flat, unit) for flat, unit in zip(flats, units))
     labels = [
         (view.labels[k] if k < len(view.labels) and view.labels[k] else path) + (f", {unit}" if unit else "")
         for k, (path, unit) in enumerate(zip(paths, (x_unit, y_unit)))

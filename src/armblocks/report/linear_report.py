@@ -20,8 +20,11 @@ from armblocks.report.writing import check_figure_formats, make_folder, usable_f
 def linear_figures(
     system: LinearSystem, *, loop: bool = False, hertz: bool = False
 ) -> dict[str, Callable[[], Picture]]:
-    """The figures of a system, by file name. ``loop``: the system is the open loop of ``1 + L``, for which
-    margins, Nyquist diagram and root locus are defined."""
+    """The figures of a system, by file name.
+
+    ``loop``: the system is the open loop of ``1 + L``, for which margins, Nyquist diagram and root locus are
+    defined.
+    """
     if not system.inputs or not system.outputs:
         return {"poles-and-zeros": lambda: pole_zero_picture(system)} if system.order else {}
     figures: dict[str, Callable[[], Picture]] = {
@@ -54,15 +57,15 @@ def write_linear_report(
     """
     formats = usable_figure_formats() if formats is None else formats
     check_figure_formats(formats, where="write_linear_report")
-    place = Path(folder)
-    make_folder(place)
+    target = Path(folder)
+    make_folder(target)
     written: list[Path] = []
     for name, draw in linear_figures(system, loop=loop, hertz=hertz).items():
         picture = draw()
         for kind in formats:
-            path = place / f"{name}.{kind}"
+            path = target / f"{name}.{kind}"
             data = svg_file(picture).encode() if kind == "svg" else picture_png(picture)
             write_atomically(path, data)
             written.append(path)
-    system.save(place / "linear-system.json")
-    return (*written, place / "linear-system.json")
+    system.save(target / "linear-system.json")
+    return (*written, target / "linear-system.json")

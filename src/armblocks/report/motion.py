@@ -79,14 +79,14 @@ def moving_arms(diagram: Diagram, result: SimulationResult) -> tuple[MovingArm, 
         path = _path(result, name, "q")
         if robot is not None and path is not None and result[path].shape[1:] == (robot.n,):
             groups.setdefault((robot, path), []).append(name)
-    found: list[MovingArm] = []
+    arms: list[MovingArm] = []
     shown = {robot for (robot, _), names in groups.items() if any(_plots(diagram, n) for n in names)}
     for (robot, path), names in groups.items():
         # A controller computes torques for several q of one arm; the drawn arm is the simulated one.
         if robot in shown and not any(_plots(diagram, n) for n in names):
             continue
-        found.append(_moving_arm(robot, path, _sources_first(diagram, names), result))
-    return tuple(found)
+        arms.append(_moving_arm(robot, path, _sources_first(diagram, names), result))
+    return tuple(arms)
 
 
 def _plots(diagram: Diagram, name: str) -> bool:
@@ -100,15 +100,17 @@ def _path(result: SimulationResult, block: str, port: str) -> str | None:
 
 
 def _sources_first(diagram: Diagram, names: list[str]) -> list[str]:
-    """Sort key of blocks: first those that output q (forward dynamics), because their speeds are the
-    simulated ones; the inputs of other blocks may be planned values."""
+    """The blocks, beginning with those that output q (forward dynamics).
+
+    Their speeds are simulated; the inputs of other blocks may be planned values.
+    """
     return sorted(names, key=lambda n: "q" not in [port.name for port in diagram.blocks[n].output_ports()])
 
 
 def _moving_arm(robot: Robot, path: str, names: list[str], result: SimulationResult) -> MovingArm:
     owner, shape = path.rpartition("/")[0], result[path].shape
 
-    def look(port: str) -> str | None:
+    def signal_of(port: str) -> str | None:
         # The source of q (a trajectory, an integrator) precedes the blocks that q is connected to.
         for name in (owner, *names):
             if port == "tau" and f"{name}/qd" not in result:
@@ -122,9 +124,9 @@ def _moving_arm(robot: Robot, path: str, names: list[str], result: SimulationRes
         robot=robot,
         blocks=tuple(names),
         q=path,
-        qd=look("qd"),
-        qdd=look("qdd"),
-        tau=look("tau"),
+        qd=signal_of("qd"),
+        qdd=signal_of("qdd"),
+        tau=signal_of("tau"),
         poses=next((p for n in names if (p := _path(result, n, "poses")) is not None), None),
     )
 

@@ -142,15 +142,15 @@ def summarise(
                 work_taken=work[1],
             )
         )
-    strides = np.linalg.norm(np.diff(tool, axis=0), axis=1)
+    steps = np.linalg.norm(np.diff(tool, axis=0), axis=1)
     spans = np.diff(time)
     return MotionSummary(
         joints=tuple(joints),
         power_peak=None if power is None else float(np.abs(power.sum(axis=1)).max()),
-        tool_path_length=float(strides.sum()),
+        tool_path_length=float(steps.sum()),
         tool_start=_triple(tool[0]),
         tool_end=_triple(tool[-1]),
-        tool_speed_peak=float((strides / spans).max()) if len(spans) else 0.0,
+        tool_speed_peak=float((steps / spans).max()) if len(spans) else 0.0,
         findings=limit_findings(robot, time, q, qd, tau),
     )
 
@@ -180,12 +180,12 @@ def shown_summary(summary: MotionSummary) -> MotionSummary:
     """
     joints: list[JointSummary] = []
     for joint in summary.joints:
-        alike = [other for other in summary.joints if other.unit == joint.unit]
+        same_unit = [other for other in summary.joints if other.unit == joint.unit]
         changes: dict[str, float] = {}
         for names in _COMPARED:
-            sizes = [abs(getattr(other, name) or 0.0) for other in alike for name in names]
+            sizes = [abs(getattr(other, name) or 0.0) for other in same_unit for name in names]
             if names == ("position_margin",):  # a difference of a position and a limit
-                sizes += [abs(end) for other in alike for end in other.position_limits or ()]
+                sizes += [abs(end) for other in same_unit for end in other.position_limits or ()]
             for name in names:
                 value: float | None = getattr(joint, name)
                 if value is not None and abs(value) <= SHOWN_AS_ZERO * max(sizes):
@@ -203,13 +203,13 @@ def limit_findings(
         limits = joint.limits
         if limits.position is not None:
             low, high = limits.position
-            findings += _beyond(name, LimitKind.POSITION, joint.unit, time, q[:, j], low, high)
+            findings += _exceeded(name, LimitKind.POSITION, joint.unit, time, q[:, j], low, high)
         for kind, values, limit in (
             (LimitKind.SPEED, qd, limits.speed),
             (LimitKind.TORQUE, tau, limits.torque),
         ):
             if values is not None and limit is not None:
-                findings += _beyond(name, kind, joint.unit, time, values[:, j], -limit, limit)
+                findings += _exceeded(name, kind, joint.unit, time, values[:, j], -limit, limit)
     return tuple(findings)
 
 
@@ -219,7 +219,7 @@ def warn_of_limits(findings: Sequence[LimitFinding]) -> None:
         warnings.warn(finding.text, LimitWarning, stacklevel=2)
 
 
-def _beyond(
+def _exceeded(
     name: str, kind: LimitKind, unit: str, time: _Array, values: _Array, low: float, high: float
 ) -> list[LimitFinding]:
     slack = _TOLERANCE * max(abs(low), abs(high))
@@ -234,8 +234,8 @@ def _beyond(
         share = min(max(-before / (after - before), 0.0), 1.0)
         first_time = float(time[first - 1]) + share * float(time[first] - time[first - 1])
     limit = high if values[worst] > high else low
-    convert, shown_unit = people_unit(kind, unit)
-    what = {
+    convert, shown_unit = shown_unit_of(kind, unit)
+    verb = {
         LimitKind.POSITION: "leaves its range",
         LimitKind.SPEED: "is faster than allowed",
         LimitKind.TORQUE: "needs more torque than allowed",
@@ -245,7 +245,7 @@ def _beyond(
         if kind is LimitKind.POSITION
         else f"at most {table_number(high * convert)}"
     )
-    reached = table_number(float(values[worst]) * convert)
+    worst_text = table_number(float(values[worst]) * convert)
     finding = LimitFinding(
         joint=name,
         kind=kind,
@@ -254,14 +254,14 @@ def _beyond(
         worst_time=float(time[worst]),
         worst=float(values[worst]),
         text=(
-            f"joint '{name}' {what} ({allowed} {shown_unit}) from t = {table_number(first_time)} s on: "
-            f"{reached} {shown_unit} at t = {table_number(float(time[worst]))} s"
+            f"joint '{name}' {verb} ({allowed} {shown_unit}) from t = {table_number(first_time)} s on: "
+            f"{worst_text} {shown_unit} at t = {table_number(float(time[worst]))} s"
         ),
     )
     return [finding]
 
 
-def people_unit(kind: LimitKind, unit: str) -> tuple[float, str]:
+def shown_unit_of(kind: LimitKind, unit: str) -> tuple[float, str]:
     """Factor and unit for the display of a joint's quantity: degrees for rad, N m or N for torques."""
     factor, base = (180 / math.pi, "deg") if unit == "rad" else (1.0, unit)
     if kind is LimitKind.POSITION:

@@ -129,7 +129,7 @@ def _notices(contents: ReportContents) -> str:
         reason = f" {run.message}" if run.message else ""
         end = axis_number(float(contents.result.time[-1])) if contents.result.time.size else "0"
         notices.append(
-            ("error", f"Incomplete: the run stopped at t = {end} s; what follows ends there.{reason}")
+            ("error", f"Incomplete: the run stopped at t = {end} s; all results end there.{reason}")
         )
     elif run.message:
         notices.append(("warning", run.message))
@@ -146,11 +146,11 @@ def _notices(contents: ReportContents) -> str:
                 f"all samples, which are in {log.path.name}.",
             )
         )
-    seen: set[str] = set()
+    inertia_texts: set[str] = set()
     for motion in contents.motions:
         for finding in inertia_findings(motion.robot):
-            if str(finding) not in seen:
-                seen.add(str(finding))
+            if str(finding) not in inertia_texts:
+                inertia_texts.add(str(finding))
                 notices.append(("warning", str(finding)[:1].upper() + str(finding)[1:]))
         notices += [("warning", f"{motion.robot.name}: {note}.") for note in motion.notes]
     if not notices:

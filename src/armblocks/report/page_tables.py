@@ -11,7 +11,7 @@ from armblocks.pictures.numbers import MINUS, axis_number, table_number
 from armblocks.pictures.style import trace_tone
 from armblocks.pictures.svg import escape
 from armblocks.report.motion import Motion
-from armblocks.report.motion_summary import LimitFinding, LimitKind, MotionSummary, people_unit
+from armblocks.report.motion_summary import LimitFinding, LimitKind, MotionSummary, shown_unit_of
 
 MOST_NUMBERS = 64
 """Longest array whose numbers are listed; of longer arrays only the range is given."""
@@ -19,7 +19,7 @@ MOST_NUMBERS = 64
 
 def limits_table(summary: MotionSummary) -> str:
     """Each joint's range and speed over the run against its limits, in degrees or m."""
-    broken = {(finding.joint, finding.kind): finding for finding in summary.findings}
+    exceeded = {(finding.joint, finding.kind): finding for finding in summary.findings}
     heads = [
         ("Joint", ""), ("Range used", ""), ("Range allowed", ""), ("Margin", ""), ("Peak speed", ""),
         ("at", "s"), ("Speed allowed", ""), ("Speed used", "%"), ("Peak acceleration", ""),
@@ -27,22 +27,22 @@ def limits_table(summary: MotionSummary) -> str:
     same_unit = len({joint.unit for joint in summary.joints}) == 1
     if same_unit and summary.joints:
         unit = summary.joints[0].unit
-        position, speed = people_unit(LimitKind.POSITION, unit)[1], people_unit(LimitKind.SPEED, unit)[1]
+        position, speed = shown_unit_of(LimitKind.POSITION, unit)[1], shown_unit_of(LimitKind.SPEED, unit)[1]
         units = ["", position, position, position, speed, "s", speed, "%", f"{speed}²"]
         heads = [(title, unit) for (title, _), unit in zip(heads, units)]
     rows: list[str] = []
     for index, joint in enumerate(summary.joints):
-        factor, unit = people_unit(LimitKind.POSITION, joint.unit)
-        tail = "" if same_unit else f' <span class="unit">{unit}</span>'
+        factor, unit = shown_unit_of(LimitKind.POSITION, joint.unit)
+        unit_html = "" if same_unit else f' <span class="unit">{unit}</span>'
         allowed = "not limited"
         if joint.position_limits is not None:
             allowed = _span(joint.position_limits[0] * factor, joint.position_limits[1] * factor)
         share = None if joint.speed_share is None else 100 * joint.speed_share
         cells = [
-            _cell(_span(joint.position_min * factor, joint.position_max * factor) + tail),
+            _cell(_span(joint.position_min * factor, joint.position_max * factor) + unit_html),
             _cell(allowed),
-            _limit_cell(joint.position_margin, factor, broken.get((joint.name, LimitKind.POSITION))),
-            _limit_cell(joint.speed_peak, factor, broken.get((joint.name, LimitKind.SPEED))),
+            _limit_cell(joint.position_margin, factor, exceeded.get((joint.name, LimitKind.POSITION))),
+            _limit_cell(joint.speed_peak, factor, exceeded.get((joint.name, LimitKind.SPEED))),
             _cell(table_number(joint.speed_peak_time, 3)),
             _cell("not limited" if joint.speed_limit is None else table_number(joint.speed_limit * factor)),
             _cell("" if share is None else table_number(share, 3)),
@@ -54,7 +54,7 @@ def limits_table(summary: MotionSummary) -> str:
 
 def loads_table(motion: Motion, summary: MotionSummary) -> str:
     """Each joint's torque (N m, or force in N), also at its motor, power (W) and work (J)."""
-    broken = {(finding.joint, finding.kind): finding for finding in summary.findings}
+    exceeded = {(finding.joint, finding.kind): finding for finding in summary.findings}
     torque = "N m" if set(motion.robot.joint_units) == {"rad"} else "N m or N"
     heads = [
         ("Joint", ""), ("Peak torque", torque), ("RMS torque", torque), ("Motor peak", "N m"),
@@ -66,7 +66,7 @@ def loads_table(motion: Motion, summary: MotionSummary) -> str:
             joint.name,
             index,
             [
-                _limit_cell(joint.torque_peak, 1.0, broken.get((joint.name, LimitKind.TORQUE))),
+                _limit_cell(joint.torque_peak, 1.0, exceeded.get((joint.name, LimitKind.TORQUE))),
                 _cell(_optional(joint.torque_rms)),
                 _cell(_optional(joint.motor_torque_peak)),
                 _cell(_optional(joint.motor_torque_rms)),
@@ -93,8 +93,8 @@ def tool_table(summary: MotionSummary) -> str:
     """Start and end position of the tool (m, world frame), its path length and maximum speed."""
     heads = [("", ""), ("x", "m"), ("y", "m"), ("z", "m")]
     rows = [
-        f'<tr><th scope="row">{word}</th>{"".join(_cell(_fixed(v)) for v in place)}</tr>'
-        for word, place in (("Start", summary.tool_start), ("End", summary.tool_end))
+        f'<tr><th scope="row">{word}</th>{"".join(_cell(_fixed(v)) for v in position)}</tr>'
+        for word, position in (("Start", summary.tool_start), ("End", summary.tool_end))
     ]
     return (
         html_table("Position of the tool in the world", heads, rows)

@@ -27,14 +27,14 @@ class SinkFile:
     settings: FileSettings
 
 
-def sink_files(diagram: Diagram, taken: Sequence[str] = ()) -> tuple[SinkFile, ...]:
+def sink_files(diagram: Diagram, reserved: Sequence[str] = ()) -> tuple[SinkFile, ...]:
     """All files of the diagram's To File blocks; nothing is written.
 
-    Raises ``DiagramError`` if two blocks have the same file, or if a file is in ``taken``, and
+    Raises ``DiagramError`` if two blocks have the same file, or if a file name is in ``reserved``, and
     ``MissingLibraryError`` if the library of a format is not installed.
     """
-    owners = {name.lower(): "the report" for name in taken}
-    found: list[SinkFile] = []
+    owners = {name.lower(): "the report" for name in reserved}
+    files: list[SinkFile] = []
     for block, view in diagram_views(diagram):
         if view.kind is not ViewKind.FILE:
             continue
@@ -49,10 +49,10 @@ def sink_files(diagram: Diagram, taken: Sequence[str] = ()) -> tuple[SinkFile, .
                 fix=f"give '{block}' another file",
             )
         check_format(Path(settings.file))
-        found.append(
+        files.append(
             SinkFile(block=block, signal=view.signals[0], variable=view.labels[0], settings=settings)
         )
-    return tuple(found)
+    return tuple(files)
 
 
 def write_files(
@@ -64,14 +64,14 @@ def write_files(
     the folder that must not be replaced. Returns the paths. Raises ``DiagramError`` if two blocks write the
     same file, and ``FormatError`` if a file cannot be written or its path leaves the folder.
     """
-    place = Path(folder)
+    target = Path(folder)
     written: list[Path] = []
     for sink in sink_files(diagram, taken):
-        path = place / sink.settings.file
-        if not path.resolve().is_relative_to(place.resolve()):
+        path = target / sink.settings.file
+        if not path.resolve().is_relative_to(target.resolve()):
             raise FormatError(
                 f"the file '{sink.settings.file}' of '{sink.block}' leads out of the folder by a link",
-                where=str(place),
+                where=str(target),
                 allowed="files inside of the folder",
                 fix="remove the link or choose another folder",
             )
@@ -80,7 +80,7 @@ def write_files(
         except OSError as error:
             raise FormatError(
                 f"the folder of '{sink.settings.file}' cannot be made ({error.strerror or error})",
-                where=str(place),
+                where=str(target),
                 fix="choose another folder or change its permissions",
             ) from error
         count = len(range(0, result.time.size, sink.settings.decimation))

@@ -64,38 +64,40 @@ def write_report(
             raise UnknownNameError("data format", name, DATA_FORMATS, where="write_report")
         check_format(Path(f"data.{name}"))
     sink_files(diagram, REPORT_DATA)  # raises errors before anything is written
-    place = Path(folder)
-    make_folder(place / "figures")
-    found = motions(diagram, result) if result.time.size > 1 else ()
-    summaries = tuple(_summary(motion) for motion in found)
-    figures = _figures(diagram, result, found)
+    target = Path(folder)
+    make_folder(target / "figures")
+    arm_motions = motions(diagram, result) if result.time.size > 1 else ()
+    summaries = tuple(_summary(motion) for motion in arm_motions)
+    figures = _figures(diagram, result, arm_motions)
     drawing = diagram_picture(diagram, result)
-    diagram_path = place / "diagram.svg"
-    data_paths = tuple(place / f"data.{kind}" for kind in data)
+    diagram_path = target / "diagram.svg"
+    data_paths = tuple(target / f"data.{kind}" for kind in data)
     written: list[Path] = []
     with _Writer() as writer:
         for figure in figures:
             for kind in formats:
-                path = place / "figures" / f"{figure.name}.{kind}"
+                path = target / "figures" / f"{figure.name}.{kind}"
                 writer.write(path, _encoding(figure, kind))
                 written.append(path)
         writer.write(diagram_path, svg_file(drawing).encode)
         for path in data_paths:
             result.save(path)
-        data_paths += write_files(place, diagram, result, taken=REPORT_DATA)
+        data_paths += write_files(target, diagram, result, taken=REPORT_DATA)
     contents = ReportContents(
         diagram=diagram,
         result=result,
-        motions=found,
+        motions=arm_motions,
         summaries=summaries,
         figures=tuple(figures),
         drawing=drawing,
         sheets=_sheets(diagram, result),
-        files=tuple(path.relative_to(place).as_posix() for path in (diagram_path, *data_paths, *written)),
+        files=tuple(path.relative_to(target).as_posix() for path in (diagram_path, *data_paths, *written)),
     )
-    page = place / "report.html"
+    page = target / "report.html"
     write_atomically(page, report_page(contents).encode())
-    return ReportFiles(folder=place, page=page, diagram=diagram_path, figures=tuple(written), data=data_paths)
+    return ReportFiles(
+        folder=target, page=page, diagram=diagram_path, figures=tuple(written), data=data_paths
+    )
 
 
 def usable_figure_formats() -> tuple[str, ...]:
@@ -128,18 +130,18 @@ def _sheets(diagram: Diagram, result: SimulationResult) -> tuple[Sheet, ...]:
     )
 
 
-def _figures(diagram: Diagram, result: SimulationResult, found: Sequence[Motion]) -> list[Figure]:
+def _figures(diagram: Diagram, result: SimulationResult, arm_motions: Sequence[Motion]) -> list[Figure]:
     if result.time.size < 2:
         return []
     figures: list[Figure] = []
-    for number, motion in enumerate(found):
-        prefix = "" if len(found) == 1 else f"{file_name(motion.robot.name)}-{number + 1}-"
+    for number, motion in enumerate(arm_motions):
+        prefix = "" if len(arm_motions) == 1 else f"{file_name(motion.robot.name)}-{number + 1}-"
         figures += motion_figures(motion, prefix)
     figures += view_figures(diagram, result)
-    taken: dict[str, int] = {}
+    counts: dict[str, int] = {}
     named: list[Figure] = []
     for figure in figures:  # different block names may give the same file name
-        count = taken[figure.name] = taken.get(figure.name, 0) + 1
+        count = counts[figure.name] = counts.get(figure.name, 0) + 1
         named.append(figure if count == 1 else replace(figure, name=f"{figure.name}-{count}"))
     return named
 

@@ -37,8 +37,10 @@ def build_in_checkout(notify: Callable[[str], None], folder: Path = WEB, script:
     if (folder / "index.html").is_file() or not script.is_file():
         return
     notify("Building the studio page of this checkout, once (about a minute).")
-    done = subprocess.run([sys.executable, str(script)], stdin=subprocess.DEVNULL, stdout=sys.stderr.fileno())
-    if done.returncode != 0:
+    completed = subprocess.run(
+        [sys.executable, str(script)], stdin=subprocess.DEVNULL, stdout=sys.stderr.fileno()
+    )
+    if completed.returncode != 0:
         raise FormatError(
             "the page of the studio could not be built; the reason is printed above",
             where=str(script),

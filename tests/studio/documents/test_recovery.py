@@ -134,9 +134,9 @@ def test_a_journal_cut_anywhere_recovers_the_complete_edits_before_the_cut(
                 waiting = other.documents()
                 done = record - 2 if cut >= ends[record] else record - 3
                 if done < 0:
-                    assert [entry.missing != "" for entry in waiting.left.offers()] == [True]
+                    assert [entry.missing != "" for entry in waiting.recoverable.offers()] == [True]
                     continue
-                assert [entry.edits for entry in waiting.left.offers()] == [done] * (done > 0)
+                assert [entry.edits for entry in waiting.recoverable.offers()] == [done] * (done > 0)
                 if done > 0:
                     back = await waiting.recover(document_messages.Recover(document=found.key, action="open"))
                     assert back is not None
@@ -193,7 +193,7 @@ def test_a_file_newer_than_the_journal_is_kept_beside_the_recovered_file(disk: D
         theirs.write_bytes(theirs.read_bytes().replace(b'"gain"', b'"other"'))
         newer = theirs.read_bytes()
         after = after_crash.documents()
-        (recovery,) = after.left.offers()
+        (recovery,) = after.recoverable.offers()
         assert (recovery.path, recovery.disk, recovery.edits) == ("a.json", "changed", 1)
         back = await after.recover(document_messages.Recover(document=found.key, action="keep_both"))
         assert back is not None
@@ -202,7 +202,7 @@ def test_a_file_newer_than_the_journal_is_kept_beside_the_recovered_file(disk: D
         assert theirs.read_bytes() == newer
         assert sorted(back.document.diagram.blocks) == ["gain", "mine"]
         assert not back.document.dirty
-        assert after.left.offers() == []
+        assert after.recoverable.offers() == []
 
     going(scenario)
 
@@ -233,11 +233,11 @@ def test_a_recovery_is_discarded_only_on_request(disk: Disk, tmp_path: Path) -> 
         second = disk.as_after_a_crash(tmp_path / "second")
         second.documents().end()
         after = second.documents()
-        assert len(after.left.offers()) == 1
+        assert len(after.recoverable.offers()) == 1
         assert await after.recover(document_messages.Recover(document=found.key, action="discard")) is None
         with pytest.raises(ArmblocksError, match="there is no diagram to recover named"):
             await after.recover(document_messages.Recover(document=found.key, action="open"))
-        assert second.documents().left.offers() == []
+        assert second.documents().recoverable.offers() == []
 
     going(scenario)
 
@@ -274,7 +274,7 @@ def test_a_missing_robot_file_is_reported_and_the_journal_remains(disk: Disk, tm
         documents.perform(found, change("2", AddBlocks(blocks=[block])))
         second = disk.as_after_a_crash(tmp_path / "second")
         after = OpenDocuments(second.project, second.state_folder, lambda name: load_robot("no " + name))
-        (recovery,) = after.left.offers()
+        (recovery,) = after.recoverable.offers()
         assert recovery.missing.startswith("the last 1 edits could not be repeated")
         back = await after.recover(document_messages.Recover(document=found.key, action="open"))
         assert back is not None
@@ -379,7 +379,7 @@ def test_an_unreadable_journal_is_not_overwritten(disk: Disk) -> None:
         with pytest.raises(FormatError, match="the journal contains no complete record"):
             documents.attach(key)
         assert journal.read_bytes() == b"nothing that is a journal"
-        assert [offer.document for offer in documents.left.offers()] == [key]
+        assert [offer.document for offer in documents.recoverable.offers()] == [key]
 
     going(scenario)
 
@@ -402,7 +402,7 @@ def test_a_defect_during_replay_keeps_the_edits_before_it(
 
         monkeypatch.setattr(Document, "outcome", defect)
         after = second.documents()
-        (offer,) = after.left.offers()
+        (offer,) = after.recoverable.offers()
         assert offer.missing == "the last 2 edits could not be repeated: armblocks has a defect (KeyError)"
         assert sorted(after.attach(found.key).document.diagram.blocks) == ["b0", "b1"]
 
@@ -412,7 +412,7 @@ def test_a_defect_during_replay_keeps_the_edits_before_it(
 def test_a_deleted_or_renamed_file_is_reported_and_its_content_remains(
     disk: Disk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(open_files, "LOOK_SECONDS", 0.01)
+    monkeypatch.setattr(open_files, "WATCH_SECONDS", 0.01)
 
     async def scenario() -> None:
         documents = disk.documents()
@@ -431,7 +431,9 @@ def test_a_deleted_or_renamed_file_is_reported_and_its_content_remains(
             assert await events.get() == "gone"
             assert found.document.dirty
             crashed = disk.as_after_a_crash(tmp_path / "second").documents()
-            assert [(offer.path, offer.disk) for offer in crashed.left.offers()] == [("a.json", "gone")]
+            assert [(offer.path, offer.disk) for offer in crashed.recoverable.offers()] == [
+                ("a.json", "gone")
+            ]
             place.with_name("b.json").rename(place)
             assert await events.get() == "same"
             place.unlink()

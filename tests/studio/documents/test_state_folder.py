@@ -25,7 +25,7 @@ def test_a_session_is_resumed_at_its_port_until_it_expires(kept: StateFolder) ->
     assert kept.begin_session(8642) == first
     assert kept.begin_session(8643).secret != first.secret
     second = kept.begin_session(8642)
-    assert kept.begin_session(8642, afresh=True).secret != second.secret
+    assert kept.begin_session(8642, new=True).secret != second.secret
     file = kept.root / "session.json"
     assert file.stat().st_mode & 0o077 == 0
     assert kept.root.stat().st_mode & 0o077 == 0

@@ -28,7 +28,7 @@ class Listener:
         self.news = asyncio.Event()
         self.outbox = Outbox(self._hear, self._hear)
         self.page = Page(self.outbox.put, self.outbox.put, self.outbox)
-        self.sending = asyncio.create_task(self.outbox.empty())
+        self.sending = asyncio.create_task(self.outbox.send_all())
 
     async def _hear(self, message: str | bytes) -> None:
         await self.listens.wait()
@@ -75,7 +75,7 @@ def of_runs(listener: Listener) -> list[str | bytes]:
 def test_a_page_suspended_during_a_run_delays_nobody_and_gets_all_messages_later(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(outbox_module, "BEHIND_BYTES", 20_000)
+    monkeypatch.setattr(outbox_module, "CONGESTED_BYTES", 20_000)
 
     async def going(hub: Hub, lively: Listener, frozen: Listener) -> None:
         document = await lively.ask(hub, 1, "open_shipped", document_kind="diagram", name="falling_pendulum")
@@ -110,9 +110,9 @@ def test_the_connection_of_an_unresponsive_page_is_closed(
                 frozen.page,
                 json.dumps({"number": number, "request": attach}),
             )
-            if frozen.outbox.given_up:
+            if frozen.outbox.closed:
                 break
-        assert frozen.outbox.given_up
+        assert frozen.outbox.closed
         assert frozen.outbox._size == 0  # pyright: ignore[reportPrivateUsage]
         await lively.ask(hub, 2, "change", document=document, key="1", edit={"kind": "arrange"})
 

@@ -143,7 +143,7 @@ def test_unsaved_robots_are_offered_and_do_not_overwrite_a_newer_file(disk: Disk
         theirs = write_robot(load_robot("kr180"))
         second.project.path("arm.json").write_bytes(theirs)
         after = second.robots()
-        (offer,) = after.left.offers()
+        (offer,) = after.recoverable.offers()
         assert (offer.kind, offer.path, offer.disk, offer.edits, offer.parts) == (
             "robot",
             "arm.json",
@@ -151,7 +151,7 @@ def test_unsaved_robots_are_offered_and_do_not_overwrite_a_newer_file(disk: Disk
             1,
             6,
         )
-        assert [offer.kind for offer in second.documents().left.offers()] == ["diagram"]
+        assert [offer.kind for offer in second.documents().recoverable.offers()] == ["diagram"]
         back = await after.recover(document_messages.Recover(document=found.key, action="keep_both"))
         assert back is not None
         assert back.path is not None

@@ -31,15 +31,15 @@ class Clock:
 def test_due_time_follows_the_clock_from_its_reference() -> None:
     clock = Clock()
     pace = Pace(0.5, clock)
-    assert pace.due == 0.0
+    assert pace.target_time == 0.0
     clock.now += 3.0
-    assert pace.due == 1.5
+    assert pace.target_time == 1.5
     pace.count_from(4.0)
     pace.speed = 10.0
     clock.now += 0.25
-    assert pace.due == 6.5
+    assert pace.target_time == 6.5
     pace.speed = None
-    assert pace.due == math.inf
+    assert pace.target_time == math.inf
 
 
 class Pipe:

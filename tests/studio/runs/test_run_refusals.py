@@ -12,7 +12,7 @@ from armblocks.blocks import BLOCKS
 from armblocks.diagram import Diagram, DiagramBuilder
 from armblocks.errors import ArmblocksError
 from armblocks.formats import diagram_from_bytes, diagram_to_bytes, load_robot
-from armblocks.studio.runs.worker import begun
+from armblocks.studio.runs.worker import begin_run
 
 
 def open_input() -> Diagram:
@@ -37,7 +37,7 @@ def test_a_worker_and_a_file_give_the_same_error_for_an_invalid_model(
     with pytest.raises(ArmblocksError) as of_file:
         diagram_from_bytes(source, "model", BLOCKS, load_robot)
     with pytest.raises(ArmblocksError) as of_run:
-        begun({"diagram": source.decode(), "folder": str(tmp_path), "tuned": {}})
+        begin_run({"diagram": source.decode(), "folder": str(tmp_path), "tuned": {}})
     assert type(of_run.value) is type(of_file.value)
     assert of_run.value.what == of_file.value.what
     assert of_run.value.fix == of_file.value.fix

@@ -285,7 +285,7 @@ def defect_in_the_report(pipe: Connection, job: dict[str, Any]) -> None:
     def defect(_: object) -> None:
         raise KeyError("something")
 
-    run_report.begun = defect  # pyright: ignore[reportAttributeAccessIssue]
+    run_report.begin_run = defect  # pyright: ignore[reportAttributeAccessIssue]
     run_report.write(pipe, job)
 
 

@@ -15,7 +15,7 @@ from starlette.routing import Mount, Route, WebSocketRoute
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.protocol.page import Page
 from armblocks.studio.server.guard import Guard, Keys
-from armblocks.studio.server.web_app import HubToCome, studio_app
+from armblocks.studio.server.web_app import FutureHub, studio_app
 
 HOST = "127.0.0.1:8642"
 ORIGIN = f"http://{HOST}"
@@ -42,7 +42,7 @@ def keys() -> Keys:
 def app(web: Path, keys: Keys, tmp_path: Path) -> Guard:
     project = tmp_path / "project"
     project.mkdir()
-    return studio_app(HubToCome(ProjectFolder(project)), keys, frozenset({HOST}), web)
+    return studio_app(FutureHub(ProjectFolder(project)), keys, frozenset({HOST}), web)
 
 
 def call(app: Guard, path: str, headers: dict[str, str], *, method: str = "GET", kind: str = "http") -> Any:
@@ -155,7 +155,7 @@ def test_hostile_parameters_cause_no_server_error_and_reveal_no_file(
     web: Path, keys: Keys, tmp_path: Path
 ) -> None:
     (tmp_path / "project").mkdir()
-    coming = HubToCome(ProjectFolder(tmp_path / "project"))
+    coming = FutureHub(ProjectFolder(tmp_path / "project"))
     app = studio_app(coming, keys, frozenset({HOST}), web)
 
     events: list[dict[str, Any]] = []
@@ -164,7 +164,7 @@ def test_hostile_parameters_cause_no_server_error_and_reveal_no_file(
         events.append(json.loads(text))
 
     async def opened() -> str:
-        hub, page = await coming.here(), Page(hear, hear)
+        hub, page = await coming.ready(), Page(hear, hear)
         await hub.answer(page, '{"number": 1, "request": {"kind": "new", "document_kind": "diagram"}}')
         return events[-1]["value"]
 

@@ -159,7 +159,7 @@ def test_a_run_without_memory_fails_with_an_error_message(monkeypatch: pytest.Mo
     job: dict[str, Any] = {"run": "r", "document": "d", "speed": None, "folder": "."}
     job |= {"diagram": "", "tuned": {}}
     run = run_worker._Run(Pipe(), job)  # pyright: ignore
-    monkeypatch.setattr(run, "_go", lambda: exhausted(None))
+    monkeypatch.setattr(run, "_simulate", lambda: exhausted(None))
     run.run()
     event = json.loads(message[-1][1:])
     assert event["state"] == "failed"

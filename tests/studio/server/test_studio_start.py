@@ -16,7 +16,7 @@ from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.server import launch
 from armblocks.studio.server.guard import Keys
 from armblocks.studio.server.hub import Hub
-from armblocks.studio.server.web_app import FOREVER, HubToCome, studio_app
+from armblocks.studio.server.web_app import FOREVER, FutureHub, studio_app
 
 HOST = "127.0.0.1:8642"
 
@@ -29,7 +29,7 @@ def web(tmp_path: Path) -> Path:
     return tmp_path / "web"
 
 
-def answered(web: Path, hub: HubToCome, path: str) -> tuple[int, dict[str, str]]:
+def answered(web: Path, hub: FutureHub, path: str) -> tuple[int, dict[str, str]]:
     """Status and headers of the response to an authenticated page."""
     keys, sent = Keys(8642), list[MutableMapping[str, Any]]()
     app = studio_app(hub, keys, frozenset({HOST}), web)
@@ -67,20 +67,20 @@ def test_the_page_is_served_while_the_hub_is_created(
         return Hub(folder)
 
     monkeypatch.setattr("armblocks.studio.server.hub.Hub", slow)
-    hub = HubToCome(ProjectFolder(tmp_path))
+    hub = FutureHub(ProjectFolder(tmp_path))
     hub.begin()
     try:
         assert answered(web, hub, "/")[0] == 200
         assert answered(web, hub, "/assets/index-1a2b.js")[0] == 200
-        assert not hub.made.done()
+        assert not hub.result.done()
     finally:
         go_on.set()
-    assert isinstance(hub.made.result(timeout=60), Hub)
-    hub.made.result().close()
+    assert isinstance(hub.result.result(timeout=60), Hub)
+    hub.result.result().close()
 
 
 def test_hashed_files_are_cached_and_the_page_is_not(web: Path, tmp_path: Path) -> None:
-    hub = HubToCome(ProjectFolder(tmp_path))
+    hub = FutureHub(ProjectFolder(tmp_path))
     assert answered(web, hub, "/assets/index-1a2b.js")[1]["cache-control"] == FOREVER
     assert answered(web, hub, "/")[1]["cache-control"] == "no-cache"
 

@@ -37,8 +37,7 @@ class Field:
         return self.across.start, self.up.end, self.across.end, self.up.start
 
     def points(self, x: _Array, y: _Array) -> _Array:
-        """Positions (N, 2) in px. Points far outside are moved closer, because renderers fail at huge
-        numbers."""
+        """Positions (N, 2) in px. Distant points are moved closer, because renderers fail at huge numbers."""
         left, top, right, bottom = self.box
         width, height = right - left, bottom - top
         px = np.clip(self.across.array(x), left - 20 * width, right + 20 * width)
@@ -112,10 +111,10 @@ def equal_box(
     return about(x, per_px * (right - left)), about(y, per_px * (bottom - top))
 
 
-def within(points: _Array, box: tuple[float, float, float, float]) -> _Array:
+def clipped_to(points: _Array, box: tuple[float, float, float, float]) -> _Array:
     """A line clipped exactly at the edges of a box (Liang-Barsky); pieces outside become gaps."""
     left, top, right, bottom = box
-    kept: list[tuple[float, float]] = []
+    clipped: list[tuple[float, float]] = []
     gap = (np.nan, np.nan)
     for (x0, y0), (x1, y1) in zip(points[:-1].tolist(), points[1:].tolist()):
         dx, dy = x1 - x0, y1 - y0
@@ -131,10 +130,10 @@ def within(points: _Array, box: tuple[float, float, float, float]) -> _Array:
         if not begin <= end:
             continue
         first, last = (x0 + begin * dx, y0 + begin * dy), (x0 + end * dx, y0 + end * dy)
-        if not kept or kept[-1] != first:
-            kept += [gap, first] if kept else [first]
-        kept.append(last)
-    return np.array(kept, dtype=np.float64).reshape(-1, 2)
+        if not clipped or clipped[-1] != first:
+            clipped += [gap, first] if clipped else [first]
+        clipped.append(last)
+    return np.array(clipped, dtype=np.float64).reshape(-1, 2)
 
 
 def legend(names: Sequence[str], x: float, y: float, room: float) -> tuple[list[Mark], float]:

@@ -27,11 +27,11 @@ from armblocks.report.charts.axes import (
     RIGHT,
     TOP,
     Field,
+    clipped_to,
     equal_box,
     headed,
     log_field,
     straight_field,
-    within,
 )
 from armblocks.report.charts.scale import padded
 
@@ -47,12 +47,12 @@ _FLOOR = 1e-12
 def channels(system: LinearSystem) -> list[tuple[int, int, str]]:
     """Row, column and name of the displayed channels: the first ones of all pairs of output and input."""
     several_in, several_out = len(system.inputs) > 1, len(system.outputs) > 1
-    found: list[tuple[int, int, str]] = []
+    pairs: list[tuple[int, int, str]] = []
     for row, output in enumerate(system.outputs):
         for column, entry in enumerate(system.inputs):
             name = f"{output} from {entry}" if several_in or not several_out else output
-            found.append((row, column, name))
-    return found[:_MOST_CHANNELS]
+            pairs.append((row, column, name))
+    return pairs[:_MOST_CHANNELS]
 
 
 def bode_picture(
@@ -94,7 +94,7 @@ def bode_picture(
     picture.extend(below.frame(x_label=label, y_label="Phase, deg"))
     for index, (row, column, _) in enumerate(shown):
         for field, values in ((above, decibels), (below, phase)):
-            points = within(field.points(grid / unit, values[:, row, column]), field.box)
+            points = clipped_to(field.points(grid / unit, values[:, row, column]), field.box)
             picture.add(Polyline(points, trace_tone(index), 1.8, trace_dash(index)))
     if found is not None:
         picture.extend(_margin_marks(found, above, below, unit, grid, phase[:, 0, 0]))
@@ -215,12 +215,12 @@ def nyquist_picture(system: LinearSystem, *, width: float = 620.0) -> Picture:
     picture.extend(field.frame(x_label="Real part", y_label="Imaginary part"))
     turn = np.linspace(0.0, 2.0 * math.pi, 181, dtype=np.float64)
     picture.add(
-        Polyline(within(field.points(np.cos(turn), np.sin(turn)), box), Tone.HAIRLINE, 1.0, (3.0, 3.0))
+        Polyline(clipped_to(field.points(np.cos(turn), np.sin(turn)), box), Tone.HAIRLINE, 1.0, (3.0, 3.0))
     )
     for index, (_, values) in enumerate(lines):
         tone = trace_tone(index)
         for sign, dash in ((1.0, trace_dash(index)), (-1.0, (5.0, 4.0))):
-            points = within(field.points(values.real, sign * values.imag), box)
+            points = clipped_to(field.points(values.real, sign * values.imag), box)
             picture.add(Polyline(points, tone, 1.8 if sign > 0.0 else 1.2, dash))
         picture.extend(_heads(field.points(values.real, values.imag), box, tone))
     cross = (field.across(-1.0), field.up(0.0))
@@ -241,26 +241,27 @@ def _nyquist_line(system: LinearSystem, row: int, column: int) -> _Complex:
     on_edge = edge[(np.abs(edge.real) <= 1e-9 * size) & (edge.imag >= -1e-9 * size)]
     if not on_edge.size:
         return frequency_response(part, grid)[:, 0, 0]
-    places = 1j * np.concatenate([[0.0], grid])
+    path_points = 1j * np.concatenate([[0.0], grid])
     radius = low / 30.0
     for pole in on_edge.imag.tolist():
         r = radius if abs(pole) <= 1e-7 * size else 1e-4 * abs(pole)
         arc = 1j * pole + r * np.exp(1j * np.linspace(-math.pi / 2, math.pi / 2, 121))
-        places = np.concatenate([places[places.imag < pole - r], arc, places[places.imag > pole + r]])
-    places = places[places.imag >= 0.0]
-    values = np.exp(places * part.dt) if part.is_discrete else places
+        path_points = np.concatenate(
+            [path_points[path_points.imag < pole - r], arc, path_points[path_points.imag > pole + r]]
+        )
+    path_points = path_points[path_points.imag >= 0.0]
+    values = np.exp(path_points * part.dt) if part.is_discrete else path_points
     return evaluate(part, values)[:, 0, 0]
 
 
 def _plane_range(values: _Complex) -> tuple[tuple[float, float], tuple[float, float]]:
-    """The displayed part of the plane: a bounded curve completely, else the bounded part and the area around
-    -1."""
+    """The displayed part of the plane: the bounded part of the curve, and the area around -1."""
     size = np.abs(values)
     typical = float(np.quantile(size[np.isfinite(size)], 0.5))
     limit = max(8.0, 3.0 * typical) if float(size.max()) > max(20.0, 12.0 * typical) else math.inf
-    kept = values[size <= limit]
-    x = padded(np.concatenate([kept.real, [-1.3, 0.2]]), 0.08)
-    reach = max(float(np.abs(kept.imag).max(initial=0.0)), 0.6)
+    bounded = values[size <= limit]
+    x = padded(np.concatenate([bounded.real, [-1.3, 0.2]]), 0.08)
+    reach = max(float(np.abs(bounded.imag).max(initial=0.0)), 0.6)
     return x, (-1.08 * reach, 1.08 * reach)
 
 
@@ -277,11 +278,13 @@ def _heads(points: _Array, box: tuple[float, float, float, float], tone: Tone) -
     x, y = points[:, 0], points[:, 1]
     inside = (x > left) & (x < right) & (y > top) & (y < bottom)
     steps = np.where(inside[1:] & inside[:-1], np.hypot(np.diff(x), np.diff(y)), 0.0)
-    walked: _Array = np.concatenate([[0.0], np.cumsum(steps)])
+    length_so_far: _Array = np.concatenate([[0.0], np.cumsum(steps)])
     marks: list[Mark] = []
-    for share in (0.3, 0.7) if walked[-1] > 90 else (0.5,) if walked[-1] > 30 else ():
-        k = min(max(int(np.searchsorted(walked, share * float(walked[-1]))), 1), len(points) - 1)
-        back = int(np.searchsorted(walked, float(walked[k]) - 6.0))
+    for share in (0.3, 0.7) if length_so_far[-1] > 90 else (0.5,) if length_so_far[-1] > 30 else ():
+        k = min(
+            max(int(np.searchsorted(length_so_far, share * float(length_so_far[-1]))), 1), len(points) - 1
+        )
+        back = int(np.searchsorted(length_so_far, float(length_so_far[k]) - 6.0))
         heading = points[k] - points[min(back, k - 1)]
         length = float(np.hypot(*heading))
         if length == 0.0:

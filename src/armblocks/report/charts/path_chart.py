@@ -92,25 +92,27 @@ def _equalised(
 
 
 def _path_with_direction(points: _Array, tone: Tone, frame: _Frame) -> list[Mark]:
-    good = points[np.isfinite(points).all(axis=1)]
-    if len(good) == 0:
+    finite = points[np.isfinite(points).all(axis=1)]
+    if len(finite) == 0:
         return []
-    walked = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(good, axis=0), axis=1))])
-    total = float(walked[-1])
-    keep = np.unique(np.concatenate([np.searchsorted(walked, np.arange(0.0, total, 1.2)), [len(good) - 1]]))
-    marks: list[Mark] = [Polyline(good[keep], stroke=tone, width=1.8)]
+    length_so_far = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(finite, axis=0), axis=1))])
+    total = float(length_so_far[-1])
+    indices = np.unique(
+        np.concatenate([np.searchsorted(length_so_far, np.arange(0.0, total, 1.2)), [len(finite) - 1]])
+    )
+    marks: list[Mark] = [Polyline(finite[indices], stroke=tone, width=1.8)]
     if total > 60:
         for share in (0.25, 0.5, 0.75):
-            k = min(max(int(np.searchsorted(walked, share * total)), 1), len(good) - 1)
-            heading = good[k] - good[max(k - max(len(good) // 200, 1), 0)]
+            k = min(max(int(np.searchsorted(length_so_far, share * total)), 1), len(finite) - 1)
+            heading = finite[k] - finite[max(k - max(len(finite) // 200, 1), 0)]
             length = float(np.linalg.norm(heading))
             if length > 0:
                 along = heading / length
                 side = np.array([-along[1], along[0]])
-                tip = good[k] + 4.5 * along
+                tip = finite[k] + 4.5 * along
                 wings = np.stack([tip, tip - 9.5 * along + 4 * side, tip - 9.5 * along - 4 * side])
                 marks.append(Polyline(wings, stroke=None, fill=tone, closed=True))
-    (x0, y0), (x1, y1) = good[0].tolist(), good[-1].tolist()
+    (x0, y0), (x1, y1) = finite[0].tolist(), finite[-1].tolist()
     marks.append(Disc(x0, y0, 4.2, fill=Tone.SURFACE, stroke=tone, stroke_width=1.8))
     marks.append(Disc(x1, y1, 4.2, fill=tone, stroke=Tone.SURFACE, stroke_width=1.0))
     if math.hypot(x1 - x0, y1 - y0) > 30:
@@ -123,7 +125,7 @@ def _beside(points: _Array, x: float, y: float, word: str, frame: _Frame) -> tup
     """Draw a word next to a point, inside the frame and at the greatest distance from the line, on a pale
     ground."""
     width = text_width(word, SMALL_SIZE)
-    places = [
+    candidates = [
         (x - width / 2, y - 10),
         (x - width / 2, y + 18),
         (x + 9, y + 4),
@@ -135,18 +137,18 @@ def _beside(points: _Array, x: float, y: float, word: str, frame: _Frame) -> tup
     ]
     left_end, top, right_end, bottom = frame
 
-    def inside(place: tuple[float, float]) -> bool:
-        left, base = place
+    def inside(position: tuple[float, float]) -> bool:
+        left, base = position
         return left_end + 2 <= left <= right_end - width - 2 and top + SMALL_SIZE + 2 <= base <= bottom - 3
 
-    def clearance(place: tuple[float, float]) -> float:
-        left, base = place
+    def clearance(position: tuple[float, float]) -> float:
+        left, base = position
         dx = np.maximum(np.maximum(left - points[:, 0], points[:, 0] - left - width), 0.0)
         dy = np.maximum(np.maximum(base - SMALL_SIZE - points[:, 1], points[:, 1] - base), 0.0)
         return float(np.nanmin(np.hypot(dx, dy)))
 
     # The position above is preferred; a clearance of more than a few px makes no difference.
-    left, base = max(places, key=lambda place: (inside(place), min(clearance(place), 7.0)))
+    left, base = max(candidates, key=lambda position: (inside(position), min(clearance(position), 7.0)))
     ground = Rectangle(
         left - 2, base - SMALL_SIZE + 1, width + 4, SMALL_SIZE + 2, 2, fill=Tone.SURFACE, opacity=0.8
     )

@@ -13,7 +13,7 @@ from armblocks.pictures.numbers import table_number
 from armblocks.pictures.picture import Disc, Mark, Picture, Polyline, Rectangle, Text
 from armblocks.pictures.style import FIGURE_WIDTH, SMALL_SIZE, Tone, trace_dash, trace_tone
 from armblocks.pictures.text_width import text_width
-from armblocks.report.charts.axes import BOTTOM, LEFT, RIGHT, TOP, Field, headed, straight_field, within
+from armblocks.report.charts.axes import BOTTOM, LEFT, RIGHT, TOP, Field, clipped_to, headed, straight_field
 from armblocks.report.charts.frequency_charts import channels
 from armblocks.report.charts.scale import padded
 
@@ -85,7 +85,7 @@ def _response_picture(response: TimeResponse[LinearSystem], what: str, width: fl
         if system.is_discrete:
             # The value is held until the next sample.
             x, y = np.repeat(x, 2)[1:], np.repeat(y, 2)[:-1]
-        points = within(field.points(x, y), box)
+        points = clipped_to(field.points(x, y), box)
         picture.add(Polyline(points, trace_tone(index), 1.8, trace_dash(index)))
     return picture, field
 
@@ -103,13 +103,13 @@ def _measure_marks(measures: StepMeasures, field: Field) -> list[Mark]:
         ),
         Polyline([(left, level), (right, level)], Tone.ACCENT, 1.0, (5.0, 4.0)),
     ]
-    places: list[tuple[float, str]] = []
+    labels: list[tuple[float, str]] = []
     if math.isfinite(measures.settling_time) and measures.settling_time > 0.0:
-        places.append((measures.settling_time, f"settled {table_number(measures.settling_time, 3)} s"))
+        labels.append((measures.settling_time, f"settled {table_number(measures.settling_time, 3)} s"))
     if math.isfinite(measures.rise_time) and measures.rise_time > 0.0:
         word = f"rise time {table_number(measures.rise_time, 3)} s"
         marks.append(Text(right - 8, bottom - 12, word, SMALL_SIZE, Tone.ACCENT, "end", bold=True))
-    for time, word in places:
+    for time, word in labels:
         x = field.across(time)
         if x > right:
             continue

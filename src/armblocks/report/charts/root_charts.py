@@ -13,7 +13,16 @@ from armblocks.analysis.shown_values import shown_poles, shown_zeros
 from armblocks.pictures.numbers import axis_number
 from armblocks.pictures.picture import Disc, Mark, Picture, Polyline, Text
 from armblocks.pictures.style import SMALL_SIZE, Tone, trace_tone
-from armblocks.report.charts.axes import BOTTOM, LEFT, RIGHT, TOP, Field, equal_box, straight_field, within
+from armblocks.report.charts.axes import (
+    BOTTOM,
+    LEFT,
+    RIGHT,
+    TOP,
+    Field,
+    clipped_to,
+    equal_box,
+    straight_field,
+)
 from armblocks.report.charts.scale import padded
 
 _Array = NDArray[np.float64]
@@ -38,8 +47,8 @@ def root_locus_picture(system: LinearSystem, *, gains: _Array | None = None, wid
     locus = root_locus(system, gains)
     loop, poles = locus.system, locus.roots[0]
     reach = extent(loop, locus.zeros)
-    seen = locus.roots[np.abs(locus.roots) < reach]
-    field, box = _plane(np.concatenate([seen, poles, locus.zeros]), loop, width)
+    visible = locus.roots[np.abs(locus.roots) < reach]
+    field, box = _plane(np.concatenate([visible, poles, locus.zeros]), loop, width)
     picture = _framed(loop, field, box, width, "Root locus")
     picture.description = (
         f"{locus.roots.shape[1]} branches for gains up to {axis_number(float(locus.gains[-1]), 3)}; crosses "
@@ -48,7 +57,7 @@ def root_locus_picture(system: LinearSystem, *, gains: _Array | None = None, wid
     for branch in range(locus.roots.shape[1]):
         values = locus.roots[:, branch]
         points = field.points(values.real, values.imag)
-        picture.add(Polyline(within(points, box), trace_tone(branch), 1.8))
+        picture.add(Polyline(clipped_to(points, box), trace_tone(branch), 1.8))
         picture.extend(_head(points, box, branch))
     picture.extend(_roots(field, poles, locus.zeros))
     picture.extend(_crossings(locus.gains, locus.roots, loop, field, box))
@@ -90,7 +99,7 @@ def _edge(system: LinearSystem, field: Field, box: tuple[float, float, float, fl
     """Draw the stability boundary: the imaginary axis, or the unit circle."""
     if system.is_discrete:
         turn = np.linspace(0.0, 2.0 * math.pi, 361, dtype=np.float64)
-        return [Polyline(within(field.points(np.cos(turn), np.sin(turn)), box), Tone.MUTED, 1.2)]
+        return [Polyline(clipped_to(field.points(np.cos(turn), np.sin(turn)), box), Tone.MUTED, 1.2)]
     x = field.across(0.0)
     return [Polyline([(x, box[1]), (x, box[3])], Tone.MUTED, 1.2, sharp=True)]
 
@@ -107,14 +116,14 @@ def _damping_grid(system: LinearSystem, field: Field, box: tuple[float, float, f
             far = 4.0 * max(abs(field.across.low), abs(field.up.high))
             line = np.array([0.0, far * complex(-damping, math.sqrt(1.0 - damping**2))])
         for sign in (1.0, -1.0):
-            points = within(field.points(line.real, sign * line.imag), box)
+            points = clipped_to(field.points(line.real, sign * line.imag), box)
             marks.append(Polyline(points, Tone.HAIRLINE, 1.0, (2.0, 3.0)))
-        ends = within(field.points(line.real, line.imag), box)
+        ends = clipped_to(field.points(line.real, line.imag), box)
         if len(ends) > 1 and (not system.is_discrete or abs(field.across.factor) > 120.0):
             x, y = ends[len(ends) // 2 if system.is_discrete else -1].tolist()
             x = min(max(x, box[0] + 14), box[2] - 14)
-            place = y + 12 if y < box[1] + 12 else y - 4
-            marks.append(Text(x, place, f"ζ {damping:g}", SMALL_SIZE, Tone.MUTED, "middle"))
+            baseline = y + 12 if y < box[1] + 12 else y - 4
+            marks.append(Text(x, baseline, f"ζ {damping:g}", SMALL_SIZE, Tone.MUTED, "middle"))
     return marks
 
 
@@ -139,10 +148,10 @@ def _head(points: _Array, box: tuple[float, float, float, float], branch: int) -
     x, y = points[:, 0], points[:, 1]
     inside = (x > left) & (x < right) & (y > top) & (y < bottom)
     steps = np.where(inside[1:] & inside[:-1], np.hypot(np.diff(x), np.diff(y)), 0.0)
-    walked: _Array = np.concatenate([[0.0], np.cumsum(steps)])
-    if walked[-1] < 24:
+    length_so_far: _Array = np.concatenate([[0.0], np.cumsum(steps)])
+    if length_so_far[-1] < 24:
         return []
-    k = min(max(int(np.searchsorted(walked, 0.5 * float(walked[-1]))), 1), len(points) - 1)
+    k = min(max(int(np.searchsorted(length_so_far, 0.5 * float(length_so_far[-1]))), 1), len(points) - 1)
     heading = points[k] - points[k - 1]
     length = float(np.hypot(*heading))
     if length == 0.0:
@@ -162,20 +171,20 @@ def _crossings(
     box: tuple[float, float, float, float],
 ) -> list[Mark]:
     """Mark the points at which branches cross the stability boundary, with the gain."""
-    beyond = np.abs(roots) - 1.0 if loop.is_discrete else roots.real
+    excess = np.abs(roots) - 1.0 if loop.is_discrete else roots.real
     marks: list[Mark] = []
     named: list[tuple[float, float]] = []
-    for k, branch in np.argwhere((beyond[1:] > 0.0) != (beyond[:-1] > 0.0)).tolist():
+    for k, branch in np.argwhere((excess[1:] > 0.0) != (excess[:-1] > 0.0)).tolist():
         if k == 0:
             continue
-        share = beyond[k, branch] / (beyond[k, branch] - beyond[k + 1, branch])
-        place = roots[k, branch] + share * (roots[k + 1, branch] - roots[k, branch])
+        share = excess[k, branch] / (excess[k, branch] - excess[k + 1, branch])
+        crossing = roots[k, branch] + share * (roots[k + 1, branch] - roots[k, branch])
         gain = float(gains[k] + share * (gains[k + 1] - gains[k]))
-        x, y = field.across(place.real), field.up(place.imag)
+        x, y = field.across(crossing.real), field.up(crossing.imag)
         if not (box[0] < x < box[2] and box[1] < y < box[3]):
             continue
         marks.append(Disc(x, y, 3.6, fill=Tone.ACCENT))
-        if place.imag >= 0.0 and all(math.hypot(x - u, y - v) > 18.0 for u, v in named):
+        if crossing.imag >= 0.0 and all(math.hypot(x - u, y - v) > 18.0 for u, v in named):
             named.append((x, y))
             word = f"gain {axis_number(gain, 3)}"
             fits = x + 80 < box[2]

@@ -11,7 +11,16 @@ from armblocks.analysis.spectrum import SignalSpectrum
 from armblocks.pictures.picture import Picture, Polyline
 from armblocks.pictures.style import FIGURE_WIDTH, trace_dash, trace_tone
 from armblocks.pictures.thinning import thin_out
-from armblocks.report.charts.axes import BOTTOM, LEFT, RIGHT, TOP, headed, log_field, straight_field, within
+from armblocks.report.charts.axes import (
+    BOTTOM,
+    LEFT,
+    RIGHT,
+    TOP,
+    clipped_to,
+    headed,
+    log_field,
+    straight_field,
+)
 from armblocks.report.charts.scale import padded
 
 _Array = NDArray[np.float64]
@@ -35,13 +44,13 @@ def spectrum_chart(
     """
     units = {unit for _, unit, _ in spectra}
     density = spectra[0][2].quantity == "power density"
-    lines = [(found.frequency, _shown(found, decibels, density)) for _, _, found in spectra]
+    lines = [(spectrum.frequency, _shown(spectrum, decibels, density)) for _, _, spectrum in spectra]
     names = [label for label, _, _ in spectra]
     low = min(float(frequency[1]) for frequency, _ in lines) if logarithmic else 0.0
     high = max(float(frequency[-1]) for frequency, _ in lines)
-    seen = np.concatenate([values[frequency >= low] for frequency, values in lines])
+    visible = np.concatenate([values[frequency >= low] for frequency, values in lines])
     box = (LEFT, TOP, width - RIGHT, TOP + _PANEL)
-    span = _range(seen, decibels)
+    span = _range(visible, decibels)
     quantity = "Power density" if density else "Amplitude"
     picture = Picture(
         width=width,
@@ -54,18 +63,18 @@ def spectrum_chart(
     label = _label(units.pop() if len(units) == 1 else "", decibels, density)
     picture.extend(field.frame(x_label="Frequency, Hz", y_label=label))
     for index, (frequency, values) in enumerate(lines):
-        kept = frequency >= low
-        places = field.points(
-            frequency[kept], np.where(np.isfinite(values[kept]), values[kept], span[0] - 1e3)
+        shown = frequency >= low
+        positions = field.points(
+            frequency[shown], np.where(np.isfinite(values[shown]), values[shown], span[0] - 1e3)
         )
-        across, up = thin_out(places[:, 0], places[:, 1], round(box[2] - box[0]))
-        points = within(np.column_stack([across, up]), field.box)
+        across, up = thin_out(positions[:, 0], positions[:, 1], round(box[2] - box[0]))
+        points = clipped_to(np.column_stack([across, up]), field.box)
         picture.add(Polyline(points, trace_tone(index), 1.6, trace_dash(index)))
     return headed(picture, names)
 
 
-def _shown(found: SignalSpectrum, decibels: bool, density: bool) -> _Array:
-    values = found.values[:, 0]
+def _shown(spectrum: SignalSpectrum, decibels: bool, density: bool) -> _Array:
+    values = spectrum.values[:, 0]
     if not decibels:
         return values
     with np.errstate(divide="ignore"):

@@ -22,7 +22,7 @@ PANEL_HEIGHT = 148.0
 _LABEL_ROOM = 132.0
 _HEAD = 26.0
 _GAP = 18.0
-_WITHIN_REACH = 0.6
+_NEAR_LIMIT = 0.6
 """A limit is drawn if the signal comes closer to it than this fraction of the limit."""
 
 
@@ -106,9 +106,9 @@ def _drawn_limits(trace: Trace) -> list[float]:
         return []
     low, high = trace.limits
     near: list[float] = []
-    if math.isfinite(high) and finite.max() >= _WITHIN_REACH * high > 0:
+    if math.isfinite(high) and finite.max() >= _NEAR_LIMIT * high > 0:
         near.append(high)
-    if math.isfinite(low) and finite.min() <= _WITHIN_REACH * low < 0:
+    if math.isfinite(low) and finite.min() <= _NEAR_LIMIT * low < 0:
         near.append(low)
     return near
 
@@ -135,7 +135,7 @@ def _grid(
 def _traces(time: _Array, panel: Panel, across: Scale, up: Scale) -> list[Mark]:
     columns = round(across.end - across.start)
     marks: list[Mark] = []
-    over: list[Mark] = []
+    exceeding: list[Mark] = []
     for trace in panel.traces:
         for bound in _drawn_limits(trace):
             y = up(bound)
@@ -158,8 +158,8 @@ def _traces(time: _Array, panel: Panel, across: Scale, up: Scale) -> list[Mark]:
             # Neighbouring samples are included, so that a single sample beyond the limit is a visible line.
             wide = beyond | np.roll(beyond, 1) | np.roll(beyond, -1)
             wide[0], wide[-1] = beyond[:2].any(), beyond[-2:].any()
-            over.append(Polyline(np.where(wide[:, None], points, np.nan), stroke=Tone.ERROR, width=4.2))
-    return [*marks, *over]
+            exceeding.append(Polyline(np.where(wide[:, None], points, np.nan), stroke=Tone.ERROR, width=4.2))
+    return [*marks, *exceeding]
 
 
 def _beyond(trace: Trace, values: _Array) -> NDArray[np.bool_]:
@@ -170,17 +170,16 @@ def _beyond(trace: Trace, values: _Array) -> NDArray[np.bool_]:
 
 
 def _end_labels(panel: Panel, up: Scale, right: float) -> list[Mark]:
-    """Draw names at the right ends of the lines, moved apart if they would overlap, with a short line as
-    key."""
+    """Draw names with keys at the right ends of the lines, moved apart if they would overlap."""
     step = SMALL_SIZE + 4.0
-    wanted: list[float] = []
+    preferred: list[float] = []
     for trace in panel.traces:
         finite = trace.values[np.isfinite(trace.values)]
-        wanted.append(up(float(finite[-1])) if len(finite) else up.start)
-    order = sorted(range(len(wanted)), key=lambda k: (wanted[k], k))
-    places = spread([wanted[k] for k in order], step, up.end - 4, up.start + 4)
+        preferred.append(up(float(finite[-1])) if len(finite) else up.start)
+    order = sorted(range(len(preferred)), key=lambda k: (preferred[k], k))
+    positions = separated([preferred[k] for k in order], step, up.end - 4, up.start + 4)
     marks: list[Mark] = []
-    for k, y in zip(order, places):
+    for k, y in zip(order, positions):
         trace = panel.traces[k]
         tone, dash = trace_tone(trace.index), trace_dash(trace.index)
         broken = trace.limits is not None and bool(
@@ -191,7 +190,10 @@ def _end_labels(panel: Panel, up: Scale, right: float) -> list[Mark]:
         label = trace.label + (" over limit" if broken else "")
         marks.append(
             Polyline(
-                [(right + 3, wanted[k]), (right + 10, y), (right + 24, y)], stroke=tone, width=1.8, dash=dash
+                [(right + 3, preferred[k]), (right + 10, y), (right + 24, y)],
+                stroke=tone,
+                width=1.8,
+                dash=dash,
             )
         )
         marks.append(
@@ -207,21 +209,21 @@ def _end_labels(panel: Panel, up: Scale, right: float) -> list[Mark]:
     return marks
 
 
-def spread(wanted: Sequence[float], step: float, low: float, high: float) -> list[float]:
-    """Positions close to the ascending positions ``wanted``, at least ``step`` apart, within ``low`` ..
+def separated(preferred: Sequence[float], step: float, low: float, high: float) -> list[float]:
+    """Positions close to the ascending positions ``preferred``, at least ``step`` apart, within ``low`` ..
     ``high`` if they fit.
 
-    Groups that would overlap are centred on the mean of their wanted positions (pool adjacent violators, Ayer
-    et al. 1955).
+    Groups that would overlap are centred on the mean of their preferred positions (pool adjacent violators,
+    Ayer et al. 1955).
     """
-    groups: list[tuple[float, int]] = []  # mean of (wanted position - offset in the group), count
-    for k, wish in enumerate(wanted):
-        mean, count = wish - k * step, 1
+    groups: list[tuple[float, int]] = []  # mean of (preferred position - offset in the group), count
+    for k, position in enumerate(preferred):
+        mean, count = position - k * step, 1
         while groups and groups[-1][0] > mean:
             other, size = groups.pop()
             mean = (mean * count + other * size) / (count + size)
             count += size
         groups.append((mean, count))
     flat = [mean for mean, count in groups for _ in range(count)]
-    top = max(low, high - step * (len(wanted) - 1))
+    top = max(low, high - step * (len(preferred) - 1))
     return [min(max(mean, low), top) + k * step for k, mean in enumerate(flat)]

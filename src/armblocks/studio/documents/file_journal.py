@@ -14,7 +14,7 @@ Each record is a JSON object; ``version`` is the version after it, ``at`` the ti
 ``saved``
     The path, and the version that the file contains from now on.
 ``kept``
-    The file contains another value or was deleted, and the open document stays as it is.
+    The file contains another value or was deleted; the open document is unchanged.
 
 An edit is a pure function of document and request, so every version follows from a snapshot and the requests
 after it. Recovery starts from the latest snapshot after which no version is missing and no undo needs a step
@@ -86,15 +86,15 @@ class FileJournal:
         on_disk: Fingerprint | None,
     ) -> FileJournal:
         """Create a journal; the first snapshot must follow (:meth:`begin_from`)."""
-        made = cls(Journal(path), kind)
-        head = {"key": key, "path": file, "origin": origin, "on_disk": _said(on_disk)}
-        made._journal.append({"head": {**head, "armblocks": version("armblocks")}, "at": _now()})
-        return made
+        file_journal = cls(Journal(path), kind)
+        head = {"key": key, "path": file, "origin": origin, "on_disk": _fingerprint_dict(on_disk)}
+        file_journal._journal.append({"head": {**head, "armblocks": version("armblocks")}, "at": _now()})
+        return file_journal
 
     @classmethod
-    def go_on(cls, found: JournaledFile[Any], kind: FileKind[Any, Any]) -> FileJournal:
+    def continue_from(cls, recovered: JournaledFile[Any], kind: FileKind[Any, Any]) -> FileJournal:
         """Continue the journal from which a document was recovered."""
-        return cls(Journal(found.journal_path, whole=found.whole), kind)
+        return cls(Journal(recovered.journal_path, whole=recovered.whole), kind)
 
     def begin_from(self, value: Any, number: int, done: str = "") -> None:
         """Write a first snapshot: the journal is new, or records are missing before it.
@@ -111,7 +111,7 @@ class FileJournal:
     def performed(self, request: Alteration, number: int, after: Any, *, continued: bool = False) -> None:
         """Write a request that was applied."""
         does = "continue" if continued else request.does
-        past, future = _counted(does, self._past, self._future)
+        past, future = _step_counts(does, self._past, self._future)
         if past < 0 or future < 0:
             self.begin_from(after, number, request.key)
             return
@@ -122,17 +122,17 @@ class FileJournal:
 
     def replaced(self, title: str, value: Any, number: int) -> None:
         """Write that another value has replaced the document."""
-        self._past, self._future = _counted("change", self._past, self._future)
+        self._past, self._future = _step_counts("change", self._past, self._future)
         text = self._kind.to_text(value)
         self._journal.append({"replace": text, "title": title, "version": number, "at": _now()})
 
     def kept(self, number: int) -> None:
-        """Write that the document stays as it is although its file contains another value."""
+        """Write that the document is unchanged although its file contains another value."""
         self._journal.append({"kept": True, "version": number, "at": _now()})
 
     def saved(self, path: str, of: int, number: int, on_disk: Fingerprint | None) -> None:
         """Write that the file at this path contains version ``of``."""
-        record = {"saved": path, "of": of, "on_disk": _said(on_disk)}
+        record = {"saved": path, "of": of, "on_disk": _fingerprint_dict(on_disk)}
         self._journal.append({**record, "version": number, "at": _now()})
 
     def sync(self) -> None:
@@ -168,7 +168,7 @@ def _replayed(
 ) -> JournaledFile[EditedT]:
     head = records[0]["head"]
     number, text = _snapshot(records, str(path))
-    found = JournaledFile(
+    recovered = JournaledFile(
         key=str(head["key"]),
         document=kind.edited(kind.from_text(text, path.name), number),
         path=head["path"],
@@ -180,22 +180,22 @@ def _replayed(
         last=records[-1]["at"],
         edits=0,
     )
-    _Replay(found, kind, first=not any("saved" in r for r in records)).run(records)
-    return found
+    _Replay(recovered, kind, first=not any("saved" in record for record in records)).run(records)
+    return recovered
 
 
 def _snapshot(records: Sequence[Record], where: str) -> tuple[int, str]:
     """Return the latest snapshot from which all later records, undo included, can be repeated."""
-    found = [(record["version"], record["whole"]) for record in records if "whole" in record]
-    if not found:
+    snapshots = [(record["version"], record["whole"]) for record in records if "whole" in record]
+    if not snapshots:
         raise FormatError("the journal contains no complete drawing", where=where, fix="it can be deleted")
-    for number, text in sorted(found, reverse=True):
-        if _follows(records, number):
+    for number, text in sorted(snapshots, reverse=True):
+        if _is_repeatable(records, number):
             return number, text
-    return max(found)
+    return max(snapshots)
 
 
-def _follows(records: Sequence[Record], number: int) -> bool:
+def _is_repeatable(records: Sequence[Record], number: int) -> bool:
     """Whether all records after a version can be repeated: no version is missing, no undo goes beyond it."""
     past = future = 0
     for record in records:
@@ -205,13 +205,13 @@ def _follows(records: Sequence[Record], number: int) -> bool:
             return False
         number += 1
         if "saved" not in record:  # saving under another name renames the value: a new version
-            past, future = _counted(record.get("does", "change"), past, future)
+            past, future = _step_counts(record.get("does", "change"), past, future)
         if past < 0 or future < 0:
             return False
     return True
 
 
-def _counted(does: str, past: int, future: int) -> tuple[int, int]:
+def _step_counts(does: str, past: int, future: int) -> tuple[int, int]:
     """Numbers of undo and redo steps after a request; negative where the request needs one more step."""
     match does:
         case "undo":
@@ -225,72 +225,74 @@ def _counted(does: str, past: int, future: int) -> tuple[int, int]:
 
 
 class _Replay(Generic[EditedT]):
-    def __init__(self, found: JournaledFile[EditedT], kind: FileKind[Any, EditedT], *, first: bool) -> None:
-        self._found = found
+    def __init__(
+        self, recovered: JournaledFile[EditedT], kind: FileKind[Any, EditedT], *, first: bool
+    ) -> None:
+        self._recovered = recovered
         self._kind = kind
-        self._start = found.document.version
+        self._start = recovered.document.version
         # A snapshot equals the content of the file only if no edit precedes it.
         if not first or self._start > 0:
-            found.document.saved = None
-        self._values = {self._start: found.document.value}
+            recovered.document.saved = None
+        self._values = {self._start: recovered.document.value}
 
     def run(self, records: Sequence[Record]) -> None:
         """Apply the records in order, up to the first that fails."""
-        found = self._found
-        for place, record in enumerate(records):
+        recovered = self._recovered
+        for index, record in enumerate(records):
             number = int(record.get("version", 0))
             if "perform" in record:
-                found.keys.append(record["perform"]["key"])
+                recovered.keys.append(record["perform"]["key"])
             if record.get("done"):
-                found.keys.append(record["done"])
+                recovered.keys.append(record["done"])
             if "saved" in record:
                 self._save(record, number)
             elif "kept" in record and number >= self._start:
-                found.document.saved = None
+                recovered.document.saved = None
             elif number > self._start and ("perform" in record or "replace" in record):
                 try:
                     self._step(record)
                 except Exception as error:  # also a defect: the edits before it are recovered
-                    lost = sum(1 for later in records[place:] if "perform" in later)
-                    what = error.what if isinstance(error, ArmblocksError) else _why(error)
-                    found.missing = f"the last {lost} edits could not be repeated: {what}"
+                    lost = sum(1 for later in records[index:] if "perform" in later)
+                    what = error.what if isinstance(error, ArmblocksError) else _defect_text(error)
+                    recovered.missing = f"the last {lost} edits could not be repeated: {what}"
                     break
-                self._values[found.document.version] = found.document.value
-            found.edits += "perform" in record
-            if found.edits == 1 and "perform" in record:
-                found.began = record["at"]
+                self._values[recovered.document.version] = recovered.document.value
+            recovered.edits += "perform" in record
+            if recovered.edits == 1 and "perform" in record:
+                recovered.began = record["at"]
 
     def _step(self, record: Record) -> None:
-        document = self._found.document
+        document = self._recovered.document
         if "perform" in record:
             document.perform(_ALTERATIONS.validate_python({**converted(record["perform"]), "document": ""}))
             return
         document.replace(record["title"], self._kind.from_text(record["replace"], "journal"))
 
     def _save(self, record: Record, number: int) -> None:
-        found = self._found
-        found.path, found.on_disk = record["saved"], _fingerprint(record["on_disk"])
-        found.edits = 0
+        recovered = self._recovered
+        recovered.path, recovered.on_disk = record["saved"], _fingerprint(record["on_disk"])
+        recovered.edits = 0
         if number < self._start:
             return
-        holds = self._values.get(record["of"])
+        saved_value = self._values.get(record["of"])
         name = Path(record["saved"]).stem
-        if holds is None:
-            found.document.saved = None
-        elif number > found.document.version:
-            found.document.written(holds, name)
+        if saved_value is None:
+            recovered.document.saved = None
+        elif number > recovered.document.version:
+            recovered.document.written(saved_value, name)
         else:
-            found.document.saved = holds
-        self._values[found.document.version] = found.document.value
+            recovered.document.saved = saved_value
+        self._values[recovered.document.version] = recovered.document.value
 
 
-def _why(error: Exception) -> str:
+def _defect_text(error: Exception) -> str:
     if isinstance(error, ValidationError):
         return "the record is invalid"
     return f"armblocks has a defect ({type(error).__name__})"
 
 
-def _said(fingerprint: Fingerprint | None) -> dict[str, Any] | None:
+def _fingerprint_dict(fingerprint: Fingerprint | None) -> dict[str, Any] | None:
     return None if fingerprint is None else fingerprint.as_dict()
 
 

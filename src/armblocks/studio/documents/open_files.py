@@ -30,7 +30,7 @@ from armblocks.studio.protocol.messages import documents as document_messages
 MOST_OPEN = 100
 MOST_KEYS = 1000
 """Number of stored request keys; they ensure that a request that is sent twice is applied once."""
-LOOK_SECONDS = 1.0
+WATCH_SECONDS = 1.0
 """Interval at which files are checked for changes, s."""
 
 
@@ -45,10 +45,10 @@ class OpenFile(Generic[EditedT]):
     """The shipped example or robot from which it was created."""
     on_disk: Fingerprint | None = None
     disk: Disk = "same"
-    seen: deque[str] = dataclasses.field(default_factory=lambda: deque(maxlen=MOST_KEYS))
+    request_keys: deque[str] = dataclasses.field(default_factory=lambda: deque(maxlen=MOST_KEYS))
     journal: FileJournal | None = None
     journaled: bool = True
-    behind: bool = False
+    incomplete: bool = False
     """Whether the journal lacks a change of the document."""
     syncing: asyncio.Task[None] | None = None
     snapshot: asyncio.Task[None] | None = None
@@ -89,9 +89,9 @@ class OpenFiles(ABC, Generic[OpenedT]):
         self.state_folder = state_folder
         self.kind = kind
         self._open: dict[str, OpenedT] = {}
-        self._same: dict[str, str] = {}
+        self._renamed_keys: dict[str, str] = {}
         """Keys that pages of an earlier server use for documents that are now open under another key."""
-        self.left = RecoverableFiles(folder, state_folder.journals, kind)
+        self.recoverable = RecoverableFiles(folder, state_folder.journals, kind)
         self._notify: Callable[[OpenedT], Awaitable[None]] | None = None
 
     @abstractmethod
@@ -105,11 +105,11 @@ class OpenFiles(ABC, Generic[OpenedT]):
         return len(self._open)
 
     def __contains__(self, key: str) -> bool:
-        return self._same.get(key, key) in self._open
+        return self._renamed_keys.get(key, key) in self._open
 
     def __getitem__(self, key: str) -> OpenedT:
         """Return the open document with this key; raises ``UnknownNameError``."""
-        key = self._same.get(key, key)
+        key = self._renamed_keys.get(key, key)
         if key not in self._open:
             raise UnknownNameError(f"open {self.kind.name}", key, self._open)
         return self._open[key]
@@ -140,14 +140,14 @@ class OpenFiles(ABC, Generic[OpenedT]):
         """Reopen a document for a page; see :class:`~armblocks.studio.protocol.messages.documents.Attach`."""
         with contextlib.suppress(UnknownNameError):
             return self[key]
-        if key in self.left:
-            return self._restore(self.left.take(key))
+        if key in self.recoverable:
+            return self._restore(self.recoverable.take(key))
         if path:
             open_file = self.open_path(path, key)
         else:
             open_file = self.open_shipped(origin, key) if origin else self.new(key)
         if open_file.key != key:
-            self._same[key] = open_file.key
+            self._renamed_keys[key] = open_file.key
         return open_file
 
     def add(
@@ -173,16 +173,16 @@ class OpenFiles(ABC, Generic[OpenedT]):
                 allowed="saving the document, or discarding its edits",
                 fix="choose one of the two",
             )
-        self._put_away(open_file, keep=False)
+        self._close(open_file, keep=False)
 
     def end(self) -> None:
         """Close all documents when the studio ends; journals of unsaved documents remain."""
         for open_file in self:
             with contextlib.suppress(OSError):
-                self._put_away(open_file, keep=open_file.document.dirty)
-        self.left.end()
+                self._close(open_file, keep=open_file.document.dirty)
+        self.recoverable.end()
 
-    def _put_away(self, open_file: OpenedT, *, keep: bool) -> None:
+    def _close(self, open_file: OpenedT, *, keep: bool) -> None:
         del self._open[open_file.key]
         open_file.leave()
         if open_file.journal is not None:
@@ -196,15 +196,15 @@ class OpenFiles(ABC, Generic[OpenedT]):
 
     def _add(self, document: Any, key: str) -> OpenedT:
         if len(self._open) >= MOST_OPEN:
-            self._make_room()
+            self._close_one()
         open_file = self._open[key] = self._made(key, document)
         return open_file
 
-    def _make_room(self) -> None:
+    def _close_one(self) -> None:
         """Close the earliest opened document that has no unsaved edits."""
         for open_file in self:
             if not open_file.document.dirty:
-                self._put_away(open_file, keep=False)
+                self._close(open_file, keep=False)
                 return
         raise InputError(
             f"{len(self._open)} {self.kind.name}s with unsaved edits are open",
@@ -217,12 +217,12 @@ class OpenFiles(ABC, Generic[OpenedT]):
 
     def perform(self, open_file: OpenedT, request: document_messages.Alteration) -> bool:
         """Apply a request; return ``False`` if it was applied before. Raises ``ArmblocksError``."""
-        if request.key and request.key in open_file.seen:
+        if request.key and request.key in open_file.request_keys:
             return False
         document, before, number = open_file.document, open_file.document.value, open_file.document.version
         document.perform(request)
         if request.key:
-            open_file.seen.append(request.key)
+            open_file.request_keys.append(request.key)
         after, version = document.value, document.version
         continued = request.does == "change" and document.continued
         self._write(
@@ -237,7 +237,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
 
     def reload(self, open_file: OpenedT, key: str = "") -> None:
         """Replace the document by the content of its file, as one undo step; once for each ``key``."""
-        if key and key in open_file.seen:
+        if key and key in open_file.request_keys:
             return
         if open_file.path is None:
             raise self._no_file(open_file)
@@ -248,7 +248,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
         open_file.on_disk, open_file.disk = on_disk, "same"
         self._saved(open_file, open_file.path, document.version)
         if key:
-            open_file.seen.append(key)
+            open_file.request_keys.append(key)
 
     def replace(self, open_file: OpenedT, title: str, value: Any) -> None:
         """Replace the value of a document, as one undo step."""
@@ -282,16 +282,16 @@ class OpenFiles(ABC, Generic[OpenedT]):
             path = path or open_file.path or ""
             if not path:
                 raise self._no_file(open_file)
-            place = self.folder.path(path)
-            path = place.relative_to(self.folder.root).as_posix()
+            target = self.folder.path(path)
+            path = target.relative_to(self.folder.root).as_posix()
             if not overwrite:
                 self._refuse_overwriting(open_file, path)
             document, of = open_file.document, open_file.document.version
             written = document.value
-            value = self.kind.renamed(written, place) if path != open_file.path else written
+            value = self.kind.renamed(written, target) if path != open_file.path else written
 
             def write() -> Fingerprint:
-                return self.folder.write(path, self.kind.to_file(value, place))
+                return self.folder.write(path, self.kind.to_file(value, target))
 
             open_file.on_disk = await asyncio.to_thread(write)
             open_file.path, open_file.disk = path, "same"
@@ -342,15 +342,15 @@ class OpenFiles(ABC, Generic[OpenedT]):
         """
         try:
             if open_file.journal is None:
-                open_file.journal, open_file.behind = self._begin_journal(open_file), True
-            if open_file.behind:
+                open_file.journal, open_file.incomplete = self._begin_journal(open_file), True
+            if open_file.incomplete:
                 open_file.journal.begin_from(before, number)
-                open_file.behind = False
+                open_file.incomplete = False
             write(open_file.journal)
             open_file.journaled = True
             self._sync_later(open_file)
         except OSError:
-            open_file.journaled, open_file.behind = False, True
+            open_file.journaled, open_file.incomplete = False, True
 
     def _begin_journal(self, open_file: OpenedT) -> FileJournal:
         return FileJournal.begin(
@@ -373,7 +373,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
                 try:
                     await asyncio.to_thread(open_file.journal.sync)
                 except OSError:
-                    open_file.journaled, open_file.behind = False, True
+                    open_file.journaled, open_file.incomplete = False, True
                     if self._notify is not None:
                         await self._notify(open_file)
 
@@ -398,9 +398,9 @@ class OpenFiles(ABC, Generic[OpenedT]):
         """Apply the user's choice for a recoverable document; return the document if it is now open."""
         key = request.document
         if request.action == "discard":
-            self.left.discard(key)
+            self.recoverable.discard(key)
             return None
-        recovered = self.left.take(key)
+        recovered = self.recoverable.take(key)
         opened = self._restore(recovered)
         if request.action == "keep_both":
             await self.save(opened, self._free_path(recovered), overwrite=False)
@@ -409,9 +409,9 @@ class OpenFiles(ABC, Generic[OpenedT]):
     def _free_path(self, recovered: JournaledFile[Any]) -> str:
         """A free file name for a recovered document, in the folder of its former file."""
         origin = PurePosixPath(recovered.path or f"{recovered.document.value.name}.json")
-        when = datetime.fromtimestamp(recovered.last).strftime("%Y-%m-%d %H.%M.%S")
-        wish = f"{origin.stem} recovered {when}"
-        names = (f"{wish}.json", *(f"{wish} {k}.json" for k in range(2, 1000)))
+        time = datetime.fromtimestamp(recovered.last).strftime("%Y-%m-%d %H.%M.%S")
+        stem = f"{origin.stem} recovered {time}"
+        names = (f"{stem}.json", *(f"{stem} {k}.json" for k in range(2, 1000)))
         return next(str(p) for name in names if not self.folder.exists(str(p := origin.with_name(name))))
 
     def _restore(self, recovered: JournaledFile[Any]) -> OpenedT:
@@ -421,7 +421,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
             path = None  # the file is already open: this document needs another name
         opened = self._add(recovered.document, recovered.key)
         opened.path, opened.origin, opened.on_disk = path, recovered.origin, recovered.on_disk
-        opened.seen.extend(recovered.keys)
+        opened.request_keys.extend(recovered.keys)
         if path is not None:
             opened.disk, opened.on_disk = self.folder.compared(path, recovered.on_disk)
         if recovered.missing:
@@ -431,7 +431,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
                 opened.document.saved = None
             return opened
         with contextlib.suppress(OSError):
-            opened.journal = FileJournal.go_on(recovered, self.kind)
+            opened.journal = FileJournal.continue_from(recovered, self.kind)
         return opened
 
     # -- the disk --------------------------------------------------------------------------------------------
@@ -442,16 +442,16 @@ class OpenFiles(ABC, Generic[OpenedT]):
         """
         self._notify = notify
         while True:
-            await asyncio.sleep(LOOK_SECONDS)
+            await asyncio.sleep(WATCH_SECONDS)
             for open_file in self:
                 if open_file.path is None or open_file.saving.locked():
                     continue
-                path, known, was = open_file.path, open_file.on_disk, open_file.disk
-                disk, now = await asyncio.to_thread(self.folder.compared, path, known)
+                path, known, old_state = open_file.path, open_file.on_disk, open_file.disk
+                disk, fingerprint = await asyncio.to_thread(self.folder.compared, path, known)
                 if open_file.on_disk is not known or open_file.path != path:
                     continue  # it was saved meanwhile
-                open_file.disk, open_file.on_disk = disk, now
-                if disk != was:
+                open_file.disk, open_file.on_disk = disk, fingerprint
+                if disk != old_state:
                     if disk == "gone":
                         self._hold(open_file)
                     await notify(open_file)

@@ -69,15 +69,15 @@ class ProjectData(DataFiles):
         try:
             path = self.folder.path(reference.file, TABLE_SUFFIXES, folder)
         except ArmblocksError as error:
-            return _unread(error, reference, reference.file, "")
+            return _unreadable(error, reference, reference.file, "")
         shown = self.shown(path)
         try:
             strict = is_strict(path)
-            found = table_of(self.columns(path), shown, reference.time, reference.columns, strict=strict)
+            table = table_of(self.columns(path), shown, reference.time, reference.columns, strict=strict)
         except ArmblocksError as error:
             fault = FormatError(error.what, where=shown, allowed=error.allowed, fix=error.fix)
-            return _unread(fault, reference, str(path), shown)
-        return dataclasses.replace(found, source=str(path), shown=shown)
+            return _unreadable(fault, reference, str(path), shown)
+        return dataclasses.replace(table, source=str(path), shown=shown)
 
     # -- functions -------------------------------------------------------------------------------------------
 
@@ -123,24 +123,28 @@ class ProjectData(DataFiles):
     def faults(self, diagram: Diagram) -> Iterator[tuple[str, ArmblocksError]]:
         """The paths of blocks whose files cannot be used now, and the reasons."""
         for path, value in files_of(diagram):
-            fault = self._fault_of_table(value) if isinstance(value, TimeTable) else self._fault_of(value)
+            fault = (
+                self._fault_of_table(value)
+                if isinstance(value, TimeTable)
+                else self._fault_of_function(value)
+            )
             if fault is not None:
                 yield path, fault
 
     def _fault_of_table(self, table: TimeTable) -> ArmblocksError | None:
         if not table.shown:
             return table.fault
-        now = self.table(TableReference(file=table.shown, time=table.time, columns=table.columns), None)
-        if now.fault is None and now.shape[1] != table.shape[1]:
+        current = self.table(TableReference(file=table.shown, time=table.time, columns=table.columns), None)
+        if current.fault is None and current.shape[1] != table.shape[1]:
             return FormatError(
-                f"{table.shown} has changed: it has {now.shape[1] - 1} columns of values instead of "
+                f"{table.shown} has changed: it has {current.shape[1] - 1} columns of values instead of "
                 f"{table.shape[1] - 1}",
                 where=table.shown,
                 fix="open the block and choose its columns again",
             )
-        return now.fault
+        return current.fault
 
-    def _fault_of(self, function: UserFunction) -> ArmblocksError | None:
+    def _fault_of_function(self, function: UserFunction) -> ArmblocksError | None:
         value = function.function
         if not isinstance(value, UnloadedFunction):
             return None
@@ -188,7 +192,7 @@ def has_functions(diagram: Diagram) -> bool:
     return any(isinstance(value, UserFunction) for _, value in files_of(diagram))
 
 
-def _unread(fault: ArmblocksError, reference: TableReference, source: str, shown: str) -> TimeTable:
+def _unreadable(fault: ArmblocksError, reference: TableReference, source: str, shown: str) -> TimeTable:
     table = TimeTable.unread(fault, source, time=reference.time, columns=reference.columns)
     return dataclasses.replace(table, shown=shown)
 

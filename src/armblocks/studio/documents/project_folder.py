@@ -27,7 +27,7 @@ STRAY_SECONDS = 60.0
 """Age after which a partly written file is considered abandoned by a killed process, s."""
 _HIDDEN = ("node_modules", "__pycache__")
 _STRAY = re.compile(r"\..*\.[0-9a-f]{12}\.(tmp|part)")
-_STRANGE = re.compile(r'[\x00-\x1f\x7f<>:"|?*\\]')
+_FORBIDDEN = re.compile(r'[\x00-\x1f\x7f<>:"|?*\\]')
 _DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
 LONGEST_NAME = 120
 
@@ -80,30 +80,30 @@ class ProjectFolder:
         # A Windows share or drive is refused before the file system is accessed: the access alone would send
         # the user's credentials to the share (CVE-2024-35178).
         rooted = relative.startswith("/") and folder is None
-        strange = "\0" in relative or "\\" in relative or ":" in relative or rooted
-        if not relative or strange or len(relative) > 1000:
+        is_forbidden = "\0" in relative or "\\" in relative or ":" in relative or rooted
+        if not relative or is_forbidden or len(relative) > 1000:
             raise FormatError(
                 f"{relative[:80]!r} is not a path of the project",
                 allowed=allowed,
                 where="project folder",
                 fix="choose a file of the project",
             )
-        found = ((folder or self.root) / relative).resolve()
-        if not found.is_relative_to(self.root) or found == self.root:
+        resolved = ((folder or self.root) / relative).resolve()
+        if not resolved.is_relative_to(self.root) or resolved == self.root:
             raise FormatError(
                 f"'{relative[:80]}' is outside of the project folder",
                 allowed=allowed,
                 where="project folder",
                 fix="copy the file into the project",
             )
-        if found.suffix.lower() not in suffixes:
+        if resolved.suffix.lower() not in suffixes:
             raise FormatError(
                 f"the studio does not open '{relative[:80]}'",
                 allowed=allowed,
                 where="project folder",
                 fix="choose a file of another kind",
             )
-        return found
+        return resolved
 
     def read(self, relative: str) -> bytes:
         """Return the content of a file."""
@@ -142,7 +142,7 @@ class ProjectFolder:
             ) from error
         return Fingerprint.of(write_atomically(path, data), data)
 
-    def keep(self, relative: str, data: bytes, suffixes: tuple[str, ...]) -> None:
+    def write_data(self, relative: str, data: bytes, suffixes: tuple[str, ...]) -> None:
         """Write a data file at the top of the folder, atomically."""
         path = self.path(relative, suffixes)
         check_file_name(relative)
@@ -159,12 +159,14 @@ class ProjectFolder:
             status = path.stat()
             if known is not None and known.matches(status):
                 return "same", known
-            now = Fingerprint.of(status, read_bounded(path, MOST_BYTES))
+            current = Fingerprint.of(status, read_bounded(path, MOST_BYTES))
         except FileNotFoundError:
             return "gone", known
         except (OSError, FormatError):
             return "changed", known
-        return ("same", now) if known is not None and known.digest == now.digest else ("changed", known)
+        return (
+            ("same", current) if known is not None and known.digest == current.digest else ("changed", known)
+        )
 
     def sweep(self, used: Iterable[str]) -> None:
         """Remove partly written temporary files beside these files, left by a studio killed during a save."""
@@ -207,7 +209,7 @@ def check_file_name(relative: str) -> None:
     for part in relative.split("/"):
         if not part or part != part.strip() or part.startswith(".") or part.endswith("."):
             reason = "is empty, or begins or ends with a dot or space"
-        elif _STRANGE.search(part):
+        elif _FORBIDDEN.search(part):
             reason = "contains a character that some systems cannot store"
         elif _DEVICES.fullmatch(part):
             reason = "is a reserved device name"

@@ -64,7 +64,9 @@ class DocumentRequests:
 
     def recoveries(self) -> list[document_messages.Recovery]:
         """The documents that can be recovered, the latest first."""
-        offers = (offer for presenter in self._presenters.values() for offer in presenter.files.left.offers())
+        offers = (
+            offer for presenter in self._presenters.values() for offer in presenter.files.recoverable.offers()
+        )
         return sorted(offers, key=lambda offer: -offer.last)
 
     def watch(self) -> list[asyncio.Task[None]]:
@@ -173,8 +175,8 @@ class DocumentRequests:
 
     async def _recover(self, page: Page, request: document_messages.Recover) -> str | None:
         files = [presenter.files for presenter in self._presenters.values()]
-        holding = next((each for each in files if request.document in each.left), files[0])
-        open_file = await holding.recover(request)
+        recoverable = next((kind for kind in files if request.document in kind.recoverable), files[0])
+        open_file = await recoverable.recover(request)
         if open_file is not None:
             return await self.show(page, open_file)
         await self.notify_list()

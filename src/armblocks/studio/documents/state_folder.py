@@ -45,16 +45,16 @@ class StateFolder:
         """The session of the previous server; ``None`` if there was none or it has expired."""
         try:
             age = time() - self._session.stat().st_mtime
-            found = json.loads(read_bounded(self._session, MOST_BYTES))
-            session = Session(port=int(found["port"]), secret=str(found["secret"]))
+            stored = json.loads(read_bounded(self._session, MOST_BYTES))
+            session = Session(port=int(stored["port"]), secret=str(stored["secret"]))
         except (OSError, FormatError, ValueError, KeyError, TypeError):
             return None
         return session if age < SESSION_SECONDS and len(session.secret) >= 32 else None
 
-    def begin_session(self, port: int, *, afresh: bool = False) -> Session:
-        """Return the session for this port: the previous one if its port is the same, unless ``afresh``."""
+    def begin_session(self, port: int, *, new: bool = False) -> Session:
+        """Return the session for this port: the previous one if its port is the same, unless ``new``."""
         last = self.session()
-        resumed = last is not None and last.port == port and not afresh
+        resumed = last is not None and last.port == port and not new
         session = last if last is not None and resumed else Session(port, secrets.token_urlsafe(32))
         self._write(self._session, asdict(session))
         return session
@@ -62,8 +62,8 @@ class StateFolder:
     def recent(self) -> list[str]:
         """Recently opened or saved project files, the latest first."""
         try:
-            found: Any = json.loads(read_bounded(self._recent, MOST_BYTES))
-            return [str(name) for name in found["files"]][:MOST_RECENT]
+            stored: Any = json.loads(read_bounded(self._recent, MOST_BYTES))
+            return [str(name) for name in stored["files"]][:MOST_RECENT]
         except (FormatError, ValueError, KeyError, TypeError):
             return []
 

@@ -27,8 +27,8 @@ class TrustedFiles:
     itself trusted.
     """
 
-    def __init__(self, kept: StateFolder | None = None, pairs: Iterable[Iterable[str]] = ()) -> None:
-        self._kept = kept
+    def __init__(self, state_folder: StateFolder | None = None, pairs: Iterable[Iterable[str]] = ()) -> None:
+        self._state_folder = state_folder
         self._pairs: dict[tuple[str, str], None] = {}
         for pair in (*self._read(), *pairs):
             path, digest = pair
@@ -50,14 +50,14 @@ class TrustedFiles:
             self._pairs = {pair: None for pair in self._pairs if pair[0] != path}
         for pair in list(self._pairs)[:-MOST_TRUSTED]:
             del self._pairs[pair]
-        if self._kept is not None:
-            self._kept.write_private("trusted.json", {"files": self.pairs})
+        if self._state_folder is not None:
+            self._state_folder.write_private("trusted.json", {"files": self.pairs})
 
     def _read(self) -> list[tuple[str, str]]:
-        if self._kept is None:
+        if self._state_folder is None:
             return []
         try:
-            found: Any = json.loads(read_bounded(self._kept.root / "trusted.json", MOST_BYTES))
-            return [(str(path), str(digest)) for path, digest in found["files"]]
+            stored: Any = json.loads(read_bounded(self._state_folder.root / "trusted.json", MOST_BYTES))
+            return [(str(path), str(digest)) for path, digest in stored["files"]]
         except (FormatError, ValueError, KeyError, TypeError):
             return []

@@ -39,15 +39,15 @@ def thinned(
     first = _extremes(time[:whole], signals[:, :whole], stride)
     if whole == time.size:
         return first
-    rest = thinned(time[whole:], signals[:, whole:], stride)
-    return np.concatenate([first[0], rest[0]]), np.concatenate([first[1], rest[1]], axis=1)
+    remaining = thinned(time[whole:], signals[:, whole:], stride)
+    return np.concatenate([first[0], remaining[0]]), np.concatenate([first[1], remaining[1]], axis=1)
 
 
 def _extremes(
     time: NDArray[np.float64], signals: NDArray[np.float64], stride: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     groups = signals.reshape(signals.shape[0], -1, stride)
-    places = np.sort(np.stack([groups.argmin(axis=2), groups.argmax(axis=2)], axis=2), axis=2)
-    values = np.take_along_axis(groups, places, axis=2)
+    indices = np.sort(np.stack([groups.argmin(axis=2), groups.argmax(axis=2)], axis=2), axis=2)
+    values = np.take_along_axis(groups, indices, axis=2)
     times = time.reshape(-1, stride)[:, [0, stride // 2]]
     return times.reshape(-1), values.reshape(signals.shape[0], -1)

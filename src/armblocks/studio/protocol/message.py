@@ -52,30 +52,30 @@ class Fault(Message):
 def reply_type(request: type[Request[Any]]) -> Any:
     """Return the type of the value in the reply to a request."""
     for base in request.__mro__:
-        given = base.__pydantic_generic_metadata__["args"] if issubclass(base, Request) else ()
-        if given and not isinstance(given[0], TypeVar):
-            return given[0]
+        arguments = base.__pydantic_generic_metadata__["args"] if issubclass(base, Request) else ()
+        if arguments and not isinstance(arguments[0], TypeVar):
+            return arguments[0]
     raise TypeError(f"{request.__name__} does not declare the type of its reply")
 
 
 def messages_of(base: type[MessageT]) -> dict[str, type[MessageT]]:
     """Return the subclasses of a message class that have a kind, by kind."""
     list(modules_in("armblocks.studio.protocol.messages"))  # imports them
-    found = {kind: message for message in _below(base) if (kind := kind_of(message))}
-    return dict(sorted(found.items()))
+    messages = {kind: message for message in _subclasses(base) if (kind := kind_of(message))}
+    return dict(sorted(messages.items()))
 
 
 def kind_of(message: type[Message]) -> str:
     """Return the kind that identifies a message within its class; ``""`` for a class without a kind."""
     field = message.model_fields.get("kind")
-    given = get_args(field.annotation) if field is not None else ()
-    return given[0] if len(given) == 1 else ""
+    kinds = get_args(field.annotation) if field is not None else ()
+    return kinds[0] if len(kinds) == 1 else ""
 
 
-def _below(base: type[MessageT]) -> Iterator[type[MessageT]]:
+def _subclasses(base: type[MessageT]) -> Iterator[type[MessageT]]:
     for message in base.__subclasses__():
         yield message
-        yield from _below(message)
+        yield from _subclasses(message)
 
 
 class AnyOf:

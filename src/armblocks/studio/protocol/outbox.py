@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable
 
 Payload = str | bytes
 """A message as JSON, or a frame of samples."""
-BEHIND_BYTES = 4 * 2**20
+CONGESTED_BYTES = 4 * 2**20
 """Above this queue size, samples of a run are added only as fast as the page receives them, bytes."""
 MOST_BYTES = 64 * 2**20
 """Above this queue size the connection is closed; the page reconnects when it is responsive again, bytes."""
@@ -22,57 +22,57 @@ class Outbox:
     ) -> None:
         self._send_text = send_text
         self._send_bytes = send_bytes
-        self._waiting: deque[Payload] = deque()
+        self._queue: deque[Payload] = deque()
         self._size = 0
-        self._news = asyncio.Event()
+        self._added = asyncio.Event()
         self._room = asyncio.Event()
         self._room.set()
-        self.given_up = False
+        self.closed = False
         """Whether the queue is closed: the page has disconnected, or the queue exceeded its size limit."""
 
     @property
-    def behind(self) -> bool:
+    def congested(self) -> bool:
         """Whether the queue is so long that no more samples of a run should be added."""
         return not self._room.is_set()
 
     async def put(self, payload: Payload) -> None:
         """Add a message; does not wait."""
-        if self.given_up:
+        if self.closed:
             return
-        self._waiting.append(payload)
+        self._queue.append(payload)
         self._size += len(payload)
-        self._news.set()
-        if self._size > BEHIND_BYTES:
+        self._added.set()
+        if self._size > CONGESTED_BYTES:
             self._room.clear()
         if self._size > MOST_BYTES:
-            self.give_up()
+            self.close()
 
     async def room(self) -> None:
-        """Wait until :attr:`behind` is false."""
+        """Wait until :attr:`congested` is false."""
         await self._room.wait()
 
-    async def empty(self) -> None:
+    async def send_all(self) -> None:
         """Send all messages, also later ones, until the queue is closed; raises connection errors."""
         try:
-            while not self.given_up:
-                while self._waiting and not self.given_up:
-                    payload = self._waiting.popleft()
+            while not self.closed:
+                while self._queue and not self.closed:
+                    payload = self._queue.popleft()
                     await (
                         self._send_text(payload) if isinstance(payload, str) else self._send_bytes(payload)
                     )
                     self._size -= len(payload)
-                    if self._size <= BEHIND_BYTES:
+                    if self._size <= CONGESTED_BYTES:
                         self._room.set()
-                self._news.clear()
-                if not self._waiting and not self.given_up:
-                    await self._news.wait()
+                self._added.clear()
+                if not self._queue and not self.closed:
+                    await self._added.wait()
         finally:
-            self.give_up()
+            self.close()
 
-    def give_up(self) -> None:
+    def close(self) -> None:
         """Close the queue and discard its messages."""
-        self.given_up = True
-        self._waiting.clear()
+        self.closed = True
+        self._queue.clear()
         self._size = 0
-        self._news.set()
+        self._added.set()
         self._room.set()

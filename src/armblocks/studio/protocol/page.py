@@ -15,7 +15,7 @@ from armblocks.studio.protocol.outbox import Outbox, Payload
 if TYPE_CHECKING:
     from armblocks.studio.protocol.message import Message
 
-GONE = (RuntimeError, ConnectionError, WebSocketDisconnect)
+DISCONNECTED = (RuntimeError, ConnectionError, WebSocketDisconnect)
 """Exceptions raised by sending to a disconnected page."""
 SendText = Callable[[str], Awaitable[None]]
 SendBytes = Callable[[bytes], Awaitable[None]]
@@ -39,12 +39,12 @@ class Page:
     """Runs whose record is being sent, with the number of sent messages; live messages are withheld."""
 
     @property
-    def behind(self) -> bool:
+    def congested(self) -> bool:
         """Whether its queue is so long that no more samples of a run should be added."""
-        return self.outbox is not None and self.outbox.behind
+        return self.outbox is not None and self.outbox.congested
 
     async def room(self) -> None:
-        """Wait until :attr:`behind` is false."""
+        """Wait until :attr:`congested` is false."""
         if self.outbox is not None:
             await self.outbox.room()
 
@@ -54,7 +54,7 @@ class Page:
 
     async def send(self, payload: Payload) -> None:
         """Send a message or a frame without conversion."""
-        with contextlib.suppress(*GONE):
+        with contextlib.suppress(*DISCONNECTED):
             await (self.send_text(payload) if isinstance(payload, str) else self.send_bytes(payload))
 
 

@@ -80,14 +80,14 @@ def _frame_column(frame: str, index: int) -> Column[Robot]:
         six = numbers(robot)
         six[index] = number_of(value)
         x, y, z, roll, pitch, yaw = six
-        made = transl(x, y, z) @ trotz(yaw) @ troty(pitch) @ trotx(roll)
-        return replace(robot, base=made) if frame == "base" else replace(robot, tool=made)
+        transform = transl(x, y, z) @ trotz(yaw) @ troty(pitch) @ trotx(roll)
+        return replace(robot, base=transform) if frame == "base" else replace(robot, tool=transform)
 
-    turn = "; R = Rz(yaw) Ry(pitch) Rx(roll)" if angular else ""
+    convention = "; R = Rz(yaw) Ry(pitch) Rx(roll)" if angular else ""
     return Column(
         name=f"{frame}_{letter}",
         title=letter,
-        doc=f"{letter} of {_FRAME_DOCS[frame]}{turn}",
+        doc=f"{letter} of {_FRAME_DOCS[frame]}{convention}",
         quantity=Quantity.ANGLE if angular else Quantity.NUMBER,
         unit="rad" if angular else "m",
         group=frame.capitalize(),

@@ -31,25 +31,25 @@ class RobotDocument(Edited[Robot]):
 
     def aspects(self, before: Robot, after: Robot) -> set[Aspect]:
         """Return the cells that differ, links that were added or removed, and changes of the link order."""
-        found = {
+        cells = {
             ("/", name) for name, column in ROBOT_COLUMNS.items() if column.read(before) != column.read(after)
         }
         old, new = ({link.name: link for link in robot.links} for robot in (before, after))
         if list(old) != list(new):
-            found.add(("/", "links"))
+            cells.add(("/", "links"))
         for name in old.keys() | new.keys():
-            found |= _of_link(name, old.get(name), new.get(name))
-        return found
+            cells |= _link_aspects(name, old.get(name), new.get(name))
+        return cells
 
     def written(self, value: Robot, name: str) -> None:
         """Mark ``value`` as saved; the name of a robot does not depend on its file name."""
         self.saved = value
 
 
-def _of_link(name: str, old: Link | None, new: Link | None) -> set[Aspect]:
+def _link_aspects(name: str, old: Link | None, new: Link | None) -> set[Aspect]:
     if old is None or new is None:
         return {(name, "")}
     if old == new:
         return set()
-    found = {(name, column.name) for column in LINK_COLUMNS.values() if column.read(old) != column.read(new)}
-    return found or {(name, "parent")}
+    cells = {(name, column.name) for column in LINK_COLUMNS.values() if column.read(old) != column.read(new)}
+    return cells or {(name, "parent")}

@@ -29,8 +29,8 @@ from armblocks.studio.robots.columns import ROBOT_COLUMNS, Column, Owner, Quanti
 from armblocks.studio.robots.link_columns import LINK_COLUMNS
 from armblocks.studio.sheet.parameter_values import number_value
 
-_OWN_UNIT = re.compile(r"\b(pi|deg|rad)\b|°")
-_UNIT_BEHIND = re.compile(r"(?<=[0-9.)])\s*(deg|rad)\b")
+_EXPLICIT_UNIT = re.compile(r"\b(pi|deg|rad)\b|°")
+_UNIT_AFTER_NUMBER = re.compile(r"(?<=[0-9.)])\s*(deg|rad)\b")
 _DEGREES = re.compile(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(?:\*?\s*deg|°)\s*")
 
 
@@ -57,7 +57,7 @@ def _set_cell(edit: SetCell, robot: Robot) -> Robot:
     if why := column.locked(link):
         raise InputError("this cell cannot be edited", where=where, allowed=why, fix="edit another cell")
     changed = column.write(link, _typed(column, link, edit, where, turns=bool(link.joint.angular)))
-    return replace(robot, links=tuple(changed if each is link else each for each in robot.links))
+    return replace(robot, links=tuple(changed if other is link else other for other in robot.links))
 
 
 def _known(columns: Mapping[str, Column[Owner]], name: str) -> Column[Owner]:
@@ -108,8 +108,8 @@ def angle_value(text: str, where: str, unit: Literal["deg", "rad"]) -> float:
     """
     if degrees := _DEGREES.fullmatch(text):
         return math.radians(_one_number(degrees.group(1), where))
-    if _OWN_UNIT.search(text):
-        return _one_number(_UNIT_BEHIND.sub(r"*\1", text.replace("°", "*deg")), where)
+    if _EXPLICIT_UNIT.search(text):
+        return _one_number(_UNIT_AFTER_NUMBER.sub(r"*\1", text.replace("°", "*deg")), where)
     value = _one_number(text, where)
     return math.radians(value) if unit == "deg" else value
 
@@ -149,27 +149,28 @@ def _add_joint(edit: AddJoint, robot: Robot) -> Robot:
     """Insert a revolute link with the convention of its neighbour between a link and its children."""
     after = edit.after
     links = list(robot.links)
-    place = links.index(robot.link(after)) + 1 if after else 0
-    near = next((link.dh for link in links[place - 1 :: -1] + links if link.dh is not None), None)
-    convention = near.convention if near is not None else DhConvention.STANDARD
+    index = links.index(robot.link(after)) + 1 if after else 0
+    neighbour = next((link.dh for link in links[index - 1 :: -1] + links if link.dh is not None), None)
+    convention = neighbour.convention if neighbour is not None else DhConvention.STANDARD
     name = _free_name(links)
-    made = link_from_dh(name, DhRow(a=0.2, convention=convention), parent=after or None)
+    new_link = link_from_dh(name, DhRow(a=0.2, convention=convention), parent=after or None)
     # In a tree, a link inserted at the base is a second root, not the parent of the others.
-    takes_over = bool(after) or _is_chain(robot)
-    hung = [
-        replace(link, parent=name) if takes_over and link.parent == made.parent else link for link in links
+    is_inserted = bool(after) or _is_chain(robot)
+    reparented = [
+        replace(link, parent=name) if is_inserted and link.parent == new_link.parent else link
+        for link in links
     ]
-    return replace(robot, links=(*hung[:place], made, *hung[place:]))
+    return replace(robot, links=(*reparented[:index], new_link, *reparented[index:]))
 
 
 def _free_name(links: Sequence[Link]) -> str:
-    taken = {link.name for link in links}
-    return next(name for k in range(1, len(links) + 2) if (name := f"link{len(links) + k}") not in taken)
+    used_names = {link.name for link in links}
+    return next(name for k in range(1, len(links) + 2) if (name := f"link{len(links) + k}") not in used_names)
 
 
 @ROBOT_EDITS.on(RemoveJoint, lambda edit: f"remove {edit.link}")
 def _remove_joint(edit: RemoveJoint, robot: Robot) -> Robot:
-    gone = robot.link(edit.link)
+    removed = robot.link(edit.link)
     if len(robot.links) == 1:
         raise RobotError(
             "a robot has at least one link",
@@ -178,9 +179,9 @@ def _remove_joint(edit: RemoveJoint, robot: Robot) -> Robot:
             fix="change this link instead",
         )
     links = tuple(
-        replace(link, parent=gone.parent) if link.parent == gone.name else link
+        replace(link, parent=removed.parent) if link.parent == removed.name else link
         for link in robot.links
-        if link is not gone
+        if link is not removed
     )
     return replace(robot, links=links)
 
@@ -189,7 +190,7 @@ def _remove_joint(edit: RemoveJoint, robot: Robot) -> Robot:
 def _move_joint(edit: MoveJoint, robot: Robot) -> Robot:
     name, by = edit.link, edit.by
     links = list(robot.links)
-    place = links.index(robot.link(name))
+    index = links.index(robot.link(name))
     if not _is_chain(robot):
         raise RobotError(
             "the links do not form a single chain",
@@ -197,14 +198,14 @@ def _move_joint(edit: MoveJoint, robot: Robot) -> Robot:
             allowed="reordering the links of a chain, not of a tree",
             fix="change the parents of the links",
         )
-    if not 0 <= place + by < len(links):
+    if not 0 <= index + by < len(links):
         raise InputError(
             "there is no link on that side",
             where=f"link '{name}'",
             allowed="the other direction",
             fix="move it the other way",
         )
-    links[place], links[place + by] = links[place + by], links[place]
+    links[index], links[index + by] = links[index + by], links[index]
     return replace(robot, links=serial_chain(links))
 
 

@@ -15,7 +15,7 @@ JOINT_WORDS = ("revolute", "prismatic")
 # -- links: Table 1 ------------------------------------------------------------------------------------------
 
 _NO_ROW = "the pose of this link is given by transforms in its file, not by a D-H row"
-_HOLDS = "this joint is fixed"
+_FIXED = "this joint is fixed"
 
 
 def _without_row(link: Link) -> str:
@@ -23,7 +23,7 @@ def _without_row(link: Link) -> str:
 
 
 def _not_moving(link: Link) -> str:
-    return "" if link.joint.moves else _HOLDS
+    return "" if link.joint.moves else _FIXED
 
 
 def variable_of(link: Link) -> str:
@@ -54,7 +54,7 @@ def with_row(link: Link, limits: JointLimits | None = None, **changes: object) -
     )
 
 
-def _rownumber_of(name: str, title: str, doc: str, quantity: Quantity, unit: str) -> Column[Link]:
+def _dh_column(name: str, title: str, doc: str, quantity: Quantity, unit: str) -> Column[Link]:
     def locked(link: Link) -> str:
         if name == variable_of(link):
             return "this parameter is the joint coordinate; its constant part is the offset"
@@ -132,10 +132,10 @@ KINEMATICS: tuple[Column[Link], ...] = (
         write=_with_joint_type,
         locked=_without_row,
     ),
-    _rownumber_of("alpha", "α", "twist: angle about x between the two joint axes", Quantity.ANGLE, "rad"),
-    _rownumber_of("a", "a", "length of the common normal of the two joint axes", Quantity.NUMBER, "m"),
-    _rownumber_of("d", "d", "distance along the joint axis to the common normal", Quantity.NUMBER, "m"),
-    _rownumber_of("theta", "θ", "angle about the joint axis", Quantity.ANGLE, "rad"),
+    _dh_column("alpha", "α", "twist: angle about x between the two joint axes", Quantity.ANGLE, "rad"),
+    _dh_column("a", "a", "length of the common normal of the two joint axes", Quantity.NUMBER, "m"),
+    _dh_column("d", "d", "distance along the joint axis to the common normal", Quantity.NUMBER, "m"),
+    _dh_column("theta", "θ", "angle about the joint axis", Quantity.ANGLE, "rad"),
     Column(
         name="offset",
         title="offset",
@@ -195,7 +195,7 @@ def _centre(axis: int) -> Column[Link]:
     )
 
 
-INERTIA_PLACES: Mapping[str, tuple[int, int]] = {
+INERTIA_INDICES: Mapping[str, tuple[int, int]] = {
     "Ixx": (0, 0),
     "Iyy": (1, 1),
     "Izz": (2, 2),
@@ -206,10 +206,10 @@ INERTIA_PLACES: Mapping[str, tuple[int, int]] = {
 """The six inertia entries in the toolbox's order, with their indices in the matrix."""
 
 
-def _inertia(name: str, place: tuple[int, int]) -> Column[Link]:
+def _inertia(name: str, index: tuple[int, int]) -> Column[Link]:
     def write(link: Link, value: Value) -> Link:
-        six = [link.inertia[i][j] for i, j in INERTIA_PLACES.values()]
-        six[list(INERTIA_PLACES).index(name)] = number_of(value)
+        six = [link.inertia[i][j] for i, j in INERTIA_INDICES.values()]
+        six[list(INERTIA_INDICES).index(name)] = number_of(value)
         return replace(link, inertia=inertia_matrix(six, link=link.name))
 
     return Column(
@@ -218,7 +218,7 @@ def _inertia(name: str, place: tuple[int, int]) -> Column[Link]:
         doc=f"{name[1:]} of the inertia about the centre of mass, in the link's axes",
         unit="kg m²",
         group="Inertia I about the centre of mass",
-        read=lambda link: link.inertia[place[0]][place[1]],
+        read=lambda link: link.inertia[index[0]][index[1]],
         write=write,
     )
 
@@ -265,7 +265,7 @@ DYNAMICS: tuple[Column[Link], ...] = (
         write=lambda link, value: replace(link, mass=number_of(value)),
     ),
     *(_centre(axis) for axis in range(3)),
-    *(_inertia(name, place) for name, place in INERTIA_PLACES.items()),
+    *(_inertia(name, index) for name, index in INERTIA_INDICES.items()),
     _motor("inertia", "Jm", "inertia of the rotor", "kg m²"),
     _motor("gear_ratio", "G", "motor turns per joint turn; negative if the directions are opposite", ""),
     _motor("viscous_friction", "B", "viscous friction", "N m s/rad"),

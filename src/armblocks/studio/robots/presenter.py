@@ -89,5 +89,5 @@ def _with_warnings(read: Callable[[], Result]) -> tuple[Result, tuple[str, ...]]
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", ArmblocksWarning)
         result = read()
-    texts = [str(one.message) for one in caught if issubclass(one.category, ArmblocksWarning)]
+    texts = [str(warning.message) for warning in caught if issubclass(warning.category, ArmblocksWarning)]
     return result, tuple(dict.fromkeys(texts))

@@ -18,7 +18,7 @@ SINGULAR = 1e-6
 """Ratio of smallest to greatest singular value below which the arm is called singular."""
 NEARLY = 0.02
 """Ratio below which joint speeds exceed fifty times the tool speed."""
-_PART = 0.1
+_NAMED_FRACTION = 0.1
 """Fraction of the greatest entry above which a joint or a direction is named."""
 
 
@@ -66,40 +66,42 @@ def singularity(J: NDArray[np.float64], joints: Sequence[str], length: float) ->
     ratio = float(values[-1] / values[0])
     if ratio >= NEARLY:
         return ""
-    how = "Singular" if ratio < SINGULAR else "Close to singular"
-    still = np.abs(right[len(values) - 1])
-    named = [joint for joint, part in zip(joints, still) if part > _PART * still.max()]
+    degree = "Singular" if ratio < SINGULAR else "Close to singular"
+    null_motion = np.abs(right[len(values) - 1])
+    named = [joint for joint, part in zip(joints, null_motion) if part > _NAMED_FRACTION * null_motion.max()]
     if len(named) == 1:
-        return f"{how}: {named[0]} moves without motion of the tool."
+        return f"{degree}: {named[0]} moves without motion of the tool."
     words = f"{', '.join(named[:-1])} and {named[-1]} can move together without motion of the tool"
     if len(joints) < 6:
-        return f"{how}: {words}."
-    return f"{how}: {words}; the tool cannot {_direction(left[:, len(values) - 1])}."
+        return f"{degree}: {words}."
+    return f"{degree}: {words}; the tool cannot {_direction(left[:, len(values) - 1])}."
 
 
 def _direction(lost: NDArray[np.float64]) -> str:
     """Describe the lost motion of the tool, in world axes."""
     linear, angular = lost[:3], lost[3:]
-    slides = float(np.linalg.norm(linear)) >= float(np.linalg.norm(angular))
-    way = linear if slides else angular
-    axis = int(np.argmax(np.abs(way)))
-    if abs(way[axis]) > 0.99 * np.linalg.norm(way):
+    is_linear = float(np.linalg.norm(linear)) >= float(np.linalg.norm(angular))
+    motion = linear if is_linear else angular
+    axis = int(np.argmax(np.abs(motion)))
+    if abs(motion[axis]) > 0.99 * np.linalg.norm(motion):
         name = "xyz"[axis]
     else:
-        x, y, z = (round(float(part), 2) + 0.0 for part in way / np.linalg.norm(way) * np.sign(way[axis]))
+        x, y, z = (
+            round(float(part), 2) + 0.0 for part in motion / np.linalg.norm(motion) * np.sign(motion[axis])
+        )
         name = f"({x:g}, {y:g}, {z:g})"
-    return f"move along {name}" if slides else f"turn about {name}"
+    return f"move along {name}" if is_linear else f"turn about {name}"
 
 
 def limit_words(robot: Robot, q: Sequence[float], qd: Sequence[float], tau: NDArray[np.float64]) -> list[str]:
     """Describe the joints outside their range, or beyond their speed or torque limits."""
-    found: list[str] = []
+    texts: list[str] = []
     for link, position, speed, torque in zip(robot.moving_links, q, qd, tau.tolist()):
         limits = link.joint.limits
         if limits.position and not limits.position[0] <= position <= limits.position[1]:
-            found.append(f"{link.name} is outside its range")
+            texts.append(f"{link.name} is outside its range")
         if limits.speed is not None and abs(speed) > limits.speed:
-            found.append(f"{link.name} exceeds its speed limit")
+            texts.append(f"{link.name} exceeds its speed limit")
         if limits.torque is not None and abs(torque) > limits.torque:
-            found.append(f"{link.name} exceeds its torque limit")
-    return found
+            texts.append(f"{link.name} exceeds its torque limit")
+    return texts

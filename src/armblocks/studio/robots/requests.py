@@ -53,9 +53,9 @@ class RobotRequests:
 
     async def _open_of_block(self, page: Page, request: robot_messages.RobotOfBlock) -> str:
         robot = self._block_robot(request.document, request.inside, request.block)
-        place = Path(robot.source)
-        if place.suffix.lower() == ".json" and place.is_relative_to(self._folder.root) and place.is_file():
-            opening = self._presenter.open_file(place.relative_to(self._folder.root).as_posix())
+        path = Path(robot.source)
+        if path.suffix.lower() == ".json" and path.is_relative_to(self._folder.root) and path.is_file():
+            opening = self._presenter.open_file(path.relative_to(self._folder.root).as_posix())
             return await self._documents.show(page, opening.opened[0], notes=opening.notes)
         is_shipped = robot.source in formats.list_robots()
         open_file = self._robots.add(robot, origin=robot.source) if is_shipped else self._robots.bring(robot)

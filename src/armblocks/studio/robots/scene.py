@@ -44,8 +44,8 @@ def scene_of(robot: Robot) -> RobotScene:
                 turns=bool(link.joint.angular),
                 limits=link.joint.limits.position,
                 carrier=rows[link.parent],
-                frame=(link.before @ _along(link)).matrix.ravel().tolist(),
-                moving=(link.after.inverse() @ _along(link)).matrix.ravel().tolist(),
+                frame=(link.before @ _z_along_axis(link)).matrix.ravel().tolist(),
+                moving=(link.after.inverse() @ _z_along_axis(link)).matrix.ravel().tolist(),
                 offset=link.joint.offset,
                 radius=radii[link.name],
             )
@@ -54,7 +54,7 @@ def scene_of(robot: Robot) -> RobotScene:
     )
 
 
-def _along(link: Link) -> Transform:
+def _z_along_axis(link: Link) -> Transform:
     """The rotation of the joint frame that aligns z with the joint axis."""
     x, y, z = link.joint.axis
     sine = math.hypot(x, y)

@@ -9,7 +9,7 @@ from armblocks.studio.protocol.messages import robots as robot_messages
 from armblocks.studio.robots.columns import ROBOT, ROBOT_COLUMNS, Column, Owner
 from armblocks.studio.robots.link_columns import (
     DYNAMICS,
-    INERTIA_PLACES,
+    INERTIA_INDICES,
     KINEMATICS,
     LINK_COLUMNS,
     variable_of,
@@ -69,17 +69,17 @@ def _row(link: Link) -> robot_messages.LinkRow:
 
 
 def _convention(robot: Robot) -> Literal["standard", "modified", ""]:
-    found = {link.dh.convention for link in robot.links if link.dh is not None}
-    if found == {DhConvention.STANDARD}:
+    conventions = {link.dh.convention for link in robot.links if link.dh is not None}
+    if conventions == {DhConvention.STANDARD}:
         return "standard"
-    return "modified" if found == {DhConvention.MODIFIED} else ""
+    return "modified" if conventions == {DhConvention.MODIFIED} else ""
 
 
 def _inertia_findings(robot: Robot) -> list[robot_messages.RobotFinding]:
     return [
         robot_messages.RobotFinding(
             link=finding.link,
-            columns=[*INERTIA_PLACES, *(["mass"] if "no mass" in finding.reason else [])],
+            columns=[*INERTIA_INDICES, *(["mass"] if "no mass" in finding.reason else [])],
             what=f"No rigid body has this inertia: {finding.reason} "
             f"(principal moments {', '.join(f'{moment:.4g}' for moment in finding.moments)} kg m²).",
             fix="It is used as given. Give moments of which none exceeds the sum of the other two.",
@@ -98,14 +98,14 @@ def _findings(robot: Robot) -> list[robot_messages.RobotFinding]:
 
 
 def _friction_findings(robot: Robot) -> list[robot_messages.RobotFinding]:
-    found: list[robot_messages.RobotFinding] = []
+    findings: list[robot_messages.RobotFinding] = []
     for link in robot.links:
         if link.motor is None:
             continue
         plus, minus = link.motor.coulomb_friction
         wrong = {"B": link.motor.viscous_friction < 0, "Tc+": plus < 0, "Tc-": minus > 0}
         if any(wrong.values()):
-            found.append(
+            findings.append(
                 robot_messages.RobotFinding(
                     link=link.name,
                     columns=[name for name, is_wrong in wrong.items() if is_wrong],
@@ -113,7 +113,7 @@ def _friction_findings(robot: Robot) -> list[robot_messages.RobotFinding]:
                     fix="Give B and Tc+ that are not below zero, and Tc- that is not above it.",
                 )
             )
-    return found
+    return findings
 
 
 def _weightless(robot: Robot) -> list[robot_messages.RobotFinding]:

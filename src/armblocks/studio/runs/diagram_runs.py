@@ -83,7 +83,7 @@ class DiagramRuns:
             for page in [
                 page for page in self._pages.showing(open_file.key) if key not in page.records_in_progress
             ]:
-                if page.behind:
+                if page.congested:
                     self._send_later(page, key, len(record) - 1)
                 else:
                     await page.send(payload)
@@ -110,8 +110,8 @@ class DiagramRuns:
     def _send_later(self, page: Page, run: str, begin: int) -> None:
         """Send a page the messages of a run from number ``begin`` on, as fast as the page receives them.
 
-        This serves pages that have just connected or are behind. Live messages of the run are withheld from
-        the page until it has received the record.
+        This is for pages that have just connected or are congested. Live messages of the run are withheld
+        from the page until it has received the record.
         """
         page.records_in_progress[run] = begin
         sending = asyncio.get_running_loop().create_task(self._notify(page, run))

@@ -20,7 +20,7 @@ class Pace:
         self._time, self._since = time, self._clock()
 
     @property
-    def due(self) -> float:
+    def target_time(self) -> float:
         """Simulated time (s) that a run should have reached by now; infinite without a speed."""
         if self.speed is None:
             return math.inf

@@ -51,9 +51,9 @@ class RunProcess:
         self._queue: asyncio.Queue[bytes | None] = asyncio.Queue()
         self._commands: SimpleQueue[bytes | None] = SimpleQueue()
         self._until = monotonic() + MOST_SECONDS
-        self._forced = False
+        self._killed = False
         """Whether the worker was killed because it did not obey ``stop``."""
-        self._broken: str = ""
+        self._failure: str = ""
         """The reason for killing the worker, other than ``stop``."""
         self._passing: asyncio.Task[None] | None = None
 
@@ -82,7 +82,7 @@ class RunProcess:
 
     def _force(self) -> None:
         if self.state not in ENDED:
-            self._forced = True
+            self._killed = True
             self._worker.process.kill()
 
     def _read(self, pipe: Connection) -> None:
@@ -104,28 +104,28 @@ class RunProcess:
         except OSError:  # the process has ended; `_read` reports this
             pass
 
-    async def _heard(self) -> bytes | None:
+    async def _next_message(self) -> bytes | None:
         """Return the next message of the worker; kill a worker that is silent or runs for too long."""
-        rest = max(self._until - monotonic(), 0.0)
-        patience = min(SILENT_SECONDS, rest) if self.state == "running" else rest
+        remaining = max(self._until - monotonic(), 0.0)
+        timeout = min(SILENT_SECONDS, remaining) if self.state == "running" else remaining
         try:
-            async with asyncio.timeout(patience):
+            async with asyncio.timeout(timeout):
                 return await self._queue.get()
         except TimeoutError:
-            if not self._broken:
-                long = (
+            if not self._failure:
+                reason = (
                     f"exceeds its time limit of {MOST_SECONDS:g} s"
-                    if patience == rest
+                    if timeout == remaining
                     else "does not respond"
                 )
-                self._broken = f"the run {long}; it was ended"
+                self._failure = f"the run {reason}; it was ended"
             self._worker.process.kill()
             return await self._queue.get()
 
     async def _pass_on(self) -> None:
         last: run_messages.RunProgress | None = None
-        while (message := await self._heard()) is not None:
-            if self._broken:
+        while (message := await self._next_message()) is not None:
+            if self._failure:
                 continue  # the worker is being killed; its last messages are not valid
             if message[:1] == b"S":
                 await self._pass_samples(message[1:])
@@ -137,32 +137,32 @@ class RunProcess:
         self._commands.put(None)
         if self.state not in ENDED:
             await asyncio.to_thread(self._worker.process.join, JOIN_SECONDS)
-            self.state = "stopped" if self._forced else "failed"
-            await self._notify(self._lost(last))
+            self.state = "stopped" if self._killed else "failed"
+            await self._notify(self._final_progress(last))
 
     async def _pass_samples(self, frame: bytes) -> None:
         """Pass a frame on; end the run if the disk cannot store it."""
         try:
             await self._notify(frame)
         except OSError as error:
-            self._broken = f"the samples of the run cannot be stored ({error.strerror}); the run was ended"
+            self._failure = f"the samples of the run cannot be stored ({error.strerror}); the run was ended"
             self._worker.process.kill()
 
-    def _lost(self, last: run_messages.RunProgress | None) -> run_messages.RunProgress:
+    def _final_progress(self, last: run_messages.RunProgress | None) -> run_messages.RunProgress:
         """The final progress message for a worker that ended without one."""
         fault = run_messages.Fault(
-            what=self._broken or _cause(self._worker.process.exitcode),
+            what=self._failure or _cause(self._worker.process.exitcode),
             where="run",
             allowed="a run within the memory and time limits",
             fix="run the model again; if it happens again, record fewer samples or shorten the run",
         )
         return run_messages.RunProgress(
             run=self.key,
-            state="stopped" if self._forced else "failed",
+            state="stopped" if self._killed else "failed",
             time=last.time if last else 0.0,
             real_time_factor=0.0,
-            message="stopped" if self._forced else "",
-            fault=None if self._forced else fault,
+            message="stopped" if self._killed else "",
+            fault=None if self._killed else fault,
         )
 
 
@@ -170,7 +170,7 @@ def _cause(exitcode: int | None) -> str:
     """The reason for the end of a process that sent no result."""
     if exitcode is None or exitcode >= 0:
         return "the process of the run ended without a result"
-    names = {one.value: one.name for one in signal.Signals}
+    names = {entry.value: entry.name for entry in signal.Signals}
     name = names.get(-exitcode, f"signal {-exitcode}")
     match name:
         case "SIGKILL":

@@ -17,18 +17,18 @@ class RunRecord:
 
     def __init__(self) -> None:
         self._file = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115 - it lives as long as the run
-        self._words: dict[int, str] = {}
+        self._unwritten: dict[int, str] = {}
         """Messages that could not be written to disk, by their number."""
-        self._spots: list[tuple[int, int, bool]] = []
+        self._extents: list[tuple[int, int, bool]] = []
         self._size = 0
 
     def __len__(self) -> int:
-        return len(self._spots)
+        return len(self._extents)
 
     def __getitem__(self, index: int) -> Payload:
-        if index in self._words:
-            return self._words[index]
-        begin, size, text = self._spots[index]
+        if index in self._unwritten:
+            return self._unwritten[index]
+        begin, size, text = self._extents[index]
         self._file.seek(begin)
         data = self._file.read(size)
         return data.decode() if text else data
@@ -41,10 +41,10 @@ class RunRecord:
         except OSError:
             if not isinstance(payload, str):
                 raise
-            self._words[len(self._spots)] = payload
-            self._spots.append((self._size, 0, True))
+            self._unwritten[len(self._extents)] = payload
+            self._extents.append((self._size, 0, True))
             return
-        self._spots.append((self._size, len(data), isinstance(payload, str)))
+        self._extents.append((self._size, len(data), isinstance(payload, str)))
         self._size += len(data)
 
     def _write(self, data: bytes) -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from armblocks.errors import ArmblocksError, SimulationError
-from armblocks.studio.runs.worker import begun, limit_process
+from armblocks.studio.runs.worker import begin_run, limit_process
 from armblocks.studio.runs.workers import answer_of
 
 MOST_SECONDS = 300.0
@@ -48,7 +48,7 @@ def write(pipe: Connection, job: dict[str, Any]) -> None:
     from armblocks.report import write_report
 
     try:
-        run = begun(job).run
+        run = begin_run(job).run
         run.advance()
         diagram, result = run.diagram, run.result()
         with tempfile.TemporaryDirectory() as folder:

@@ -61,7 +61,12 @@ def solver_choices() -> list[SolverChoice]:
     return [
         automatic,
         *(
-            SolverChoice(name=one.name, title=one.title, adaptive=one.adaptive, stiff=one.name in stiff)
-            for one in TABLEAUX
+            SolverChoice(
+                name=tableau.name,
+                title=tableau.title,
+                adaptive=tableau.adaptive,
+                stiff=tableau.name in stiff,
+            )
+            for tableau in TABLEAUX
         ),
     ]

@@ -77,7 +77,7 @@ def limit_process() -> None:
     resource.setrlimit(resource.RLIMIT_CPU, (MOST_CPU_SECONDS, MOST_CPU_SECONDS + 5))
 
 
-def begun(job: Mapping[str, Any]) -> RunHistory:
+def begin_run(job: Mapping[str, Any]) -> RunHistory:
     """Return the run of a job before its first step; raises ``ArmblocksError``."""
     diagram = diagram_of(job)
     for path, value in files_of(diagram):
@@ -129,7 +129,7 @@ class _Run:
     def run(self) -> None:
         """Execute the run to its end or to an error."""
         try:
-            self._go()
+            self._simulate()
         except SimulationError as error:
             self._send_rest(error.partial)
             self._fail(error)
@@ -143,8 +143,8 @@ class _Run:
         except Exception as error:  # a defect is reported; the model is not affected
             self._fail(_defect(error))
 
-    def _go(self) -> None:
-        history = begun(self.job)
+    def _simulate(self) -> None:
+        history = begin_run(self.job)
         self.stride = stride_of(history.run)
         self._notify_start(history.run)
         self.began = perf_counter()
@@ -167,10 +167,10 @@ class _Run:
         if self.state == "paused":
             history.step()
             return
-        due = self.pace.due
-        if run.time < due:
+        target = self.pace.target_time
+        if run.time < target:
             history.add_snapshot()
-            run.advance(None if due == math.inf else due, wall_time=FRAME_SECONDS)
+            run.advance(None if target == math.inf else target, wall_time=FRAME_SECONDS)
 
     def _listen(self, history: RunHistory) -> bool:
         """Execute pending commands, wait if paused or ahead of the clock; return ``False`` to stop."""
@@ -189,10 +189,10 @@ class _Run:
                 case "control", "stop":
                     return False
                 case "control", "pause":
-                    self._stand_where_shown(history)
-                    self._become("paused")
+                    self._return_to_shown_time(history)
+                    self._set_state("paused")
                 case "control", "resume":
-                    self._become("running")
+                    self._set_state("running")
                 case "control", "step":
                     return True
                 case "control", "back":
@@ -206,7 +206,7 @@ class _Run:
                 case _:
                     self._tune(history, command["parameter"], command["value"])
 
-    def _become(self, state: Literal["running", "paused"]) -> None:
+    def _set_state(self, state: Literal["running", "paused"]) -> None:
         self.state = state
         self.pace.count_from(self.time)
         self._progress()
@@ -214,7 +214,7 @@ class _Run:
     def _tune(self, history: RunHistory, parameter: str, value: Any) -> None:
         """Change a parameter from the present time on; report an invalid value and continue."""
         try:
-            self._stand_where_shown(history)
+            self._return_to_shown_time(history)
             history.tune(parameter, tuned_value(value, parameter))
         except ArmblocksError as error:
             self._progress(error.what, _fault(error))
@@ -231,9 +231,9 @@ class _Run:
         sent = int(np.searchsorted(self.numbers, self.count, "right"))
         self.times, self.numbers = self.times[:sent], self.numbers[:sent]
         self._notify(run_messages.RunRewound(run=self.key, time=self.time, count=sent))
-        self._become("paused")
+        self._set_state("paused")
 
-    def _stand_where_shown(self, history: RunHistory) -> None:
+    def _return_to_shown_time(self, history: RunHistory) -> None:
         """Return to the displayed time if the run is beyond it, and send all samples up to there."""
         if history.run.time > self.time:
             history.return_to_time(self.time)
@@ -279,15 +279,15 @@ class _Run:
 
     def _send_samples(self, history: RunHistory) -> None:
         """Send the recorded samples that are due by the clock; if paused, all."""
-        fresh = history.samples(self.count)
-        due = math.inf if self.state == "paused" else self.pace.due
-        ready = int(np.searchsorted(fresh.time, due, "right"))
-        last = history.run.finished and ready == fresh.time.size
+        samples = history.samples(self.count)
+        target = math.inf if self.state == "paused" else self.pace.target_time
+        ready = int(np.searchsorted(samples.time, target, "right"))
+        last = history.run.finished and ready == samples.time.size
         if not last:
             ready -= ready % self.stride
         if ready:
-            self._send(fresh.time[:ready], fresh.signals[:, :ready], fresh.jumps, last=last)
-        self.time = min(due, history.run.time)
+            self._send(samples.time[:ready], samples.signals[:, :ready], samples.jumps, last=last)
+        self.time = min(target, history.run.time)
 
     def _send(self, time: Array, signals: Array, jumps: Jumps, *, last: bool) -> None:
         """Send samples, with both sides of the jumps between the last sample sent and the last of these."""

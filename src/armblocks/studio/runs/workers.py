@@ -19,7 +19,7 @@ from armblocks.errors import SimulationError
 if TYPE_CHECKING:
     from multiprocessing.context import ForkServerContext, SpawnContext
 
-COPIED = (
+PRELOADED = (
     "__main__",
     "armblocks.studio.runs.worker",
     "armblocks.studio.runs.report",
@@ -33,7 +33,7 @@ def process_context() -> ForkServerContext | SpawnContext:
     if sys.platform != "linux":
         return multiprocessing.get_context("spawn")
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(list(COPIED))
+    context.set_forkserver_preload(list(PRELOADED))
     return context
 
 
@@ -107,10 +107,10 @@ class Workers:
         """Return a worker for one run. Raises ``SimulationError`` if no process can be started."""
         while True:
             self.prepare()
-            made, self._next = self._next, None
-            assert made is not None
+            starting, self._next = self._next, None
+            assert starting is not None
             try:
-                worker = await made
+                worker = await starting
             except (OSError, EOFError) as error:
                 raise SimulationError(
                     f"no process for the run could be started ({error})",

@@ -72,12 +72,12 @@ class Keys:
         self._logins.append(self._login)
         return self._login
 
-    def spend_login(self, given: str) -> bool:
-        """Whether ``given`` is the valid login; it becomes invalid."""
-        good = self._login is not None and hmac.compare_digest(given.encode(), self._login.encode())
-        if good:
+    def spend_login(self, login: str) -> bool:
+        """Whether ``login`` is valid; it becomes invalid."""
+        is_valid = self._login is not None and hmac.compare_digest(login.encode(), self._login.encode())
+        if is_valid:
             self._login = None
-        return good
+        return is_valid
 
 
 class Guard:
@@ -152,12 +152,12 @@ class Guard:
         return scheme.lower() == "bearer" and hmac.compare_digest(token.encode(), self._keys.token.encode())
 
     def _has_cookie(self, cookies: list[str]) -> bool:
-        given = [cookie_parser(text).get(self._keys.cookie_name, "") for text in cookies]
-        return any(hmac.compare_digest(value.encode(), self._keys.session.encode()) for value in given)
+        sessions = [cookie_parser(text).get(self._keys.cookie_name, "") for text in cookies]
+        return any(hmac.compare_digest(value.encode(), self._keys.session.encode()) for value in sessions)
 
 
-async def _answer(send: Send, status: int, words: str) -> None:
-    body = words.encode()
+async def _answer(send: Send, status: int, text: str) -> None:
+    body = text.encode()
     headers = [(b"content-type", b"text/plain; charset=utf-8"), (b"content-length", str(len(body)).encode())]
     await send({"type": "http.response.start", "status": status, "headers": headers})
     await send({"type": "http.response.body", "body": body})

@@ -17,7 +17,7 @@ from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.documents.state_folder import StateFolder
 from armblocks.studio.server.guard import Keys
 from armblocks.studio.server.terminal_log import log_settings
-from armblocks.studio.server.web_app import HubToCome, studio_app
+from armblocks.studio.server.web_app import FutureHub, studio_app
 
 if TYPE_CHECKING:
     from armblocks.studio.server.hub import Hub
@@ -33,27 +33,27 @@ def serve(
     port: int,
     open_browser: bool,
     announce: Callable[[str], None],
-    afresh: bool = False,
+    new_session: bool = False,
 ) -> None:
     """Serve until Ctrl-C. ``announce`` receives the login link. ``port`` 0 selects a free port.
 
     With ``port`` 0, the port of the previous server for this folder is tried first, and its pages reconnect
-    to this server, unless ``afresh``. The socket is bound to 127.0.0.1, so only this machine can connect.
-    Raises ``InputError`` if the port is in use, ``FormatError`` if the page is not built.
+    to this server, unless ``new_session``. The socket is bound to 127.0.0.1, so only this machine can
+    connect. Raises ``InputError`` if the port is in use, ``FormatError`` if the page is not built.
     """
     import uvicorn
 
     web = built_page()
     project = ProjectFolder(folder)
     state_folder = StateFolder(project.root)
-    listener = _listener_as_before(state_folder) if port == 0 and not afresh else None
+    listener = _previous_listener(state_folder) if port == 0 and not new_session else None
     listener = listener or _listener(port)
-    taken: int = listener.getsockname()[1]
-    keys = Keys(taken, state_folder.begin_session(taken, afresh=afresh).secret)
-    hub = HubToCome(project)
-    app = studio_app(hub, keys, frozenset(f"{host}:{taken}" for host in LOOPBACK), web)
+    used_port: int = listener.getsockname()[1]
+    keys = Keys(used_port, state_folder.begin_session(used_port, new=new_session).secret)
+    hub = FutureHub(project)
+    app = studio_app(hub, keys, frozenset(f"{host}:{used_port}" for host in LOOPBACK), web)
     fragment = f"#{quote(model)}" if model else ""
-    link = f"http://127.0.0.1:{taken}/login?key={keys.new_login()}{fragment}"
+    link = f"http://127.0.0.1:{used_port}/login?key={keys.new_login()}{fragment}"
     announce(link)
     if open_browser:
         webbrowser.open(link)
@@ -69,16 +69,16 @@ def serve(
     )
     server = uvicorn.Server(config)
 
-    def give_up(made: Future[Hub]) -> None:
-        server.should_exit |= made.exception() is not None
+    def stop_after_error(future: Future[Hub]) -> None:
+        server.should_exit |= future.exception() is not None
 
-    hub.made.add_done_callback(give_up)
+    hub.result.add_done_callback(stop_after_error)
     server.run(sockets=[listener])
-    if hub.made.done():
-        hub.made.result()  # raises the error that prevented the creation of the hub
+    if hub.result.done():
+        hub.result.result()  # raises the error that prevented the creation of the hub
 
 
-def _listener_as_before(state_folder: StateFolder) -> socket.socket | None:
+def _previous_listener(state_folder: StateFolder) -> socket.socket | None:
     """Listen at the port of the previous server, if it is free, so that its pages can reconnect."""
     last = state_folder.session()
     if last is not None:

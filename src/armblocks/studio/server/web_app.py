@@ -1,7 +1,7 @@
 """The web application of the studio: one page, one websocket, a few downloads, behind the guard.
 
 The page itself needs no hub and is served at once. The imports of the hub take longer than loading the page,
-so the hub is created in a thread meanwhile (:class:`HubToCome`), and requests that need it wait.
+so the hub is created in a thread meanwhile (:class:`FutureHub`), and requests that need it wait.
 """
 
 from __future__ import annotations
@@ -49,29 +49,29 @@ class Assets(StaticFiles):
         status_code: int = 200,
     ) -> Response:
         """Return the file with a permanent cache lifetime."""
-        answer = super().file_response(full_path, stat_result, scope, status_code)
-        answer.headers["cache-control"] = FOREVER
-        return answer
+        response = super().file_response(full_path, stat_result, scope, status_code)
+        response.headers["cache-control"] = FOREVER
+        return response
 
 
-class HubToCome:
+class FutureHub:
     """The hub of a folder, created in a thread when it is first requested."""
 
     def __init__(self, folder: ProjectFolder) -> None:
-        self.made: Future[Hub] = Future()
+        self.result: Future[Hub] = Future()
         self._folder = folder
-        self._begun = False
+        self._started = False
 
     def begin(self) -> None:
         """Start to create the hub, once."""
-        if not self._begun:
-            self._begun = True
+        if not self._started:
+            self._started = True
             Thread(target=self._make, name="hub").start()
 
-    async def here(self) -> Hub:
+    async def ready(self) -> Hub:
         """Return the hub when it exists; raise the error that prevented its creation."""
         self.begin()
-        return await asyncio.shield(asyncio.wrap_future(self.made))
+        return await asyncio.shield(asyncio.wrap_future(self.result))
 
     def _make(self) -> None:
         try:
@@ -79,16 +79,16 @@ class HubToCome:
             from armblocks.studio.sheet.shown import library
 
             library()  # fills its cache for the first page
-            self.made.set_result(Hub(self._folder))
+            self.result.set_result(Hub(self._folder))
         except BaseException as error:
-            self.made.set_exception(error)
+            self.result.set_exception(error)
 
 
 @dataclass(frozen=True)
-class Answers:
+class Endpoints:
     """The endpoints of the routes, one method each."""
 
-    hub: HubToCome
+    hub: FutureHub
     keys: Keys
     web: Path
 
@@ -116,7 +116,7 @@ class Answers:
         theme = requested.get("theme")
         if theme not in THEMES:
             return PlainTextResponse("the theme must be light or dark", 422)
-        hub, document = await self.hub.here(), request.path_params["document"]
+        hub, document = await self.hub.ready(), request.path_params["document"]
         try:
             data = await hub.drawing(document, kind, sheet=requested.get("sheet", ""), theme=theme)
         except ArmblocksError as error:
@@ -125,7 +125,7 @@ class Answers:
 
     async def example(self, request: Request) -> Response:
         """Return the drawing of a shipped example, for the gallery."""
-        hub = await self.hub.here()
+        hub = await self.hub.ready()
         try:
             data = await hub.example_drawing(request.path_params["name"])
         except ArmblocksError as error:
@@ -134,7 +134,7 @@ class Answers:
 
     async def report(self, request: Request) -> Response:
         """Return the report of the last run of a document."""
-        hub = await self.hub.here()
+        hub = await self.hub.ready()
         try:
             data = await hub.runs.report(request.path_params["document"])
         except ArmblocksError as error:
@@ -145,8 +145,8 @@ class Answers:
         """Serve the websocket of a page until it disconnects."""
         await socket.accept()
         outbox = Outbox(socket.send_text, socket.send_bytes)
-        hub, page = await self.hub.here(), Page(outbox.put, outbox.put, outbox)
-        sending = asyncio.create_task(outbox.empty())
+        hub, page = await self.hub.ready(), Page(outbox.put, outbox.put, outbox)
+        sending = asyncio.create_task(outbox.send_all())
         await hub.welcome(page)
         try:
             while (text := await _received(socket, sending)) is not None:
@@ -178,30 +178,30 @@ async def _received(socket: WebSocket, sending: asyncio.Task[None]) -> str | Non
             receiving.cancel()
 
 
-def studio_app(hub: HubToCome, keys: Keys, hosts: frozenset[str], web: Path) -> Guard:
+def studio_app(hub: FutureHub, keys: Keys, hosts: frozenset[str], web: Path) -> Guard:
     """Create the guarded application. ``hosts``: the ``Host`` values of this server."""
 
     @asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncGenerator[None]:
         async def prepare() -> None:
-            (await hub.here()).prepare()
+            (await hub.ready()).prepare()
 
         preparing = asyncio.create_task(prepare())
         yield
         preparing.cancel()
         await asyncio.gather(preparing, return_exceptions=True)
-        if hub.made.done() and hub.made.exception() is None:
-            hub.made.result().close()
+        if hub.result.done() and hub.result.exception() is None:
+            hub.result.result().close()
 
-    answers = Answers(hub, keys, web)
+    endpoints = Endpoints(hub, keys, web)
     routes: list[Any] = [
-        Route("/health", answers.health),
-        Route("/login", answers.login),
-        Route("/drawing/{document}.{kind}", answers.drawing),
-        Route("/example/{name}.svg", answers.example),
-        Route("/report/{document}", answers.report),
-        WebSocketRoute("/ws", answers.talk),
-        Route("/", answers.index),
+        Route("/health", endpoints.health),
+        Route("/login", endpoints.login),
+        Route("/drawing/{document}.{kind}", endpoints.drawing),
+        Route("/example/{name}.svg", endpoints.example),
+        Route("/report/{document}", endpoints.report),
+        WebSocketRoute("/ws", endpoints.talk),
+        Route("/", endpoints.index),
         Mount("/assets", Assets(directory=web / "assets", check_dir=False)),
         Mount("/", StaticFiles(directory=web)),
     ]

@@ -80,17 +80,17 @@ class DataRequests:
         name = PurePath(request.name).name
         path = self._folder.path(name, TABLE_SUFFIXES)
 
-        def keep() -> bool:
+        def store() -> bool:
             try:
                 columns_of(data, path)
             except ArmblocksError as error:
                 raise _relative(error, name) from None
             if path.exists() and not request.replace:
                 return _has_content(path, data)
-            self._folder.keep(name, data, TABLE_SUFFIXES)
+            self._folder.write_data(name, data, TABLE_SUFFIXES)
             return True
 
-        stored = await asyncio.to_thread(keep)
+        stored = await asyncio.to_thread(store)
         if stored:
             self._recheck()
         return data_messages.KeptFile(path=name, stored=stored)
