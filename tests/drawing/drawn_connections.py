@@ -25,17 +25,17 @@ def routed(diagram: Diagram) -> Routed:
 
 def drawn_lines(diagram: Diagram) -> dict[tuple[str, str, str], tuple[Point, ...]]:
     """The line of each connection from its source, or from where it branches: by blocks and input."""
-    wires, _, found, _ = routed(diagram)
+    wires, _, nets, _ = routed(diagram)
     return {
         (source.block, target.block, target.port): path
-        for (source, targets), net in zip(wires.items(), found)
+        for (source, targets), net in zip(wires.items(), nets)
         for target, path in zip(targets, net.paths)
     }
 
 
 def connections_in_the_drawing(diagram: Diagram) -> tuple[Mapping[str, str], Mapping[str, str]]:
     """The driver of each input that a reader infers, and that of the diagram."""
-    wires, _, found, _ = routed(diagram)
+    wires, _, nets, _ = routed(diagram)
     placed = boxes(diagram)
     ports = {
         f"{name}/{spot.name}": Port(name, spot.x, spot.y, (way * spot.dx, way * spot.dy), way == 1)
@@ -44,15 +44,15 @@ def connections_in_the_drawing(diagram: Diagram) -> tuple[Mapping[str, str], Map
         for spot in spots
     }
     labels: dict[str, str] = {}
-    for (source, targets), net in zip(wires.items(), found):
+    for (source, targets), net in zip(wires.items(), nets):
         for target, path in zip(targets, net.paths):
             if not path:
                 labels[str(source)] = labels[str(target)] = str(source)
     drawn = Drawing(
         blocks={name: Block(box.x, box.y, box.width, box.height) for name, box in placed.items()},
         ports=ports,
-        lines=[path for net in found for path in net.paths if path],
-        dots=[dot for net in found for dot in net.dots],
+        lines=[path for net in nets for path in net.paths if path],
+        dots=[dot for net in nets for dot in net.dots],
         labels=labels,
     )
     return read(drawn), {str(target): str(source) for source, targets in wires.items() for target in targets}

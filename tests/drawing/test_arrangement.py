@@ -170,9 +170,9 @@ def test_arranged_blocks_keep_their_sizes_and_stand_upright() -> None:
     builder.add("gain", Gain(), builder.add("wide", Constant()))
     builder.place("wide", 0, 0, width=150, height=80)
     builder.place("gain", 200, 0, rotation=90)
-    found = arranged(builder.draft()).layout
-    assert (found["wide"].width, found["wide"].height) == (150, 80)
-    assert found["gain"].rotation == 0 and found["gain"].width is None
+    layout = arranged(builder.draft()).layout
+    assert (layout["wide"].width, layout["wide"].height) == (150, 80)
+    assert layout["gain"].rotation == 0 and layout["gain"].width is None
 
 
 def test_blocks_without_connections_and_incomplete_ones_have_places() -> None:

@@ -47,15 +47,15 @@ class SheetModel:
 
     def ports(self) -> dict[str, Port]:
         """All ports, also those without wires."""
-        found: dict[str, Port] = {}
+        ports: dict[str, Port] = {}
         for name, block in self.blocks.items():
             for k in range(block.inputs):
                 place = block.port_position(block.input_side, k, block.inputs)
-                found[f"{name}/u{k}"] = Port(name, *place, SIDES[block.input_side], False)
+                ports[f"{name}/u{k}"] = Port(name, *place, SIDES[block.input_side], False)
             for k in range(block.outputs):
                 place = block.port_position(block.output_side, k, block.outputs)
-                found[f"{name}/y{k}"] = Port(name, *place, SIDES[block.output_side], True)
-        return found
+                ports[f"{name}/y{k}"] = Port(name, *place, SIDES[block.output_side], True)
+        return ports
 
     def nets(self) -> tuple[dict[str, Net], dict[str, list[str]]]:
         """The nets by source, and their targets."""

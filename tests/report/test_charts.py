@@ -18,12 +18,12 @@ from armblocks.report.charts.time_chart import Panel, Trace, separated, time_cha
 
 def boxes(picture: Picture) -> list[tuple[float, float, float, float]]:
     """The bounding rectangle of every text: left, top, right, bottom."""
-    found: list[tuple[float, float, float, float]] = []
+    rectangles: list[tuple[float, float, float, float]] = []
     for mark in text_marks(picture):
         width = text_width(mark.text, mark.size, bold=mark.bold, mono=mark.mono)
         left = mark.x - {"start": 0.0, "middle": 0.5, "end": 1.0}[mark.anchor] * width
-        found.append((left, mark.y - 0.75 * mark.size, left + width, mark.y + 0.2 * mark.size))
-    return found
+        rectangles.append((left, mark.y - 0.75 * mark.size, left + width, mark.y + 0.2 * mark.size))
+    return rectangles
 
 
 def overlapping(picture: Picture) -> list[tuple[str, str]]:
@@ -55,10 +55,10 @@ def test_texts_do_not_overlap_and_are_inside_the_picture(scale: float) -> None:
 
 
 @given(st.lists(st.floats(0, 150), min_size=1, max_size=9))
-def test_labels_are_spread_within_their_panel(wanted: list[float]) -> None:
-    places = separated(sorted(wanted), 15.0, 0.0, 150.0)
-    assert all(b - a >= 15.0 - 1e-9 for a, b in itertools.pairwise(places))
-    assert places[0] >= 0.0 and places[-1] <= 150.0 + 1e-9
+def test_labels_are_spread_within_their_panel(preferred: list[float]) -> None:
+    positions = separated(sorted(preferred), 15.0, 0.0, 150.0)
+    assert all(b - a >= 15.0 - 1e-9 for a, b in itertools.pairwise(positions))
+    assert positions[0] >= 0.0 and positions[-1] <= 150.0 + 1e-9
 
 
 def test_labels_that_do_not_overlap_are_not_moved() -> None:

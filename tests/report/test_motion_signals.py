@@ -60,9 +60,9 @@ def test_two_arms_have_two_motions(puma560: Robot, kr180: Robot) -> None:
         builder.add(f"plot {robot.name}", RobotPlot(robot=robot), plan["q"])
         builder.add(f"rne {robot.name}", Rne(robot=robot), plan["q"], plan["qd"], plan["qdd"])
     diagram, result = run(builder)
-    found = motions(diagram, result)
-    assert {motion.robot.name for motion in found} == {puma560.name, kr180.name}
-    assert all(motion.tau is not None for motion in found)
+    arm_motions = motions(diagram, result)
+    assert {motion.robot.name for motion in arm_motions} == {puma560.name, kr180.name}
+    assert all(motion.tau is not None for motion in arm_motions)
 
 
 def test_a_diagram_without_a_robot_has_no_motion(puma560: Robot) -> None:

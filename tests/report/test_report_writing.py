@@ -264,8 +264,8 @@ def test_file_names_of_figures_are_sanitised(name: str, expected: str) -> None:
 def test_quantities_are_shown_in_display_units(
     value: float, unit: str, shown: float, shown_unit: str
 ) -> None:
-    values, found = in_shown_unit(np.array([value]), unit)
-    assert (values[0], found) == (pytest.approx(shown, rel=1e-3), shown_unit)
+    values, unit_text = in_shown_unit(np.array([value]), unit)
+    assert (values[0], unit_text) == (pytest.approx(shown, rel=1e-3), shown_unit)
 
 
 def nested_run() -> tuple[ab.Diagram, ab.SimulationResult]:

@@ -15,7 +15,7 @@ from armblocks.studio.server.hub import Hub, Page
 Events = list[dict[str, Any]]
 
 
-def talk(
+def run_scenario(
     folder: Path,
     scenario: Callable[[Hub, Callable[..., Awaitable[Any]], Events], Awaitable[None]],
     *,

@@ -35,8 +35,8 @@ def add(name: str, kind: str = "Gain") -> AddBlocks:
     return AddBlocks(blocks=[NewBlock(name=name, type=kind, place=Place(x=0, y=0))])
 
 
-def content(found: OpenDocument) -> bytes:
-    return diagram_to_bytes(found.document.diagram, load_robot)
+def content(open_file: OpenDocument) -> bytes:
+    return diagram_to_bytes(open_file.document.diagram, load_robot)
 
 
 def random_requests(seed: int, count: int) -> list[Any]:
@@ -67,26 +67,26 @@ def random_requests(seed: int, count: int) -> list[Any]:
 def test_recovered_edits_have_their_undo_and_redo_history(disk: Disk, tmp_path: Path, seed: int) -> None:
     async def scenario() -> None:
         documents = disk.documents()
-        found = documents.new()
-        carry_out(documents, found, random_requests(seed, 150))
+        open_file = documents.new()
+        carry_out(documents, open_file, random_requests(seed, 150))
         if seed % 3 == 0:
-            await documents.save(found, "saved.json", overwrite=False)
-        carry_out(documents, found, random_requests(seed + 1000, 150))
+            await documents.save(open_file, "saved.json", overwrite=False)
+        carry_out(documents, open_file, random_requests(seed + 1000, 150))
         after = disk.as_after_a_crash(tmp_path / "second").documents()
-        back = after.attach(found.key)
-        assert content(back) == content(found)
-        assert back.document.version == found.document.version
-        assert back.document.dirty == found.document.dirty
-        assert back.path == found.path
-        while back.document.undo_title:  # up to the start of the journal
-            assert back.document.undo_title == found.document.undo_title
-            back.document.undo()
-            found.document.undo()
-            assert content(back) == content(found)
-        while found.document.redo_title:
-            back.document.redo()
-            found.document.redo()
-        assert content(back) == content(found)
+        recovered = after.attach(open_file.key)
+        assert content(recovered) == content(open_file)
+        assert recovered.document.version == open_file.document.version
+        assert recovered.document.dirty == open_file.document.dirty
+        assert recovered.path == open_file.path
+        while recovered.document.undo_title:  # up to the start of the journal
+            assert recovered.document.undo_title == open_file.document.undo_title
+            recovered.document.undo()
+            open_file.document.undo()
+            assert content(recovered) == content(open_file)
+        while open_file.document.redo_title:
+            recovered.document.redo()
+            open_file.document.redo()
+        assert content(recovered) == content(open_file)
 
     going(scenario)
 
@@ -94,20 +94,22 @@ def test_recovered_edits_have_their_undo_and_redo_history(disk: Disk, tmp_path: 
 def test_a_long_journal_is_replayed_from_its_last_snapshot(disk: Disk, tmp_path: Path) -> None:
     async def scenario() -> None:
         documents = disk.documents()
-        found = documents.new()
-        documents.perform(found, change("0", add("gain")))
+        open_file = documents.new()
+        documents.perform(open_file, change("0", add("gain")))
         for k in range(1, 450):
-            documents.perform(found, change(str(k), SetParameters(block="gain", values={"gain": float(k)})))
+            documents.perform(
+                open_file, change(str(k), SetParameters(block="gain", values={"gain": float(k)}))
+            )
             await asyncio.sleep(0.002 if k % 200 < 2 else 0)
         for _ in range(100):
             await asyncio.sleep(0.01)
-            if found.snapshot is not None and found.snapshot.done():
+            if open_file.snapshot is not None and open_file.snapshot.done():
                 break
         for k in range(300):
-            documents.perform(found, document_messages.Undo(document="", key=f"u{k}"))
-        back = disk.as_after_a_crash(tmp_path / "second").documents().attach(found.key)
-        assert content(back) == content(found)
-        assert back.document.diagram.blocks["gain"].parameter_value("gain") == 149.0
+            documents.perform(open_file, document_messages.Undo(document="", key=f"u{k}"))
+        recovered = disk.as_after_a_crash(tmp_path / "second").documents().attach(open_file.key)
+        assert content(recovered) == content(open_file)
+        assert recovered.document.diagram.blocks["gain"].parameter_value("gain") == 149.0
 
     going(scenario)
 
@@ -117,12 +119,12 @@ def test_a_journal_cut_anywhere_recovers_the_complete_edits_before_the_cut(
 ) -> None:
     async def scenario() -> None:
         documents = disk.documents()
-        found = documents.new()
-        states = [content(found)]
+        open_file = documents.new()
+        states = [content(open_file)]
         for k in range(6):
-            documents.perform(found, change(str(k), add(f"b{k}")))
-            states.append(content(found))
-        journal = disk.state_folder.journals / f"{found.key}.diagram"
+            documents.perform(open_file, change(str(k), add(f"b{k}")))
+            states.append(content(open_file))
+        journal = disk.state_folder.journals / f"{open_file.key}.diagram"
         whole = journal.read_bytes()
         ends = [0, *(k + 1 for k, byte in enumerate(whole) if byte == 10)]
         other = disk.as_after_a_crash(tmp_path / "second")
@@ -138,9 +140,11 @@ def test_a_journal_cut_anywhere_recovers_the_complete_edits_before_the_cut(
                     continue
                 assert [entry.edits for entry in waiting.recoverable.offers()] == [done] * (done > 0)
                 if done > 0:
-                    back = await waiting.recover(document_messages.Recover(document=found.key, action="open"))
-                    assert back is not None
-                    assert content(back) == states[done]
+                    recovered = await waiting.recover(
+                        document_messages.Recover(document=open_file.key, action="open")
+                    )
+                    assert recovered is not None
+                    assert content(recovered) == states[done]
 
     going(scenario)
 
@@ -148,13 +152,13 @@ def test_a_journal_cut_anywhere_recovers_the_complete_edits_before_the_cut(
 def test_an_edit_repeated_after_a_crash_is_applied_once(disk: Disk, tmp_path: Path) -> None:
     async def scenario() -> None:
         documents = disk.documents()
-        found = documents.new()
-        documents.perform(found, change("one", add("gain")))
+        open_file = documents.new()
+        documents.perform(open_file, change("one", add("gain")))
         after = disk.as_after_a_crash(tmp_path / "second").documents()
-        back = after.attach(found.key)
-        assert not after.perform(back, change("one", add("gain")))
-        assert after.perform(back, change("two", add("gain 2")))
-        assert sorted(back.document.diagram.blocks) == ["gain", "gain 2"]
+        recovered = after.attach(open_file.key)
+        assert not after.perform(recovered, change("one", add("gain")))
+        assert after.perform(recovered, change("two", add("gain 2")))
+        assert sorted(recovered.document.diagram.blocks) == ["gain", "gain 2"]
 
     going(scenario)
 
@@ -167,11 +171,11 @@ def test_a_page_finds_its_document_after_a_server_restart(disk: Disk) -> None:
         first.end()
         documents = disk.documents()
         key = "0123456789abcdef"
-        found = documents.attach(key, path="a.json")
-        assert found.key == key
+        open_file = documents.attach(key, path="a.json")
+        assert open_file.key == key
         again = documents.attach("f" * 16, path="a.json")
-        assert again is found
-        assert documents["f" * 16] is found
+        assert again is open_file
+        assert documents["f" * 16] is open_file
         example = documents.attach("e" * 16, origin="van_der_pol_pid")
         assert example.document.diagram.name == "van_der_pol_pid"
         assert documents.attach("d" * 16).document.diagram.blocks == {}
@@ -184,10 +188,10 @@ def test_a_page_finds_its_document_after_a_server_restart(disk: Disk) -> None:
 def test_a_file_newer_than_the_journal_is_kept_beside_the_recovered_file(disk: Disk, tmp_path: Path) -> None:
     async def scenario() -> None:
         documents = disk.documents()
-        found = documents.new()
-        documents.perform(found, change("1", add("gain")))
-        await documents.save(found, "a.json", overwrite=False)
-        documents.perform(found, change("2", add("mine")))
+        open_file = documents.new()
+        documents.perform(open_file, change("1", add("gain")))
+        await documents.save(open_file, "a.json", overwrite=False)
+        documents.perform(open_file, change("2", add("mine")))
         after_crash = disk.as_after_a_crash(tmp_path / "second")
         theirs = after_crash.project.path("a.json")
         theirs.write_bytes(theirs.read_bytes().replace(b'"gain"', b'"other"'))
@@ -195,13 +199,13 @@ def test_a_file_newer_than_the_journal_is_kept_beside_the_recovered_file(disk: D
         after = after_crash.documents()
         (recovery,) = after.recoverable.offers()
         assert (recovery.path, recovery.disk, recovery.edits) == ("a.json", "changed", 1)
-        back = await after.recover(document_messages.Recover(document=found.key, action="keep_both"))
-        assert back is not None
-        assert back.path is not None
-        assert back.path.startswith("a recovered 20")
+        recovered = await after.recover(document_messages.Recover(document=open_file.key, action="keep_both"))
+        assert recovered is not None
+        assert recovered.path is not None
+        assert recovered.path.startswith("a recovered 20")
         assert theirs.read_bytes() == newer
-        assert sorted(back.document.diagram.blocks) == ["gain", "mine"]
-        assert not back.document.dirty
+        assert sorted(recovered.document.diagram.blocks) == ["gain", "mine"]
+        assert not recovered.document.dirty
         assert after.recoverable.offers() == []
 
     going(scenario)
@@ -210,17 +214,17 @@ def test_a_file_newer_than_the_journal_is_kept_beside_the_recovered_file(disk: D
 def test_a_recovered_diagram_does_not_overwrite_a_newer_file(disk: Disk, tmp_path: Path) -> None:
     async def scenario() -> None:
         documents = disk.documents()
-        found = documents.new()
-        await documents.save(found, "a.json", overwrite=False)
-        documents.perform(found, change("2", add("mine")))
+        open_file = documents.new()
+        await documents.save(open_file, "a.json", overwrite=False)
+        documents.perform(open_file, change("2", add("mine")))
         after_crash = disk.as_after_a_crash(tmp_path / "second")
         after_crash.project.path("a.json").write_bytes(b"{}")
         after = after_crash.documents()
-        back = await after.recover(document_messages.Recover(document=found.key, action="open"))
-        assert back is not None
-        assert (back.disk, back.document.dirty) == ("changed", True)
+        recovered = await after.recover(document_messages.Recover(document=open_file.key, action="open"))
+        assert recovered is not None
+        assert (recovered.disk, recovered.document.dirty) == ("changed", True)
         with pytest.raises(ArmblocksError, match="the file has changed on the disk"):
-            await after.save(back, "", overwrite=False)
+            await after.save(recovered, "", overwrite=False)
 
     going(scenario)
 
@@ -228,15 +232,17 @@ def test_a_recovered_diagram_does_not_overwrite_a_newer_file(disk: Disk, tmp_pat
 def test_a_recovery_is_discarded_only_on_request(disk: Disk, tmp_path: Path) -> None:
     async def scenario() -> None:
         documents = disk.documents()
-        found = documents.new()
-        documents.perform(found, change("1", add("gain")))
+        open_file = documents.new()
+        documents.perform(open_file, change("1", add("gain")))
         second = disk.as_after_a_crash(tmp_path / "second")
         second.documents().end()
         after = second.documents()
         assert len(after.recoverable.offers()) == 1
-        assert await after.recover(document_messages.Recover(document=found.key, action="discard")) is None
+        assert (
+            await after.recover(document_messages.Recover(document=open_file.key, action="discard")) is None
+        )
         with pytest.raises(ArmblocksError, match="there is no diagram to recover named"):
-            await after.recover(document_messages.Recover(document=found.key, action="open"))
+            await after.recover(document_messages.Recover(document=open_file.key, action="open"))
         assert second.documents().recoverable.offers() == []
 
     going(scenario)
@@ -245,12 +251,12 @@ def test_a_recovery_is_discarded_only_on_request(disk: Disk, tmp_path: Path) -> 
 def test_saved_diagrams_leave_no_journal(disk: Disk) -> None:
     async def scenario() -> None:
         documents = disk.documents()
-        found = documents.new()
-        documents.perform(found, change("1", add("gain")))
+        open_file = documents.new()
+        documents.perform(open_file, change("1", add("gain")))
         assert len(list(disk.state_folder.journals.iterdir())) == 1
         with pytest.raises(InputError, match="'untitled' has unsaved edits"):
-            documents.close(found, discard=False)
-        await documents.save(found, "a.json", overwrite=False)
+            documents.close(open_file, discard=False)
+        await documents.save(open_file, "a.json", overwrite=False)
         documents.end()
         assert list(disk.state_folder.journals.iterdir()) == []
 
@@ -268,18 +274,18 @@ def test_a_missing_robot_file_is_reported_and_the_journal_remains(disk: Disk, tm
             return load_robot(str(disk.project.root / "arm.json") if name == "arm.json" else name)
 
         documents = OpenDocuments(disk.project, disk.state_folder, resolve)
-        found = documents.new()
+        open_file = documents.new()
         block = NewBlock(name="arm", type="Fkine", place=Place(x=0, y=0), parameters={"robot": "arm.json"})
-        documents.perform(found, change("1", add("gain")))
-        documents.perform(found, change("2", AddBlocks(blocks=[block])))
+        documents.perform(open_file, change("1", add("gain")))
+        documents.perform(open_file, change("2", AddBlocks(blocks=[block])))
         second = disk.as_after_a_crash(tmp_path / "second")
         after = OpenDocuments(second.project, second.state_folder, lambda name: load_robot("no " + name))
         (recovery,) = after.recoverable.offers()
         assert recovery.missing.startswith("the last 1 edits could not be repeated")
-        back = await after.recover(document_messages.Recover(document=found.key, action="open"))
-        assert back is not None
-        assert list(back.document.diagram.blocks) == ["gain"]
-        assert back.document.dirty
+        recovered = await after.recover(document_messages.Recover(document=open_file.key, action="open"))
+        assert recovered is not None
+        assert list(recovered.document.diagram.blocks) == ["gain"]
+        assert recovered.document.dirty
         assert [path.suffix for path in second.state_folder.journals.iterdir()] == [".unread"]
 
     going(scenario)
@@ -290,22 +296,22 @@ def test_a_disk_error_in_the_journal_does_not_prevent_edits(
 ) -> None:
     async def scenario() -> None:
         documents = disk.documents()
-        found = documents.new()
-        documents.perform(found, change("1", add("one")))
+        open_file = documents.new()
+        documents.perform(open_file, change("1", add("one")))
 
         def refuse(*_: object) -> int:
             raise OSError(28, "No space left on device")
 
         with monkeypatch.context() as patch:
             patch.setattr(os, "write", refuse)
-            documents.perform(found, change("2", add("two")))
-            assert not found.state().journaled
-        documents.perform(found, document_messages.Undo(document="", key="3"))
-        documents.perform(found, document_messages.Undo(document="", key="4"))
-        documents.perform(found, document_messages.Redo(document="", key="5"))
-        assert found.state().journaled
-        back = disk.as_after_a_crash(tmp_path / "second").documents().attach(found.key)
-        assert content(back) == content(found)
+            documents.perform(open_file, change("2", add("two")))
+            assert not open_file.state().journaled
+        documents.perform(open_file, document_messages.Undo(document="", key="3"))
+        documents.perform(open_file, document_messages.Undo(document="", key="4"))
+        documents.perform(open_file, document_messages.Redo(document="", key="5"))
+        assert open_file.state().journaled
+        recovered = disk.as_after_a_crash(tmp_path / "second").documents().attach(open_file.key)
+        assert content(recovered) == content(open_file)
 
     going(scenario)
 
@@ -320,12 +326,12 @@ def test_pages_are_notified_of_a_disk_error_in_the_journal(
         events: list[bool] = []
         notified = asyncio.Event()
 
-        async def notify(found: OpenDocument) -> None:
-            events.append(found.state().journaled)
+        async def notify(open_file: OpenDocument) -> None:
+            events.append(open_file.state().journaled)
             notified.set()
 
         watching = asyncio.create_task(documents.watch(notify))
-        found = documents.new()
+        open_file = documents.new()
         await asyncio.sleep(0)
 
         def refuse(_: int) -> None:
@@ -333,7 +339,7 @@ def test_pages_are_notified_of_a_disk_error_in_the_journal(
 
         with monkeypatch.context() as patch:
             patch.setattr(os, "fsync", refuse)
-            documents.perform(found, change("1", add("one")))
+            documents.perform(open_file, change("1", add("one")))
             async with asyncio.timeout(30):
                 await notified.wait()
         assert events == [False]
@@ -347,9 +353,9 @@ def test_a_disk_error_in_a_save_leaves_the_diagram_and_the_journal(
 ) -> None:
     async def scenario() -> None:
         documents = disk.documents()
-        found = documents.new()
-        await documents.save(found, "a.json", overwrite=False)
-        documents.perform(found, change("1", add("one")))
+        open_file = documents.new()
+        await documents.save(open_file, "a.json", overwrite=False)
+        documents.perform(open_file, change("1", add("one")))
         old = disk.project.read("a.json")
 
         def refuse(*_: object) -> None:
@@ -358,13 +364,13 @@ def test_a_disk_error_in_a_save_leaves_the_diagram_and_the_journal(
         with monkeypatch.context() as patch:
             patch.setattr(Path, "replace", refuse)
             with pytest.raises(FormatError, match=r"No space left on device.*free space"):
-                await documents.save(found, "", overwrite=False)
-        assert (found.document.dirty, found.disk) == (True, "same")
+                await documents.save(open_file, "", overwrite=False)
+        assert (open_file.document.dirty, open_file.disk) == (True, "same")
         assert disk.project.read("a.json") == old
-        back = disk.as_after_a_crash(tmp_path / "second").documents().attach(found.key)
-        assert content(back) == content(found)
-        await documents.save(found, "", overwrite=False)
-        assert not found.document.dirty
+        recovered = disk.as_after_a_crash(tmp_path / "second").documents().attach(open_file.key)
+        assert content(recovered) == content(open_file)
+        await documents.save(open_file, "", overwrite=False)
+        assert not open_file.document.dirty
 
     going(scenario)
 
@@ -389,9 +395,9 @@ def test_a_defect_during_replay_keeps_the_edits_before_it(
 ) -> None:
     async def scenario() -> None:
         documents = disk.documents()
-        found = documents.new()
+        open_file = documents.new()
         for k in range(4):
-            documents.perform(found, change(str(k), add(f"b{k}")))
+            documents.perform(open_file, change(str(k), add(f"b{k}")))
         second = disk.as_after_a_crash(tmp_path / "second")
         real = Document.outcome
 
@@ -404,7 +410,7 @@ def test_a_defect_during_replay_keeps_the_edits_before_it(
         after = second.documents()
         (offer,) = after.recoverable.offers()
         assert offer.missing == "the last 2 edits could not be repeated: armblocks has a defect (KeyError)"
-        assert sorted(after.attach(found.key).document.diagram.blocks) == ["b0", "b1"]
+        assert sorted(after.attach(open_file.key).document.diagram.blocks) == ["b0", "b1"]
 
     going(scenario)
 
@@ -418,18 +424,18 @@ def test_a_deleted_or_renamed_file_is_reported_and_its_content_remains(
         documents = disk.documents()
         events: asyncio.Queue[str] = asyncio.Queue()
 
-        async def notify(found: OpenDocument) -> None:
-            events.put_nowait(found.disk)
+        async def notify(open_file: OpenDocument) -> None:
+            events.put_nowait(open_file.disk)
 
         watching = asyncio.create_task(documents.watch(notify))
-        found = documents.new()
-        documents.perform(found, change("1", add("one")))
-        await documents.save(found, "a.json", overwrite=False)
+        open_file = documents.new()
+        documents.perform(open_file, change("1", add("one")))
+        await documents.save(open_file, "a.json", overwrite=False)
         place = disk.project.path("a.json")
         async with asyncio.timeout(30):
             place.rename(place.with_name("b.json"))
             assert await events.get() == "gone"
-            assert found.document.dirty
+            assert open_file.document.dirty
             crashed = disk.as_after_a_crash(tmp_path / "second").documents()
             assert [(offer.path, offer.disk) for offer in crashed.recoverable.offers()] == [
                 ("a.json", "gone")
@@ -438,7 +444,7 @@ def test_a_deleted_or_renamed_file_is_reported_and_its_content_remains(
             assert await events.get() == "same"
             place.unlink()
             assert await events.get() == "gone"
-            await documents.save(found, "", overwrite=False)
+            await documents.save(open_file, "", overwrite=False)
         assert disk.project.exists("a.json")
         watching.cancel()
 

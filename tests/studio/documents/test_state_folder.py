@@ -14,39 +14,39 @@ from armblocks.studio.documents.state_folder import SESSION_SECONDS, StateFolder
 
 
 @pytest.fixture
-def kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> StateFolder:
+def studio_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> StateFolder:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     return StateFolder(tmp_path / "project")
 
 
-def test_a_session_is_resumed_at_its_port_until_it_expires(kept: StateFolder) -> None:
-    assert kept.session() is None
-    first = kept.begin_session(8642)
-    assert kept.begin_session(8642) == first
-    assert kept.begin_session(8643).secret != first.secret
-    second = kept.begin_session(8642)
-    assert kept.begin_session(8642, new=True).secret != second.secret
-    file = kept.root / "session.json"
+def test_a_session_is_resumed_at_its_port_until_it_expires(studio_state: StateFolder) -> None:
+    assert studio_state.session() is None
+    first = studio_state.begin_session(8642)
+    assert studio_state.begin_session(8642) == first
+    assert studio_state.begin_session(8643).secret != first.secret
+    second = studio_state.begin_session(8642)
+    assert studio_state.begin_session(8642, new=True).secret != second.secret
+    file = studio_state.root / "session.json"
     assert file.stat().st_mode & 0o077 == 0
-    assert kept.root.stat().st_mode & 0o077 == 0
+    assert studio_state.root.stat().st_mode & 0o077 == 0
     os.utime(file, (0, file.stat().st_mtime - SESSION_SECONDS - 1))
-    assert kept.session() is None
+    assert studio_state.session() is None
 
 
 @pytest.mark.parametrize("content", ["", "[]", '{"port": 1}', '{"port": "x", "secret": "y"}'])
-def test_a_damaged_file_is_ignored(kept: StateFolder, content: str) -> None:
-    kept.begin_session(1)
-    (kept.root / "session.json").write_text(content)
-    (kept.root / "recent.json").write_text(content)
-    assert kept.session() is None
-    assert kept.recent() == []
+def test_a_damaged_file_is_ignored(studio_state: StateFolder, content: str) -> None:
+    studio_state.begin_session(1)
+    (studio_state.root / "session.json").write_text(content)
+    (studio_state.root / "recent.json").write_text(content)
+    assert studio_state.session() is None
+    assert studio_state.recent() == []
 
 
-def test_recent_files_are_unique_and_latest_first(kept: StateFolder) -> None:
+def test_recent_files_are_unique_and_latest_first(studio_state: StateFolder) -> None:
     for name in ("a.json", "b.json", "a.json", *(f"{k}.json" for k in range(20))):
-        kept.use(name)
-    assert kept.recent()[:2] == ["19.json", "18.json"]
-    assert len(kept.recent()) == state_folder.MOST_RECENT
+        studio_state.use(name)
+    assert studio_state.recent()[:2] == ["19.json", "18.json"]
+    assert len(studio_state.recent()) == state_folder.MOST_RECENT
 
 
 def test_a_missing_home_folder_raises_an_error_with_a_remedy(

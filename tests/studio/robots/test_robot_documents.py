@@ -25,7 +25,7 @@ from armblocks.studio.server.hub import Hub, Page
 PRINTED = Path(__file__).parents[2] / "formats" / "kr180_as_printed.m"
 
 
-class Talk:
+class Client:
     """A hub and a connected page."""
 
     def __init__(self, folder: Path) -> None:
@@ -66,12 +66,12 @@ class Talk:
         return {**next(content for content in reversed(contents) if content), **events[-1]["state"]}
 
 
-def talk(folder: Path, scenario: Callable[[Talk], Awaitable[None]]) -> None:
+def run_scenario(folder: Path, scenario: Callable[[Client], Awaitable[None]]) -> None:
     async def going() -> None:
-        talk = Talk(folder)
-        await talk.hub.welcome(talk.page)
-        await scenario(talk)
-        talk.hub.close()
+        client = Client(folder)
+        await client.hub.welcome(client.page)
+        await scenario(client)
+        client.hub.close()
 
     asyncio.run(going())
 
@@ -85,40 +85,40 @@ def cell(link: str, column: str, text: str) -> dict[str, str]:
 
 
 def test_the_script_of_the_paper_is_dropped_edited_undone_saved_and_reopened(tmp_path: Path) -> None:
-    async def scenario(talk: Talk) -> None:
-        (key,) = await talk.ask("drop", name="kr180.m", content=packed(PRINTED.read_bytes()))
-        opened = next(event for event in talk.received if event["kind"] == "opened")
+    async def scenario(client: Client) -> None:
+        (key,) = await client.ask("drop", name="kr180.m", content=packed(PRINTED.read_bytes()))
+        opened = next(event for event in client.received if event["kind"] == "opened")
         assert opened["content"]["name"] == "KR180"
         assert any("broken as on a printed page" in note for note in opened["notes"])
-        shown = talk.shown()
+        shown = client.shown()
         assert (shown["path"], shown["dirty"], shown["convention"]) == (None, True, "standard")
         assert shown["links"][1]["cells"]["mass"] == 150
         assert {finding["link"] for finding in shown["findings"]} == {"link1", "link3"}
         for number, text in enumerate(("1", "1.", "1.5")):
-            await talk.ask(
+            await client.ask(
                 "change", document=key, key=str(number), gesture="g", edit=cell("link2", "d", text)
             )
-        await talk.ask("change", document=key, key="2", gesture="g", edit=cell("link2", "d", "9"))
-        assert talk.shown()["links"][1]["cells"]["d"] == 1.5  # a request with a repeated key is not applied
-        assert "the cell is empty" in await talk.refused(
+        await client.ask("change", document=key, key="2", gesture="g", edit=cell("link2", "d", "9"))
+        assert client.shown()["links"][1]["cells"]["d"] == 1.5  # a request with a repeated key is not applied
+        assert "the cell is empty" in await client.refused(
             "change", document=key, key="x", edit=cell("link2", "d", "")
         )
-        await talk.ask("undo", document=key)
-        assert talk.shown()["links"][1]["cells"]["d"] == 1.25  # the typed letters are one step
-        await talk.ask("redo", document=key)
-        assert "no file yet" in await talk.refused("save", document=key)
-        assert "studio does not open" in await talk.refused("save", document=key, path="x.txt")
-        await talk.ask("save", document=key, path="arms/mine.json")
-        assert not talk.shown()["dirty"]
-        again = await talk.ask("open", path="arms/mine.json")
+        await client.ask("undo", document=key)
+        assert client.shown()["links"][1]["cells"]["d"] == 1.25  # the typed letters are one step
+        await client.ask("redo", document=key)
+        assert "no file yet" in await client.refused("save", document=key)
+        assert "studio does not open" in await client.refused("save", document=key, path="x.txt")
+        await client.ask("save", document=key, path="arms/mine.json")
+        assert not client.shown()["dirty"]
+        again = await client.ask("open", path="arms/mine.json")
         assert again == [key]  # already open
         (tmp_path / "arms" / "mine.json").write_bytes(write_robot(load_robot("puma560")))
-        assert "changed on the disk" in await talk.refused("save", document=key)
-        await talk.ask("save", document=key, overwrite=True)
+        assert "changed on the disk" in await client.refused("save", document=key)
+        await client.ask("save", document=key, overwrite=True)
         (tmp_path / "other.json").write_text("{}")
-        assert "the file exists already" in await talk.refused("save", document=key, path="other.json")
+        assert "the file exists already" in await client.refused("save", document=key, path="other.json")
 
-    talk(tmp_path, scenario)
+    run_scenario(tmp_path, scenario)
     (saved,) = read_robots((tmp_path / "arms" / "mine.json").read_bytes(), "mine.json").values()
     with pytest.warns(ArmblocksWarning, match="printed page"):
         (printed,) = read_robots(PRINTED.read_bytes(), "kr180.m").values()
@@ -128,103 +128,105 @@ def test_the_script_of_the_paper_is_dropped_edited_undone_saved_and_reopened(tmp
 
 
 def test_dropped_files_are_bounded_and_errors_name_the_file(tmp_path: Path) -> None:
-    async def scenario(talk: Talk) -> None:
+    async def scenario(client: Client) -> None:
         for name in ("arm.exe", "noname", "run.py"):
-            assert "is not a file type" in await talk.refused("drop", name=name, content="")
-        assert "the content is not base64" in await talk.refused("drop", name="a.m", content="§")
+            assert "is not a file type" in await client.refused("drop", name=name, content="")
+        assert "the content is not base64" in await client.refused("drop", name="a.m", content="§")
         huge = packed(b" " * (MOST_DROPPED + 1))
-        assert f"{MOST_DROPPED + 1} bytes" in await talk.refused("drop", name="a.json", content=huge)
+        assert f"{MOST_DROPPED + 1} bytes" in await client.refused("drop", name="a.json", content=huge)
         code = b"L{1} = link([0 1 0 0 0]);\nsystem('rm -rf /')\n"
-        assert "evil.m:2" in await talk.refused("drop", name="evil.m", content=packed(code))
-        assert "defines no robot" in await talk.refused("drop", name="a.m", content=packed(b"x = 1;"))
-        assert "a.json" in await talk.refused("drop", name="a.json", content=packed(b"{"))
+        assert "evil.m:2" in await client.refused("drop", name="evil.m", content=packed(code))
+        assert "defines no robot" in await client.refused("drop", name="a.m", content=packed(b"x = 1;"))
+        assert "a.json" in await client.refused("drop", name="a.json", content=packed(b"{"))
         model = (Path(ab.__file__).parents[2] / "examples" / "kr180model.json").read_bytes()
-        (document,) = await talk.ask("drop", name="model.json", content=packed(model))
-        assert talk.hub.documents[document].state().kind == "diagram"
+        (document,) = await client.ask("drop", name="model.json", content=packed(model))
+        assert client.hub.documents[document].state().kind == "diagram"
         robot = packed(write_robot(load_robot("puma560")))
-        await talk.ask("drop", name="p.json", content=robot)
-        assert talk.shown()["title"] == load_robot("puma560").name
+        await client.ask("drop", name="p.json", content=robot)
+        assert client.shown()["title"] == load_robot("puma560").name
         two = b"L{1} = link([0 1 0 0 0]); a = robot(L, 'one'); L{2} = link([0 2 0 0 0]); b = robot(L, 'two');"
-        keys = await talk.ask("drop", name="two.m", content=packed(two))
-        assert [talk.hub.documents[key].state().title for key in keys] == ["one", "two"]
-        assert talk.shown()["title"] == "one"
+        keys = await client.ask("drop", name="two.m", content=packed(two))
+        assert [client.hub.documents[key].state().title for key in keys] == ["one", "two"]
+        assert client.shown()["title"] == "one"
 
-    talk(tmp_path, scenario)
+    run_scenario(tmp_path, scenario)
 
 
 def test_saving_a_robot_file_updates_the_diagrams_that_use_it(tmp_path: Path) -> None:
     (tmp_path / "arms").mkdir()
     ab.save_robot(load_robot("puma560"), tmp_path / "arms" / "mine.json")
 
-    async def scenario(talk: Talk) -> None:
-        document = await talk.ask("open_shipped", document_kind="diagram", name="kr180model")
-        blocks = talk.hub.documents[document].document.diagram.blocks
+    async def scenario(client: Client) -> None:
+        document = await client.ask("open_shipped", document_kind="diagram", name="kr180model")
+        blocks = client.hub.documents[document].document.diagram.blocks
         name = next(name for name, block in blocks.items() if hasattr(block, "robot"))
         edit = {"kind": "parameters", "block": name, "values": {"robot": "arms/mine.json"}}
-        await talk.ask("change", document=document, key="1", edit=edit)
-        key = await talk.ask("robot_of_block", document=document, block=name)
-        assert talk.shown()["path"] == "arms/mine.json"
-        link = talk.shown()["links"][0]["name"]
-        await talk.ask("change", document=key, key="1", edit=cell(link, "mass", "7"))
-        await talk.ask("save", document=key)
-        block = talk.hub.documents[document].document.diagram.block(name)
+        await client.ask("change", document=document, key="1", edit=edit)
+        key = await client.ask("robot_of_block", document=document, block=name)
+        assert client.shown()["path"] == "arms/mine.json"
+        link = client.shown()["links"][0]["name"]
+        await client.ask("change", document=key, key="1", edit=cell(link, "mass", "7"))
+        await client.ask("save", document=key)
+        block = client.hub.documents[document].document.diagram.block(name)
         assert block.robot.links[0].mass == 7
-        assert talk.received[-3]["kind"] == "changed"
-        assert talk.received[-3]["state"]["document"] == document
-        await talk.ask("undo", document=document)
-        block = talk.hub.documents[document].document.diagram.block(name)
+        assert client.received[-3]["kind"] == "changed"
+        assert client.received[-3]["state"]["document"] == document
+        await client.ask("undo", document=document)
+        block = client.hub.documents[document].document.diagram.block(name)
         assert block.robot.links[0].mass == 0
         other = next(name for name, block in blocks.items() if not hasattr(block, "robot"))
-        assert "no robot" in await talk.refused("robot_of_block", document=document, block=other)
+        assert "no robot" in await client.refused("robot_of_block", document=document, block=other)
 
-    talk(tmp_path, scenario)
+    run_scenario(tmp_path, scenario)
 
 
 def test_two_pages_show_each_other_s_edits(tmp_path: Path) -> None:
-    async def scenario(talk: Talk) -> None:
-        key = await talk.ask("open_shipped", document_kind="robot", name="puma560")
-        assert talk.shown()["origin"] == "puma560"
+    async def scenario(client: Client) -> None:
+        key = await client.ask("open_shipped", document_kind="robot", name="puma560")
+        assert client.shown()["origin"] == "puma560"
         other_told: list[dict[str, Any]] = []
-        other = talk.new_page(other_told)
-        await talk.hub.welcome(other)
+        other = client.new_page(other_told)
+        await client.hub.welcome(other)
         request = {"number": 1, "request": {"kind": "attach", "document_kind": "robot", "document": key}}
-        await talk.hub.answer(other, json.dumps(request))
-        tables = await talk.ask("robot_tables")
+        await client.hub.answer(other, json.dumps(request))
+        tables = await client.ask("robot_tables")
         assert [column["title"] for column in tables["kinematics"]][:4] == ["joint", "α", "a", "d"]
         for number in range(8):
-            await talk.ask(
+            await client.ask(
                 "change", document=key, key=str(number), edit=cell("link2", "a", f"0.{number + 1}")
             )
-            pose = await talk.ask("pose", document=key, q=[0.0] * 6)
-            await talk.ask("scene", document=key)
+            pose = await client.ask("pose", document=key, q=[0.0] * 6)
+            await client.ask("scene", document=key)
         assert other_told[-1]["state"]["version"] == 8
-        arm = ab.Arm(talk.hub.documents[key].document.value)
+        arm = ab.Arm(client.hub.documents[key].document.value)
         assert_allclose(pose, arm.link_poses([0.0] * 6), atol=1e-14)
-        talk.hub.leave(other)
+        client.hub.leave(other)
         late: list[dict[str, Any]] = []
-        await talk.hub.welcome(talk.new_page(late))
+        await client.hub.welcome(client.new_page(late))
         assert [(state["document"], state["version"]) for state in late[0]["documents"]] == [(key, 8)]
-        await talk.ask("undo", document=key)
+        await client.ask("undo", document=key)
         assert other_told[-1]["state"]["version"] == 8
-        assert "open document" in await talk.refused("undo", document="nobody")
+        assert "open document" in await client.refused("undo", document="nobody")
         rename = {"kind": "rename", "block": "a", "name": "b"}
-        assert "'rename' is not an edit of a robot" in await talk.refused("change", document=key, edit=rename)
-        await talk.ask("redo", document=key)
-        await talk.ask("undo", document=key)
-        assert "has unsaved edits" in await talk.refused("close", document=key)
-        await talk.ask("close", document=key, discard=True)
-        assert talk.received[-2]["documents"] == []
+        assert "'rename' is not an edit of a robot" in await client.refused(
+            "change", document=key, edit=rename
+        )
+        await client.ask("redo", document=key)
+        await client.ask("undo", document=key)
+        assert "has unsaved edits" in await client.refused("close", document=key)
+        await client.ask("close", document=key, discard=True)
+        assert client.received[-2]["documents"] == []
 
-    talk(tmp_path, scenario)
+    run_scenario(tmp_path, scenario)
 
 
 def test_read_outs_equal_the_values_of_the_arm(tmp_path: Path) -> None:
     arm = ab.load_robot("puma560")
     q, qd, qdd = [0.1, 0.4, -0.3, 0.5, 0.7, 0.2], [0.5] * 6, [1.0] * 6
 
-    async def scenario(talk: Talk) -> None:
-        key = await talk.ask("open_shipped", document_kind="robot", name="puma560")
-        found = await talk.ask("readings", document=key, q=q, qd=qd, qdd=qdd)
+    async def scenario(client: Client) -> None:
+        key = await client.ask("open_shipped", document_kind="robot", name="puma560")
+        found = await client.ask("readings", document=key, q=q, qd=qd, qdd=qdd)
         assert found["pose"] == arm.fkine(q).tolist()
         assert found["jacobian"] == arm.jacob0(q).tolist()
         assert found["torque"] == arm.rne(q, qd, qdd).tolist()
@@ -233,14 +235,14 @@ def test_read_outs_equal_the_values_of_the_arm(tmp_path: Path) -> None:
         roll, pitch, yaw = found["rpy"]
         assert_allclose(math.cos(pitch) * math.cos(yaw), found["pose"][0][0], atol=1e-12)
         assert_allclose(math.cos(pitch) * math.sin(roll), found["pose"][2][1], atol=1e-12)
-        assert "5 numbers were given for q" in await talk.refused(
+        assert "5 numbers were given for q" in await client.refused(
             "readings", document=key, q=q[:5], qd=qd, qdd=qdd
         )
-        assert "joint coordinates" in await talk.refused("pose", document=key, q=[0.0])
-        picture = await talk.ask("picture", document=key, q=q, theme="light")
+        assert "joint coordinates" in await client.refused("pose", document=key, q=[0.0])
+        picture = await client.ask("picture", document=key, q=q, theme="light")
         assert "<svg" in picture
 
-    talk(tmp_path, scenario)
+    run_scenario(tmp_path, scenario)
 
 
 def test_singularities_are_described_in_words() -> None:

@@ -19,8 +19,8 @@ from armblocks.studio.protocol.messages.sheet_edits import ArrangeBlocks, Rename
 from armblocks.studio.robots.open_robots import OpenRobot
 
 
-def content(found: OpenRobot) -> bytes:
-    return write_robot(found.robot)
+def content(open_file: OpenRobot) -> bytes:
+    return write_robot(open_file.robot)
 
 
 def cell(
@@ -83,27 +83,27 @@ def test_recovered_robot_edits_have_their_undo_and_redo_history(
 
     async def scenario() -> None:
         robots = disk.robots()
-        found = robots.open_shipped("puma560")
-        carry_out(robots, found, requests(seed, 60))
-        if found.snapshot is not None:
-            await found.snapshot
+        open_file = robots.open_shipped("puma560")
+        carry_out(robots, open_file, requests(seed, 60))
+        if open_file.snapshot is not None:
+            await open_file.snapshot
         if seed % 3 == 0:
-            await robots.save(found, "arms/mine.json", overwrite=False)
-        carry_out(robots, found, requests(seed + 1000, 40))
-        back = disk.as_after_a_crash(tmp_path / "second").robots().attach(found.key)
-        assert content(back) == content(found)
-        assert back.document.version == found.document.version
-        assert back.document.dirty == found.document.dirty
-        assert (back.path, back.origin) == (found.path, found.origin)
+            await robots.save(open_file, "arms/mine.json", overwrite=False)
+        carry_out(robots, open_file, requests(seed + 1000, 40))
+        back = disk.as_after_a_crash(tmp_path / "second").robots().attach(open_file.key)
+        assert content(back) == content(open_file)
+        assert back.document.version == open_file.document.version
+        assert back.document.dirty == open_file.document.dirty
+        assert (back.path, back.origin) == (open_file.path, open_file.origin)
         while back.document.undo_title:  # up to the start of the journal
-            assert back.document.undo_title == found.document.undo_title
+            assert back.document.undo_title == open_file.document.undo_title
             back.document.undo()
-            found.document.undo()
-            assert content(back) == content(found)
-        while found.document.redo_title:
+            open_file.document.undo()
+            assert content(back) == content(open_file)
+        while open_file.document.redo_title:
             back.document.redo()
-            found.document.redo()
-        assert content(back) == content(found)
+            open_file.document.redo()
+        assert content(back) == content(open_file)
 
     going(scenario)
 
@@ -115,12 +115,12 @@ def test_a_snapshot_within_a_gesture_does_not_split_its_undo_step(
 
     async def scenario() -> None:
         robots = disk.robots()
-        found = robots.open_shipped("puma560")
+        open_file = robots.open_shipped("puma560")
         for number, text in enumerate(("1", "1.2", "1.25")):
-            robots.perform(found, cell(str(number), "link2", "a", text, "one cell"))
-            if found.snapshot is not None:
-                await found.snapshot
-        back = disk.as_after_a_crash(tmp_path / "second").robots().attach(found.key)
+            robots.perform(open_file, cell(str(number), "link2", "a", text, "one cell"))
+            if open_file.snapshot is not None:
+                await open_file.snapshot
+        back = disk.as_after_a_crash(tmp_path / "second").robots().attach(open_file.key)
         assert back.robot.links[1].dh is not None
         assert back.robot.links[1].dh.a == 1.25
         back.document.undo()
@@ -132,9 +132,9 @@ def test_a_snapshot_within_a_gesture_does_not_split_its_undo_step(
 def test_unsaved_robots_are_offered_and_do_not_overwrite_a_newer_file(disk: Disk, tmp_path: Path) -> None:
     async def scenario() -> None:
         robots = disk.robots()
-        found = robots.open_shipped("puma560")
-        await robots.save(found, "arm.json", overwrite=False)
-        robots.perform(found, cell("1", "link1", "mass", "7"))
+        open_file = robots.open_shipped("puma560")
+        await robots.save(open_file, "arm.json", overwrite=False)
+        robots.perform(open_file, cell("1", "link1", "mass", "7"))
         documents = disk.documents()
         documents.perform(
             documents.new(), document_messages.Change(document="", key="1", edit=ArrangeBlocks())
@@ -152,14 +152,14 @@ def test_unsaved_robots_are_offered_and_do_not_overwrite_a_newer_file(disk: Disk
             6,
         )
         assert [offer.kind for offer in second.documents().recoverable.offers()] == ["diagram"]
-        back = await after.recover(document_messages.Recover(document=found.key, action="keep_both"))
+        back = await after.recover(document_messages.Recover(document=open_file.key, action="keep_both"))
         assert back is not None
         assert back.path is not None
         assert back.path.startswith("arm recovered 20")
         assert back.robot.links[0].mass == 7
         assert second.project.read("arm.json") == theirs
         with pytest.raises(ArmblocksError, match="there is no robot to recover named"):
-            await after.recover(document_messages.Recover(document=found.key, action="open"))
+            await after.recover(document_messages.Recover(document=open_file.key, action="open"))
 
     going(scenario)
 
@@ -167,11 +167,11 @@ def test_unsaved_robots_are_offered_and_do_not_overwrite_a_newer_file(disk: Disk
 def test_a_robot_edit_repeated_after_a_crash_is_applied_once(disk: Disk, tmp_path: Path) -> None:
     async def scenario() -> None:
         robots = disk.robots()
-        found = robots.new()
-        robots.perform(found, cell("one", "link1", "a", "2"))
-        robots.perform(found, document_messages.Undo(document="", key="two"))
+        open_file = robots.new()
+        robots.perform(open_file, cell("one", "link1", "a", "2"))
+        robots.perform(open_file, document_messages.Undo(document="", key="two"))
         after = disk.as_after_a_crash(tmp_path / "second").robots()
-        back = after.attach(found.key)
+        back = after.attach(open_file.key)
         assert not after.perform(back, cell("one", "link1", "a", "2"))
         assert not after.perform(back, document_messages.Undo(document="", key="two"))
         assert after.perform(back, document_messages.Redo(document="", key="three"))
@@ -188,10 +188,10 @@ def test_a_page_finds_its_robot_after_a_server_restart(disk: Disk) -> None:
         await first.save(made, "arm.json", overwrite=False)
         first.end()
         robots = disk.robots()
-        found = robots.attach("0123456789abcdef", "arm.json")
-        assert (found.key, found.robot) == ("0123456789abcdef", made.robot)
-        assert robots.attach("f" * 16, "arm.json") is found
-        assert robots["f" * 16] is found
+        open_file = robots.attach("0123456789abcdef", "arm.json")
+        assert (open_file.key, open_file.robot) == ("0123456789abcdef", made.robot)
+        assert robots.attach("f" * 16, "arm.json") is open_file
+        assert robots["f" * 16] is open_file
         assert robots.attach("e" * 16, origin="kr180").robot == load_robot("kr180")
         assert robots.attach("d" * 16).robot == made.robot
 
@@ -201,11 +201,11 @@ def test_a_page_finds_its_robot_after_a_server_restart(disk: Disk) -> None:
 def test_a_dropped_robot_is_journaled_before_its_first_edit(disk: Disk, tmp_path: Path) -> None:
     async def scenario() -> None:
         robots = disk.robots()
-        found = robots.bring(load_robot("kr180"))
-        assert found.document.dirty
+        open_file = robots.bring(load_robot("kr180"))
+        assert open_file.document.dirty
         with pytest.raises(InputError, match="has unsaved edits"):
-            robots.close(found, discard=False)
-        back = disk.as_after_a_crash(tmp_path / "second").robots().attach(found.key)
+            robots.close(open_file, discard=False)
+        back = disk.as_after_a_crash(tmp_path / "second").robots().attach(open_file.key)
         assert back.robot == load_robot("kr180")
 
     going(scenario)
@@ -214,21 +214,21 @@ def test_a_dropped_robot_is_journaled_before_its_first_edit(disk: Disk, tmp_path
 def test_reloading_a_changed_robot_file_is_one_undo_step(disk: Disk, tmp_path: Path) -> None:
     async def scenario() -> None:
         robots = disk.robots()
-        found = robots.new()
+        open_file = robots.new()
         with pytest.raises(FormatError, match="the robot has no file yet"):
-            robots.reload(found)
-        await robots.save(found, "arm.json", overwrite=False)
-        robots.perform(found, cell("1", "link1", "a", "2"))
-        mine = found.robot
+            robots.reload(open_file)
+        await robots.save(open_file, "arm.json", overwrite=False)
+        robots.perform(open_file, cell("1", "link1", "a", "2"))
+        mine = open_file.robot
         disk.project.write("arm.json", write_robot(load_robot("kr180")))
         with pytest.raises(FormatError, match="the file has changed on the disk since it was opened"):
-            await robots.save(found, "", overwrite=False)
-        assert found.state().disk == "changed"
+            await robots.save(open_file, "", overwrite=False)
+        assert open_file.state().disk == "changed"
         for _ in range(2):  # a repeated request is applied once
-            robots.reload(found, "reload")
-        assert found.robot == load_robot("kr180")
-        assert not found.document.dirty
-        back = disk.as_after_a_crash(tmp_path / "second").robots().attach(found.key)
+            robots.reload(open_file, "reload")
+        assert open_file.robot == load_robot("kr180")
+        assert not open_file.document.dirty
+        back = disk.as_after_a_crash(tmp_path / "second").robots().attach(open_file.key)
         back.document.undo()
         assert back.robot == mine
 
@@ -238,17 +238,19 @@ def test_reloading_a_changed_robot_file_is_one_undo_step(disk: Disk, tmp_path: P
 def test_a_page_does_not_overwrite_a_cell_changed_by_another_page(disk: Disk) -> None:
     async def scenario() -> None:
         robots = disk.robots()
-        found = robots.open_shipped("puma560")
-        robots.perform(found, cell("1", "link1", "a", "2", author="other", base=0))
-        robots.perform(found, cell("2", "link1", "d", "3", author="me", base=0))  # another cell
+        open_file = robots.open_shipped("puma560")
+        robots.perform(open_file, cell("1", "link1", "a", "2", author="other", base=0))
+        robots.perform(open_file, cell("2", "link1", "d", "3", author="me", base=0))  # another cell
         for late in (
             cell("3", "link1", "a", "4", author="me", base=0),
             document_messages.Undo(document="", key="4", author="me", base=0),
         ):
             with pytest.raises(InputError, match=r"another page.*repeat the edit"):
-                robots.perform(found, late)
-        assert found.robot.links[0].dh is not None
-        assert (found.robot.links[0].dh.a, found.robot.links[0].dh.d) == (2, 3)
-        robots.perform(found, cell("5", "link1", "a", "4", author="me", base=2))  # after seeing the change
+                robots.perform(open_file, late)
+        assert open_file.robot.links[0].dh is not None
+        assert (open_file.robot.links[0].dh.a, open_file.robot.links[0].dh.d) == (2, 3)
+        robots.perform(
+            open_file, cell("5", "link1", "a", "4", author="me", base=2)
+        )  # after seeing the change
 
     going(scenario)

@@ -31,7 +31,7 @@ PATIENCE_SECONDS = 60.0
 """Time limit far above any normal waiting time, s, so that a hang fails the test."""
 
 
-class Talk:
+class Client:
     """A page that runs models and collects the messages of the runs."""
 
     def __init__(self, folder: Path) -> None:
@@ -73,14 +73,14 @@ class Talk:
         return pid
 
 
-def talk(folder: Path, scenario: Callable[[Talk], Awaitable[None]]) -> None:
+def run_scenario(folder: Path, scenario: Callable[[Client], Awaitable[None]]) -> None:
     async def going() -> None:
-        talk = Talk(folder)
-        await talk.hub.welcome(talk.page)
+        client = Client(folder)
+        await client.hub.welcome(client.page)
         try:
-            await scenario(talk)
+            await scenario(client)
         finally:
-            talk.hub.close()
+            client.hub.close()
 
     asyncio.run(going())
 
@@ -154,24 +154,24 @@ DEATHS: list[tuple[Callable[[Connection], None], str]] = [
 def test_a_failed_worker_is_reported_and_the_next_run_works(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, death: Callable[[Connection], None], words: str
 ) -> None:
-    async def scenario(talk: Talk) -> None:
-        document = await talk.ask("open_shipped", document_kind="diagram", name="falling_pendulum")
+    async def scenario(client: Client) -> None:
+        document = await client.ask("open_shipped", document_kind="diagram", name="falling_pendulum")
         with monkeypatch.context() as patch:
             in_worker(patch, death)
-            talk.hub.runs.workers.prepare()
-            run = await talk.ask("run", document=document)
-            last = await talk.until(run, "failed", "done")
+            client.hub.runs.workers.prepare()
+            run = await client.ask("run", document=document)
+            last = await client.until(run, "failed", "done")
             assert last["state"] == "failed"
             assert last["fault"]["what"] == words
             assert last["fault"]["where"] == "run"
             assert last["fault"]["fix"]
-            talk.hub.runs.workers.end()  # the next worker was prepared with the same fault
-        assert await talk.ask("ping") is None
-        await talk.ask("change", document=document, key="1", edit={"kind": "arrange"})
-        again = await talk.ask("run", document=document)
-        assert (await talk.until(again, "done", "failed"))["state"] == "done"
+            client.hub.runs.workers.end()  # the next worker was prepared with the same fault
+        assert await client.ask("ping") is None
+        await client.ask("change", document=document, key="1", edit={"kind": "arrange"})
+        again = await client.ask("run", document=document)
+        assert (await client.until(again, "done", "failed"))["state"] == "done"
 
-    talk(tmp_path, scenario)
+    run_scenario(tmp_path, scenario)
 
 
 @pytest.mark.parametrize("hang", [hang_in_python, hang_in_native_code])
@@ -180,20 +180,20 @@ def test_stop_ends_a_run_in_any_state_of_its_worker(
 ) -> None:
     in_worker(monkeypatch, hang)
 
-    async def scenario(talk: Talk) -> None:
-        document = await talk.ask("open_shipped", document_kind="diagram", name="falling_pendulum")
-        run = await talk.ask("run", document=document)
-        pid = talk.pid(run)
+    async def scenario(client: Client) -> None:
+        document = await client.ask("open_shipped", document_kind="diagram", name="falling_pendulum")
+        run = await client.ask("run", document=document)
+        pid = client.pid(run)
         for _ in range(3000):  # more than the capacity of the pipe: sending must not block
-            await talk.ask("speed", run=run, speed=1.0)
-        await talk.ask("control", run=run, action="stop")
-        last = await talk.until(run, "stopped", "failed", "done")
+            await client.ask("speed", run=run, speed=1.0)
+        await client.ask("control", run=run, action="stop")
+        last = await client.until(run, "stopped", "failed", "done")
         assert (last["state"], last["fault"]) == ("stopped", None)
         with pytest.raises(ProcessLookupError):
             os.kill(pid, 0)
 
     assert run_process.STOP_SECONDS < 1.0  # leaves time for the system to end the process
-    talk(tmp_path, scenario)
+    run_scenario(tmp_path, scenario)
 
 
 def test_a_hung_worker_is_killed_without_a_stop_request(
@@ -202,39 +202,41 @@ def test_a_hung_worker_is_killed_without_a_stop_request(
     in_worker(monkeypatch, hang_in_python)
     monkeypatch.setattr(run_process, "SILENT_SECONDS", 1.0)
 
-    async def scenario(talk: Talk) -> None:
-        document = await talk.ask("open_shipped", document_kind="diagram", name="falling_pendulum")
-        run = await talk.ask("run", document=document)
-        assert (await talk.until(run, "failed"))["fault"]["what"] == "the run does not respond; it was ended"
+    async def scenario(client: Client) -> None:
+        document = await client.ask("open_shipped", document_kind="diagram", name="falling_pendulum")
+        run = await client.ask("run", document=document)
+        assert (await client.until(run, "failed"))["fault"][
+            "what"
+        ] == "the run does not respond; it was ended"
 
-    talk(tmp_path, scenario)
+    run_scenario(tmp_path, scenario)
 
 
 def test_a_paused_run_is_ended_at_the_time_limit(tmp_path: Path) -> None:
-    async def scenario(talk: Talk) -> None:
-        document = await talk.ask("open_shipped", document_kind="diagram", name="falling_pendulum")
-        run = await talk.ask("run", document=document, speed=0.1)
-        await talk.until(run, "running")
-        await talk.ask("control", run=run, action="pause")
-        await talk.until(run, "paused")
-        talk.hub.runs.processes[run]._until = monotonic() + 0.2  # pyright: ignore[reportPrivateUsage]
-        await talk.ask("control", run=run, action="back")
-        last = await talk.until(run, "failed")
+    async def scenario(client: Client) -> None:
+        document = await client.ask("open_shipped", document_kind="diagram", name="falling_pendulum")
+        run = await client.ask("run", document=document, speed=0.1)
+        await client.until(run, "running")
+        await client.ask("control", run=run, action="pause")
+        await client.until(run, "paused")
+        client.hub.runs.processes[run]._until = monotonic() + 0.2  # pyright: ignore[reportPrivateUsage]
+        await client.ask("control", run=run, action="back")
+        last = await client.until(run, "failed")
         assert (
             last["fault"]["what"]
             == f"the run exceeds its time limit of {run_process.MOST_SECONDS:g} s; it was ended"
         )
 
-    talk(tmp_path, scenario)
+    run_scenario(tmp_path, scenario)
 
 
 def test_a_killed_worker_is_reported_and_its_samples_remain(tmp_path: Path) -> None:
-    async def scenario(talk: Talk) -> None:
-        document = await talk.ask("open_shipped", document_kind="diagram", name="falling_pendulum")
-        run = await talk.ask("run", document=document, speed=1.0)
-        await talk.until(run, "running")
-        os.kill(talk.pid(run), signal.SIGKILL)
-        last = await talk.until(run, "failed")
+    async def scenario(client: Client) -> None:
+        document = await client.ask("open_shipped", document_kind="diagram", name="falling_pendulum")
+        run = await client.ask("run", document=document, speed=1.0)
+        await client.until(run, "running")
+        os.kill(client.pid(run), signal.SIGKILL)
+        last = await client.until(run, "failed")
         assert "(SIGKILL): the memory may be exhausted" in last["fault"]["what"]
         late: list[str | bytes] = []
 
@@ -242,15 +244,15 @@ def test_a_killed_worker_is_reported_and_its_samples_remain(tmp_path: Path) -> N
             late.append(text)
 
         other = Page(hear, hear)
-        await talk.hub.welcome(other)
+        await client.hub.welcome(other)
         request = {"kind": "attach", "document": document, "document_kind": "diagram"}
         attach = {"number": 1, "request": request}
-        await talk.hub.answer(other, json.dumps(attach))
+        await client.hub.answer(other, json.dumps(attach))
         assert any(isinstance(text, bytes) for text in late), (
             "a page that connects later receives the samples"
         )
 
-    talk(tmp_path, scenario)
+    run_scenario(tmp_path, scenario)
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="/dev/full exists only on Linux")
@@ -260,20 +262,20 @@ def test_a_run_whose_samples_do_not_fit_on_disk_is_reported(
     def full(**_: object) -> object:
         return Path("/dev/full").open("r+b", buffering=0)
 
-    async def scenario(talk: Talk) -> None:
-        document = await talk.ask("open_shipped", document_kind="diagram", name="falling_pendulum")
+    async def scenario(client: Client) -> None:
+        document = await client.ask("open_shipped", document_kind="diagram", name="falling_pendulum")
         with monkeypatch.context() as patch:
             patch.setattr("armblocks.studio.runs.record.tempfile.TemporaryFile", full)
-            run = await talk.ask("run", document=document)
-        last = await talk.until(run, "failed", "done")
+            run = await client.ask("run", document=document)
+        last = await client.until(run, "failed", "done")
         assert last["state"] == "failed"
         assert last["fault"]["what"] == (
             "the samples of the run cannot be stored (No space left on device); the run was ended"
         )
-        again = await talk.ask("run", document=document)
-        assert (await talk.until(again, "done", "failed"))["state"] == "done"
+        again = await client.ask("run", document=document)
+        assert (await client.until(again, "done", "failed"))["state"] == "done"
 
-    talk(tmp_path, scenario)
+    run_scenario(tmp_path, scenario)
 
 
 def crash_in_the_report(pipe: Connection, job: dict[str, Any]) -> None:
@@ -304,12 +306,12 @@ def test_a_report_whose_process_fails_raises_an_error_with_the_reason(
 ) -> None:
     monkeypatch.setattr(run_report, "write", death)
 
-    async def scenario(talk: Talk) -> None:
-        document = await talk.ask("open_shipped", document_kind="diagram", name="falling_pendulum")
-        run = await talk.ask("run", document=document)
-        await talk.until(run, "done")
+    async def scenario(client: Client) -> None:
+        document = await client.ask("open_shipped", document_kind="diagram", name="falling_pendulum")
+        run = await client.ask("run", document=document)
+        await client.until(run, "done")
         with pytest.raises(SimulationError) as refused:
-            await talk.hub.runs.report(document)
+            await client.hub.runs.report(document)
         assert refused.value.what == words
 
-    talk(tmp_path, scenario)
+    run_scenario(tmp_path, scenario)

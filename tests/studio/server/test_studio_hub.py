@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from page_requests import Events, talk
+from page_requests import Events, run_scenario
 
 from armblocks.blocks import BLOCKS
 from armblocks.errors import ArmblocksError, FormatError, InputError
@@ -48,7 +48,7 @@ def test_a_diagram_is_opened_changed_checked_and_saved(tmp_path: Path) -> None:
         assert await ask("save", document=key, path="models/mine.json") == "models/mine.json"
         await until(lambda: last_check() == [])
 
-    events = talk(tmp_path, scenario)
+    events = run_scenario(tmp_path, scenario)
     assert load_diagram(tmp_path / "models" / "mine.json", BLOCKS).name == "mine"
     checks = [event for event in events if event["kind"] == "checked"]
     first = next(event["findings"] for event in checks if event["findings"])
@@ -76,7 +76,7 @@ def test_a_file_changed_on_disk_is_not_overwritten_without_confirmation(tmp_path
         await ask("save", document=key, path="b.json", overwrite=True)
         await ask("save", document=key)
 
-    talk(tmp_path, scenario)
+    run_scenario(tmp_path, scenario)
     assert load_diagram(tmp_path / "b.json", BLOCKS).name == "b"
 
 
@@ -88,7 +88,7 @@ def test_an_incomplete_diagram_is_saved_and_reopened(tmp_path: Path) -> None:
         await ask("close", document=key)
         await ask("open", path="open.json")
 
-    events = talk(tmp_path, scenario)
+    events = run_scenario(tmp_path, scenario)
     sheets = [event["content"]["sheet"]["blocks"] for event in events if event["kind"] == "opened"]
     assert list(sheets[-1]) == ["gain"]
 
@@ -110,7 +110,7 @@ def test_a_group_needs_blocks_and_a_free_name(tmp_path: Path) -> None:
         await ask("undo", document=key)
         await ask("undo", document=key)  # the subsystem is removed, so the page shows the top sheet
 
-    events = talk(tmp_path, scenario)
+    events = run_scenario(tmp_path, scenario)
     opened = [event for event in events if event["kind"] == "opened"]
     assert opened[1]["content"]["inside"] == ["part"]
     assert opened[-1]["content"]["inside"] == []
@@ -131,7 +131,7 @@ def test_the_server_sends_scenes_and_poses_of_robots(tmp_path: Path) -> None:
             await ask("scene", document=key, block="speed")
         assert await ask("typed", type="Gain", parameter="gain", text="[1 2;3 4]") == [[1.0, 2.0], [3.0, 4.0]]
 
-    talk(tmp_path, scenario)
+    run_scenario(tmp_path, scenario)
 
 
 def test_a_failed_start_raises_an_error_with_the_reason(tmp_path: Path) -> None:

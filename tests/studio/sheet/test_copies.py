@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from page_requests import Events, talk
+from page_requests import Events, run_scenario
 
 import armblocks as ab
 from armblocks.blocks import BLOCKS, Gain
@@ -117,7 +117,7 @@ def test_pasting_reads_no_file_outside_the_project(tmp_path: Path) -> None:
         with pytest.raises(InputError, match="is outside of the project folder"):
             await ask("change", document=key, edit={**edit, "text": outside, "names": {"servo 1": "third"}})
 
-    talk(tmp_path / "project", scenario)
+    run_scenario(tmp_path / "project", scenario)
 
 
 def test_inserting_a_block_into_a_wire_and_removing_it_is_one_step_each() -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from page_requests import Events, talk
+from page_requests import Events, run_scenario
 
 from armblocks.errors import ArmblocksError
 from armblocks.studio.server.hub import Hub
@@ -70,7 +70,7 @@ def test_a_file_is_previewed_and_its_columns_are_chosen(tmp_path: Path) -> None:
     (tmp_path / "data" / "drive.csv").write_text(ROWS)
     (tmp_path / "other.txt").write_text(ROWS)
 
-    async def talking(_: Hub, ask: Ask, message: Events) -> None:
+    async def scenario(_: Hub, ask: Ask, message: Events) -> None:
         assert [file["path"] for file in await ask("data_files", holds="table")] == ["data/drive.csv"]
         shown = await ask("preview_table", file="data/drive.csv")
         assert shown["time"] == "time [ms]"
@@ -105,7 +105,7 @@ def test_a_file_is_previewed_and_its_columns_are_chosen(tmp_path: Path) -> None:
         await ask("run", document=document, speed=None, tuned={})
         assert (await end_of_run(message, since))["fault"] is None
 
-    talk(tmp_path, talking, runs=True)
+    run_scenario(tmp_path, scenario, runs=True)
     block = json.loads((tmp_path / "models" / "model.json").read_text())["blocks"]["drive"]
     assert block["parameters"]["data"] == {
         "columns": ["x"],
@@ -117,7 +117,7 @@ def test_a_file_is_previewed_and_its_columns_are_chosen(tmp_path: Path) -> None:
 def test_a_table_that_cannot_be_read_is_a_finding_at_its_block(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("time,x\n0,1\n1,2\n")
 
-    async def talking(_: Hub, ask: Ask, message: Events) -> None:
+    async def scenario(_: Hub, ask: Ask, message: Events) -> None:
         document = await ask("new", document_kind="diagram")
         await ask("change", document=document, key="1", edit=played("a", file="a.csv"))
         await ask("save", document=document, path="m.json")
@@ -141,11 +141,11 @@ def test_a_table_that_cannot_be_read_is_a_finding_at_its_block(tmp_path: Path) -
         await ask("undo", document=document)
         assert "there is no such file" in (await findings(message, since))[0]["what"]
 
-    talk(tmp_path, talking, runs=True)
+    run_scenario(tmp_path, scenario, runs=True)
 
 
 def test_a_dropped_table_is_stored_and_replaced_only_on_request(tmp_path: Path) -> None:
-    async def talking(_: Hub, ask: Ask, message: Events) -> None:
+    async def scenario(_: Hub, ask: Ask, message: Events) -> None:
         def content(text: str) -> str:
             return base64.b64encode(text.encode()).decode()
 
@@ -174,7 +174,7 @@ def test_a_dropped_table_is_stored_and_replaced_only_on_request(tmp_path: Path) 
             await ask("keep_file", name="c.mat", content=matlab)
         assert sorted(path.name for path in tmp_path.iterdir()) == ["a.csv", "b.csv"]
 
-    talk(tmp_path, talking, runs=True)
+    run_scenario(tmp_path, scenario, runs=True)
 
 
 MARK = "from pathlib import Path\nPath(__file__).with_name('ran').write_text('')\n"
@@ -184,7 +184,7 @@ LAW = f"{MARK}\n\ndef law(u, t, gain=2.0):\n    return gain * u\n"
 def test_code_runs_only_after_its_content_was_trusted(tmp_path: Path) -> None:
     (tmp_path / "law.py").write_text(LAW)
 
-    async def talking(_: Hub, ask: Ask, message: Events) -> None:
+    async def scenario(_: Hub, ask: Ask, message: Events) -> None:
         assert [file["path"] for file in await ask("data_files", holds="function")] == ["law.py"]
         source = await ask("read_source", file="law.py")
         assert source["text"] == LAW
@@ -228,13 +228,13 @@ def test_code_runs_only_after_its_content_was_trusted(tmp_path: Path) -> None:
         assert found["block"] == "f"
         assert "law.py, line 6: ZeroDivisionError" in found["what"]
 
-    talk(tmp_path, talking, runs=True)
+    run_scenario(tmp_path, scenario, runs=True)
 
 
 def test_ports_follow_the_arguments_after_a_reload(tmp_path: Path) -> None:
     (tmp_path / "law.py").write_text("def law(u):\n    return u\n")
 
-    async def talking(_: Hub, ask: Ask, message: Events) -> None:
+    async def scenario(_: Hub, ask: Ask, message: Events) -> None:
         document = await ask("new", document_kind="diagram")
         await ask(
             "change", document=document, key="1", edit=called("f", "law.py:law", "CalledPythonFunction")
@@ -256,18 +256,18 @@ def test_ports_follow_the_arguments_after_a_reload(tmp_path: Path) -> None:
         with pytest.raises(ArmblocksError, match="the file is not Python: line 2"):
             await ask("change", document=document, key="4", edit=edit)
 
-    talk(tmp_path, talking, runs=True)
+    run_scenario(tmp_path, scenario, runs=True)
 
 
 def test_hidden_characters_of_a_source_are_shown(tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text("def law(u):\n    return u  # \u202e } \u200b\n")
     (tmp_path / "b.py").write_bytes(b"# -*- coding: utf-7 -*-\n#+AAo-def law(u): return u\n")
 
-    async def talking(_: Hub, ask: Ask, message: Events) -> None:
+    async def scenario(_: Hub, ask: Ask, message: Events) -> None:
         source = await ask("read_source", file="a.py")
         assert source["hidden"] == 2
         assert "\\u202e" in source["text"]
         # the text that Python would run, in the encoding that the file declares
         assert "\ndef law(u)" in (await ask("read_source", file="b.py"))["text"]
 
-    talk(tmp_path, talking, runs=True)
+    run_scenario(tmp_path, scenario, runs=True)

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from page_requests import Events, talk
+from page_requests import Events, run_scenario
 
 import armblocks as ab
 from armblocks.blocks import BLOCKS, Constant, Gain, Scope
@@ -227,4 +227,4 @@ def test_a_page_can_read_and_set_a_mask(tmp_path: Path) -> None:
         change = [event for event in events if event["kind"] == "changed"][-1]["change"]
         assert ">Servo<" in change["sheet"]["blocks"]["servo 1"]["face"]
 
-    talk(tmp_path, scenario)
+    run_scenario(tmp_path, scenario)

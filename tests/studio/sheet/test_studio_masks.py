@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from page_requests import Events, talk
+from page_requests import Events, run_scenario
 
 import armblocks as ab
 from armblocks.blocks import BLOCKS
@@ -86,7 +86,7 @@ def test_a_page_opens_a_masked_subsystem_and_evaluates_formulas(tmp_path: Path) 
         again = await ask("open", path="mine.json")
         assert again == [key]
 
-    talk(tmp_path, scenario)
+    run_scenario(tmp_path, scenario)
 
 
 def test_libraries_outside_the_project_are_not_read(tmp_path: Path) -> None:
