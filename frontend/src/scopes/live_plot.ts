@@ -95,7 +95,7 @@ export class LivePlot {
       title,
       width: 760,
       height: 360,
-      x: { min: from, max: to, label: 'time, s' },
+      x: { min: from, max: to, label: 'Time, s' },
       y: { min, max, label: this.unit },
       lines: shown.map(({ tone, dash, label }, k) => ({
         tone,

@@ -45,7 +45,7 @@ export function plotOptions(
       {
         ...axis,
         size: 32,
-        label: 'time, s',
+        label: 'Time, s',
         values: (_, splits) => splits.map((value) => tick(value, splits)),
       },
       {

@@ -200,7 +200,7 @@ def test_scope_exports_contain_all_samples_and_jumps(opened: Opened) -> None:
     wanted = np.column_stack([result.time, result["gain/y"], result["lag/y"]])
     np.testing.assert_array_equal(np.array(rows[1:], dtype=float), wanted)
     picture = ElementTree.fromstring(saved(page, "scope", "Picture as SVG"))
-    assert {"scope", "gain", "lag", "time, s"} <= {text.text for text in picture.iter() if text.text}
+    assert {"scope", "gain", "lag", "Time, s"} <= {text.text for text in picture.iter() if text.text}
     assert saved(page, "scope", "Picture as PNG").startswith(b"\x89PNG")
 
 
