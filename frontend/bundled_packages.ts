@@ -13,11 +13,11 @@ export function bundledPackages(): Plugin {
     apply: 'build',
     generateBundle(_, bundle) {
       const modules = [...this.getModuleIds()].filter((id) => /\.css(\?|$)/.test(id))
-      for (const part of Object.values(bundle)) if (part.type === 'chunk') modules.push(...part.moduleIds)
+      for (const chunk of Object.values(bundle)) if (chunk.type === 'chunk') modules.push(...chunk.moduleIds)
       const folders = new Set<string>()
       for (const id of modules) {
-        const found = PACKAGE.exec(id.replaceAll('\\', '/').replace('\0', ''))
-        if (found?.[1]) folders.add(found[1])
+        const match = PACKAGE.exec(id.replaceAll('\\', '/').replace('\0', ''))
+        if (match?.[1]) folders.add(match[1])
       }
       this.emitFile({
         type: 'asset',

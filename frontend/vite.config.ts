@@ -10,13 +10,13 @@ const OTHER_THEME = /\.dockview-theme-(?!(light|dark)(?![\w-]))/
 const OLD_FONT = /,\s*url\([^)]*\.woff\)\s*format\('woff'\)/
 
 /** Removes unused styles. */
-const unseen: Exclude<NonNullable<NonNullable<UserConfig['css']>['postcss']>, string>['plugins'] = [
+const unusedStyles: Exclude<NonNullable<NonNullable<UserConfig['css']>['postcss']>, string>['plugins'] = [
   {
     postcssPlugin: 'unseen',
     Rule(rule) {
-      const kept = rule.selectors.filter((selector) => !OTHER_THEME.test(selector))
-      if (!kept.length) rule.remove()
-      else if (kept.length < rule.selectors.length) rule.selectors = kept
+      const used = rule.selectors.filter((selector) => !OTHER_THEME.test(selector))
+      if (!used.length) rule.remove()
+      else if (used.length < rule.selectors.length) rule.selectors = used
     },
     Declaration: {
       src: (declaration) => {
@@ -52,9 +52,9 @@ function lighterSans(): Plugin {
     name: 'lighter-sans',
     apply: 'build',
     async generateBundle(_, bundle) {
-      for (const part of Object.values(bundle))
-        if (part.type === 'asset' && /inter-latin-wght-normal/.test(part.fileName))
-          part.source = await subsetFont(Buffer.from(part.source), characters(LATIN), {
+      for (const asset of Object.values(bundle))
+        if (asset.type === 'asset' && /inter-latin-wght-normal/.test(asset.fileName))
+          asset.source = await subsetFont(Buffer.from(asset.source), characters(LATIN), {
             targetFormat: 'woff2',
             variationAxes: { wght: { min: 400, max: 700 } },
           })
@@ -65,7 +65,7 @@ function lighterSans(): Plugin {
 export default defineConfig({
   base: './',
   plugins: [react(), lighterSans(), bundledPackages()],
-  css: { postcss: { plugins: unseen } },
+  css: { postcss: { plugins: unusedStyles } },
   build: {
     outDir: process.env['ARMBLOCKS_OUT'] ?? '../src/armblocks/studio/web',
     emptyOutDir: true,

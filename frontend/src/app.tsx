@@ -2,18 +2,18 @@ import { useComputedColorScheme, useMantineColorScheme } from '@mantine/core'
 import { DockviewReact, type IDockviewPanelHeaderProps } from 'dockview-react'
 import { lazy, Suspense, useEffect } from 'react'
 import { setDock } from './dock'
-import { later, useSettled, useSettling, useWanted } from './later'
+import { deferred, useDeferredReady, usePrefetch, useDialogRequested } from './deferred'
 import { Notices } from './notices'
 import { panelsOf, type Panel } from './panel'
-import { followRobot } from './robot_panel'
+import { showRobotPanelIfNeeded } from './robot_panel'
 import { TopBar } from './run/top_bar'
 import { Timeline } from './run/timeline'
 import { DropZone } from './robot/drop'
-import { useDesk } from './robot/editor/desk'
+import { useRobotEditor } from './robot/editor/state'
 import { onTheme } from './theme'
 
 const RobotEditor = lazy(() => import('./robot/editor/robot_editor'))
-const Dialogs = later(async () => (await import('./all_dialogs')).AllDialogs)
+const Dialogs = deferred(async () => (await import('./all_dialogs')).AllDialogs)
 
 /** Every file in `panels/` is a panel. */
 const PANELS = panelsOf(import.meta.glob<{ panel: Panel }>('./panels/*.tsx', { eager: true }))
@@ -24,18 +24,18 @@ function Tab({ api }: IDockviewPanelHeaderProps) {
 }
 
 /** A separate component: opening or closing a dialog renders no other part of the page. */
-function DialogsWhenWanted() {
-  const settled = useSettled()
-  const wanted = useWanted()
-  return (settled || wanted) && <Dialogs />
+function DialogsOnDemand() {
+  const ready = useDeferredReady()
+  const requested = useDialogRequested()
+  return (ready || requested) && <Dialogs />
 }
 
 export function App() {
   const scheme = useComputedColorScheme('light')
   const { setColorScheme } = useMantineColorScheme()
   useEffect(() => onTheme(setColorScheme), [setColorScheme])
-  const editing = useDesk((s) => s.current !== null)
-  useSettling()
+  const editing = useRobotEditor((s) => s.current !== null)
+  usePrefetch()
   return (
     <div className="studio">
       <div className={editing ? 'behind' : 'sheets'} inert={editing}>
@@ -48,13 +48,13 @@ export function App() {
             onReady={(event) => {
               PANELS.arrange(event)
               setDock(event.api)
-              followRobot(event.api, (id) => PANELS.addTo(event.api, id))
+              showRobotPanelIfNeeded(event.api, (id) => PANELS.addTo(event.api, id))
             }}
           />
         </main>
         <Timeline wires />
       </div>
-      <DialogsWhenWanted />
+      <DialogsOnDemand />
       {editing && (
         <Suspense fallback={<p className="robot-editor empty">Loading the robot editor …</p>}>
           <RobotEditor />

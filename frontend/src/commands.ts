@@ -1,11 +1,11 @@
-import { align, comment, distribute, flip, ground, group, rotate, chosenBlocks } from './canvas/arranging'
+import { align, comment, distribute, flip, ground, group, rotate, selectedBlocks } from './canvas/arranging'
 import { rename } from './canvas/block_node'
 import { copy, cut, duplicate, paste } from './canvas/clipboard'
 import { addNote, sheetView, ZOOM_STEP } from './canvas/sheet_actions'
-import { openConfiguration, openMask, openTour, save, show } from './dialogs'
+import { openConfiguration, openMask, openTour, save, showDialog } from './dialogs'
 import { exportDrawing, openReport } from './documents/export'
 import { control, startOrResume } from './run/start'
-import { alter, ask, change, look, useStudio } from './store'
+import { alterDocument, ask, change, openSheet, useStudio } from './store'
 import { setTheme } from './theme'
 
 /** A command: shown in the command palette and in the list of keys, and executed by its key. */
@@ -14,100 +14,100 @@ export interface Command {
   /** Key combination, `Ctrl+Shift+G`; alternatives separated by a comma. */
   keys?: string
   /** Whether the key is active only while the sheet has the focus. */
-  onSheet?: boolean
+  sheetOnly?: boolean
   /** Whether text fields handle this key themselves. */
-  fieldsOwn?: boolean
+  handledByFields?: boolean
   /** Whether the command is available now; by default always. */
-  possible?: () => boolean
+  enabled?: () => boolean
   run: () => void
 }
 
-const selected = () => useStudio.getState().selection.size > 0
-const chosen = () => chosenBlocks().length > 0
-const several = () => chosenBlocks().length > 1
-const masked = () => chosenBlocks().find(({ opens }) => opens)
-const ran = () => useStudio.getState().run !== null
+const hasSelection = () => useStudio.getState().selection.size > 0
+const hasBlocks = () => selectedBlocks().length > 0
+const hasSeveralBlocks = () => selectedBlocks().length > 1
+const selectedSubsystem = () => selectedBlocks().find(({ opens }) => opens)
+const hasRun = () => useStudio.getState().run !== null
 
 /** Every command, in the order of the palette. */
 export function commands(): Command[] {
-  return LIST
+  return COMMANDS
 }
 
-const LIST: Command[] = [
+const COMMANDS: Command[] = [
   { title: 'Run or continue', keys: 'Ctrl+Enter', run: startOrResume },
-  { title: 'Pause the run', keys: 'Ctrl+.', possible: ran, run: () => control('pause') },
-  { title: 'Stop the run', keys: 'Ctrl+Shift+Enter', possible: ran, run: () => control('stop') },
+  { title: 'Pause the run', keys: 'Ctrl+.', enabled: hasRun, run: () => control('pause') },
+  { title: 'Stop the run', keys: 'Ctrl+Shift+Enter', enabled: hasRun, run: () => control('stop') },
   {
     title: 'Step forward',
     keys: 'Ctrl+→',
-    fieldsOwn: true,
-    possible: ran,
+    handledByFields: true,
+    enabled: hasRun,
     run: () => control('step'),
   },
-  { title: 'Step back', keys: 'Ctrl+←', fieldsOwn: true, possible: ran, run: () => control('back') },
-  { title: 'Find blocks, types and values', keys: 'Ctrl+F', run: () => show('find') },
-  { title: 'Add a block', run: () => show('insert') },
-  { title: 'Draw a wire by the names of its ends', keys: '>', run: () => show('connect') },
+  { title: 'Step back', keys: 'Ctrl+←', handledByFields: true, enabled: hasRun, run: () => control('back') },
+  { title: 'Find blocks, types and values', keys: 'Ctrl+F', run: () => showDialog('find') },
+  { title: 'Add a block', run: () => showDialog('insert') },
+  { title: 'Draw a wire by the names of its ends', keys: '>', run: () => showDialog('connect') },
   { title: 'Write a note', keys: '"', run: addNote },
-  { title: 'Undo', keys: 'Ctrl+Z', fieldsOwn: true, run: () => alter('undo') },
-  { title: 'Redo', keys: 'Ctrl+Y, Ctrl+Shift+Z', fieldsOwn: true, run: () => alter('redo') },
+  { title: 'Undo', keys: 'Ctrl+Z', handledByFields: true, run: () => alterDocument('undo') },
+  { title: 'Redo', keys: 'Ctrl+Y, Ctrl+Shift+Z', handledByFields: true, run: () => alterDocument('redo') },
   { title: 'Save', keys: 'Ctrl+S', run: () => void save() },
-  { title: 'Save under another name', keys: 'Ctrl+Shift+S', run: () => show('save_as') },
-  { title: 'Open', keys: 'Ctrl+O', run: () => show('open') },
+  { title: 'Save under another name', keys: 'Ctrl+Shift+S', run: () => showDialog('save_as') },
+  { title: 'Open', keys: 'Ctrl+O', run: () => showDialog('open') },
   { title: 'New diagram', run: () => void ask({ kind: 'new', document_kind: 'diagram' }) },
-  { title: 'Group into a subsystem', keys: 'Ctrl+G', onSheet: true, possible: chosen, run: group },
+  { title: 'Group into a subsystem', keys: 'Ctrl+G', sheetOnly: true, enabled: hasBlocks, run: group },
   {
     title: 'Edit the mask: parameters of the subsystem or the model',
     keys: 'Ctrl+M',
-    onSheet: true,
-    possible: () => !useStudio.getState().document?.linked.length && !masked()?.link,
-    run: () => openMask(masked()?.name),
+    sheetOnly: true,
+    enabled: () => !useStudio.getState().document?.linked.length && !selectedSubsystem()?.link,
+    run: () => openMask(selectedSubsystem()?.name),
   },
   {
     title: 'Rename',
     keys: 'F2',
-    onSheet: true,
-    possible: chosen,
-    run: () => rename(chosenBlocks()[0]!.name),
+    sheetOnly: true,
+    enabled: hasBlocks,
+    run: () => rename(selectedBlocks()[0]!.name),
   },
-  { title: 'Rotate', keys: 'Ctrl+R', onSheet: true, possible: chosen, run: rotate },
-  { title: 'Flip', keys: 'Ctrl+I', onSheet: true, possible: chosen, run: flip },
+  { title: 'Rotate', keys: 'Ctrl+R', sheetOnly: true, enabled: hasBlocks, run: rotate },
+  { title: 'Flip', keys: 'Ctrl+I', sheetOnly: true, enabled: hasBlocks, run: flip },
   {
     title: 'Comment out, or uncomment',
     keys: 'Ctrl+Shift+X',
-    onSheet: true,
-    possible: chosen,
+    sheetOnly: true,
+    enabled: hasBlocks,
     run: () => comment('out'),
   },
   {
     title: 'Comment through, or uncomment',
     keys: 'Ctrl+Shift+Y',
-    onSheet: true,
-    possible: chosen,
+    sheetOnly: true,
+    enabled: hasBlocks,
     run: () => comment('through'),
   },
   { title: 'Ground and terminate unconnected ports', run: ground },
-  { title: 'Duplicate', keys: 'Ctrl+D', onSheet: true, possible: selected, run: () => void duplicate() },
-  { title: 'Copy', keys: 'Ctrl+C', onSheet: true, possible: selected, run: () => void copy() },
-  { title: 'Cut', keys: 'Ctrl+X', onSheet: true, possible: selected, run: () => void cut() },
-  { title: 'Paste', keys: 'Ctrl+V', onSheet: true, run: () => void paste() },
+  { title: 'Duplicate', keys: 'Ctrl+D', sheetOnly: true, enabled: hasSelection, run: () => void duplicate() },
+  { title: 'Copy', keys: 'Ctrl+C', sheetOnly: true, enabled: hasSelection, run: () => void copy() },
+  { title: 'Cut', keys: 'Ctrl+X', sheetOnly: true, enabled: hasSelection, run: () => void cut() },
+  { title: 'Paste', keys: 'Ctrl+V', sheetOnly: true, run: () => void paste() },
   {
     title: 'Select all',
     keys: 'Ctrl+A',
-    onSheet: true,
+    sheetOnly: true,
     run: () => {
       const { document, select } = useStudio.getState()
       select([...Object.keys(document?.blocks ?? {}), ...Object.keys(document?.notes ?? {})])
     },
   },
-  { title: 'Align left edges', possible: several, run: () => align('left') },
-  { title: 'Align centres', possible: several, run: () => align('centre') },
-  { title: 'Align right edges', possible: several, run: () => align('right') },
-  { title: 'Align top edges', possible: several, run: () => align('top') },
-  { title: 'Align middles', possible: several, run: () => align('middle') },
-  { title: 'Align bottom edges', possible: several, run: () => align('bottom') },
-  { title: 'Equal gaps from left to right', possible: several, run: () => distribute('x') },
-  { title: 'Equal gaps from top to bottom', possible: several, run: () => distribute('y') },
+  { title: 'Align left edges', enabled: hasSeveralBlocks, run: () => align('left') },
+  { title: 'Align centres', enabled: hasSeveralBlocks, run: () => align('centre') },
+  { title: 'Align right edges', enabled: hasSeveralBlocks, run: () => align('right') },
+  { title: 'Align top edges', enabled: hasSeveralBlocks, run: () => align('top') },
+  { title: 'Align middles', enabled: hasSeveralBlocks, run: () => align('middle') },
+  { title: 'Align bottom edges', enabled: hasSeveralBlocks, run: () => align('bottom') },
+  { title: 'Equal gaps from left to right', enabled: hasSeveralBlocks, run: () => distribute('x') },
+  { title: 'Equal gaps from top to bottom', enabled: hasSeveralBlocks, run: () => distribute('y') },
   { title: 'Arrange the sheet', run: () => void change({ kind: 'arrange' }) },
   { title: 'Fit the sheet into the window', keys: 'Space', run: () => sheetView.fit?.() },
   { title: 'Zoom in', keys: '+', run: () => sheetView.zoom?.(ZOOM_STEP) },
@@ -119,25 +119,25 @@ const LIST: Command[] = [
   {
     title: 'Leave the subsystem',
     keys: 'Esc',
-    possible: () => Boolean(useStudio.getState().document?.inside.length),
-    run: () => look(useStudio.getState().document!.inside.slice(0, -1)),
+    enabled: () => Boolean(useStudio.getState().document?.inside.length),
+    run: () => openSheet(useStudio.getState().document!.inside.slice(0, -1)),
   },
-  { title: 'Report of this run', possible: ran, run: openReport },
+  { title: 'Report of this run', enabled: hasRun, run: openReport },
   { title: 'Export the sheet as SVG', run: () => exportDrawing('svg') },
   { title: 'Export the sheet as PNG', run: () => exportDrawing('png') },
   { title: 'Export the sheet as PDF', run: () => exportDrawing('pdf') },
   { title: 'Configuration parameters', keys: 'Ctrl+E', run: openConfiguration },
   { title: 'Take the tour', run: openTour },
-  { title: 'All commands by name', keys: 'Ctrl+K', run: () => show('commands') },
-  { title: 'All keys', keys: '?', run: () => show('keys') },
+  { title: 'All commands by name', keys: 'Ctrl+K', run: () => showDialog('commands') },
+  { title: 'All keys', keys: '?', run: () => showDialog('keys') },
 ]
 
 const ARROWS: Record<string, string> = { '→': 'arrowright', '←': 'arrowleft' }
 
 /** Whether exactly these keys are pressed, all of them with Ctrl. */
-function pressed(keys: string, event: KeyboardEvent): boolean {
-  return keys.split(', ').some((way) => {
-    const parts = way.split('+')
+function arePressed(keys: string, event: KeyboardEvent): boolean {
+  return keys.split(', ').some((combination) => {
+    const parts = combination.split('+')
     const key = parts.at(-1)!.toLowerCase()
     return (
       parts.includes('Ctrl') &&
@@ -151,8 +151,8 @@ function pressed(keys: string, event: KeyboardEvent): boolean {
 /** The command for the pressed keys, among the commands of the sheet or among all others. */
 export function commandOf(event: KeyboardEvent, ofSheet: boolean): Command | undefined {
   const typing = event.target instanceof Element && event.target.closest('input, textarea') !== null
-  return LIST.find(
-    ({ keys, onSheet = false, fieldsOwn = false }) =>
-      keys && onSheet === ofSheet && !(fieldsOwn && typing) && pressed(keys, event),
+  return COMMANDS.find(
+    ({ keys, sheetOnly = false, handledByFields = false }) =>
+      keys && sheetOnly === ofSheet && !(handledByFields && typing) && arePressed(keys, event),
   )
 }

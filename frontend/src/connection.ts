@@ -1,5 +1,5 @@
 import type { ReplyTo, Request, ServerEvent } from './messages'
-import { keepUnsent, unsent } from './unsent'
+import { storeUnsent, unsent } from './unsent'
 
 /** Why the server refused a request. */
 export class Refusal extends Error {
@@ -14,21 +14,21 @@ export class Refusal extends Error {
 }
 
 /** `up`; `down`: no reply; `rejected`: the server replies but does not accept the session of this page. */
-export type Line = 'up' | 'down' | 'rejected'
+export type ConnectionState = 'up' | 'down' | 'rejected'
 
-interface Waiting {
+interface PendingRequest {
   request: Request
   resolve: (value: unknown) => void
   reject: (reason: Refusal) => void
 }
 
 const FIRST_DELAY_MS = 250
-const LONGEST_DELAY_MS = 2000
+const MAX_DELAY_MS = 2000
 /** Interval of the connection test, and time without a reply after which the connection counts as lost. */
 const PING_MS = 1000
-const SILENCE_MS = 2500
+const REPLY_TIMEOUT_MS = 2500
 /** Time without a reply after which the connection is closed and opened again. */
-const DEAD_MS = 10_000
+const RECONNECT_AFTER_MS = 10_000
 
 /**
  * The websocket to the server. Requests without a reply are sent again after a reconnection, when the page
@@ -37,22 +37,22 @@ const DEAD_MS = 10_000
  */
 export class Connection {
   private socket: WebSocket | null = null
-  private number = 0
-  private readonly waiting = new Map<number, Waiting>()
-  private delay = FIRST_DELAY_MS
+  private lastNumber = 0
+  private readonly pending = new Map<number, PendingRequest>()
+  private reconnectDelay = FIRST_DELAY_MS
   /** Whether requests may be sent: not until the server has reopened the documents of this page. */
-  private flowing = false
-  private asked = 0
+  private attached = false
+  private pingedAt = 0
   private onEvent: (event: ServerEvent) => void = () => {}
 
   constructor(
     private readonly onFrame: (frame: ArrayBuffer) => void,
-    private readonly onLine: (line: Line) => void,
+    private readonly onState: (state: ConnectionState) => void,
     onRefused: (reason: Refusal) => void,
   ) {
     for (const request of unsent())
-      this.waiting.set(++this.number, { request, resolve: () => {}, reject: onRefused })
-    setInterval(() => this.listen(), PING_MS)
+      this.pending.set(++this.lastNumber, { request, resolve: () => {}, reject: onRefused })
+    setInterval(() => this.checkConnection(), PING_MS)
   }
 
   /** Open the connection; `onEvent` receives the events of the server. */
@@ -68,66 +68,66 @@ export class Connection {
     socket.binaryType = 'arraybuffer'
     this.socket = socket
     socket.onopen = () => {
-      this.delay = FIRST_DELAY_MS
-      this.asked = 0
-      this.onLine('up')
+      this.reconnectDelay = FIRST_DELAY_MS
+      this.pingedAt = 0
+      this.onState('up')
     }
     socket.onmessage = ({ data }: MessageEvent<string | ArrayBuffer>) => {
-      if (this.silent()) this.onLine('up')
-      this.asked = 0
+      if (this.isSilent()) this.onState('up')
+      this.pingedAt = 0
       if (typeof data === 'string') this.receive(JSON.parse(data) as ServerEvent)
       else this.onFrame(data)
     }
     socket.onclose = () => {
       if (this.socket !== socket) return
-      this.flowing = false
-      this.forget('attach')
-      void isRejected().then((rejected) => this.onLine(rejected ? 'rejected' : 'down'))
-      setTimeout(() => this.connect(), this.delay)
-      this.delay = Math.min(2 * this.delay, LONGEST_DELAY_MS)
+      this.attached = false
+      this.dropPending('attach')
+      void isRejected().then((rejected) => this.onState(rejected ? 'rejected' : 'down'))
+      setTimeout(() => this.connect(), this.reconnectDelay)
+      this.reconnectDelay = Math.min(2 * this.reconnectDelay, MAX_DELAY_MS)
     }
   }
 
   /** Test the connection; report a missing reply, and after a longer time reconnect. */
-  private listen(): void {
+  private checkConnection(): void {
     const { socket } = this
     if (socket?.readyState !== WebSocket.OPEN) return
-    if (this.silent()) this.onLine('down')
-    if (this.asked && performance.now() - this.asked > DEAD_MS) {
+    if (this.isSilent()) this.onState('down')
+    if (this.pingedAt && performance.now() - this.pingedAt > RECONNECT_AFTER_MS) {
       socket.close()
       socket.onclose?.(new CloseEvent('close'))
       return
     }
-    if (!this.asked) this.asked = performance.now()
+    if (!this.pingedAt) this.pingedAt = performance.now()
     socket.send(JSON.stringify({ number: 0, request: { kind: 'ping' } }))
   }
 
-  private silent(): boolean {
-    return this.asked > 0 && performance.now() - this.asked > SILENCE_MS
+  private isSilent(): boolean {
+    return this.pingedAt > 0 && performance.now() - this.pingedAt > REPLY_TIMEOUT_MS
   }
 
-  private forget(kind: Request['kind']): void {
-    for (const [number, { request }] of this.waiting) if (request.kind === kind) this.waiting.delete(number)
+  private dropPending(kind: Request['kind']): void {
+    for (const [number, { request }] of this.pending) if (request.kind === kind) this.pending.delete(number)
   }
 
   /** Send a request to the server; the promise is rejected with a Refusal. */
   ask<R extends Request>(request: R): Promise<ReplyTo<R>> {
-    const number = ++this.number
+    const number = ++this.lastNumber
     return new Promise<ReplyTo<R>>((resolve, reject) => {
-      this.waiting.set(number, { request, resolve: resolve as (value: unknown) => void, reject })
-      this.keep()
-      if (this.flowing || request.kind === 'attach') this.send(number, request)
+      this.pending.set(number, { request, resolve: resolve as (value: unknown) => void, reject })
+      this.storePending()
+      if (this.attached || request.kind === 'attach') this.send(number, request)
     })
   }
 
   /** Send requests again, first those without a reply; called when the page has its document again. */
   resend(): void {
-    this.flowing = true
-    for (const [number, { request }] of this.waiting) this.send(number, request)
+    this.attached = true
+    for (const [number, { request }] of this.pending) this.send(number, request)
   }
 
-  private keep(): void {
-    keepUnsent([...this.waiting.values()].map(({ request }) => request))
+  private storePending(): void {
+    storeUnsent([...this.pending.values()].map(({ request }) => request))
   }
 
   private send(number: number, request: Request): void {
@@ -139,21 +139,21 @@ export class Connection {
       this.onEvent(event)
       return
     }
-    const waiting = this.waiting.get(event.number)
-    if (!waiting) return
-    this.waiting.delete(event.number)
-    this.keep()
+    const request = this.pending.get(event.number)
+    if (!request) return
+    this.pending.delete(event.number)
+    this.storePending()
     const { fault } = event
-    if (fault) waiting.reject(new Refusal(fault.what, fault.where, fault.allowed, fault.fix))
-    else waiting.resolve(event.value)
+    if (fault) request.reject(new Refusal(fault.what, fault.where, fault.allowed, fault.fix))
+    else request.resolve(event.value)
   }
 }
 
 /** Whether the server replies but rejects this page because it was restarted with a new login. */
 async function isRejected(): Promise<boolean> {
   try {
-    const answer = await fetch(new URL('index.html', location.href), { method: 'HEAD', cache: 'no-store' })
-    return answer.status === 401
+    const response = await fetch(new URL('index.html', location.href), { method: 'HEAD', cache: 'no-store' })
+    return response.status === 401
   } catch {
     return false
   }

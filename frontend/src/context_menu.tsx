@@ -5,7 +5,7 @@ import { closeMenu, useContextMenu, type Entries, type Entry } from './context_m
 
 /** The open context menu, at the pointer. */
 export function ContextMenu() {
-  const { opened, label, at, entries, times } = useContextMenu()
+  const { opened, label, at, entries, openCount } = useContextMenu()
   // A panel under the menu may disappear, such as the sheet of another document.
   useEffect(() => {
     if (!opened) return
@@ -14,7 +14,7 @@ export function ContextMenu() {
   }, [opened])
   return (
     <Menu
-      key={times}
+      key={openCount}
       opened={opened}
       onChange={(next) => !next && closeMenu()}
       position="bottom-start"
@@ -40,13 +40,13 @@ function Items({ entries }: { entries: Entries }) {
 }
 
 function Item({ entry }: { entry: Entry }) {
-  const { title, keys, possible = true, checked, swatch, within, run } = entry
-  if (within) return <Within title={title} within={within} />
+  const { title, keys, enabled = true, checked, swatch, submenu, run } = entry
+  if (submenu) return <Submenu title={title} entries={submenu} />
   if (checked !== undefined)
     return (
       <Menu.CheckboxItem
         checked={checked}
-        disabled={!possible}
+        disabled={!enabled}
         onChange={run}
         closeMenuOnClick
         rightSection={swatch && <span className="swatch" style={{ background: swatch }} />}
@@ -56,7 +56,7 @@ function Item({ entry }: { entry: Entry }) {
     )
   return (
     <Menu.Item
-      disabled={!possible}
+      disabled={!enabled}
       rightSection={keys && <Kbd size="xs">{keys.split(', ')[0]}</Kbd>}
       onClick={run}
     >
@@ -65,14 +65,14 @@ function Item({ entry }: { entry: Entry }) {
   )
 }
 
-function Within({ title, within }: { title: string; within: Entries }) {
+function Submenu({ title, entries }: { title: string; entries: Entries }) {
   const [opened, setOpened] = useState(false)
   return (
     <Menu.Sub onChange={setOpened}>
       <Menu.Sub.Target>
         <Menu.Sub.Item>{title}</Menu.Sub.Item>
       </Menu.Sub.Target>
-      <Menu.Sub.Dropdown className="context-menu">{opened && <Items entries={within} />}</Menu.Sub.Dropdown>
+      <Menu.Sub.Dropdown className="context-menu">{opened && <Items entries={entries} />}</Menu.Sub.Dropdown>
     </Menu.Sub>
   )
 }

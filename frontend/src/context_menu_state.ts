@@ -6,13 +6,13 @@ export interface Entry {
   /** The key with the same effect. */
   keys?: string | undefined
   /** Whether the entry is available; by default always. */
-  possible?: boolean
+  enabled?: boolean
   /** Whether an option is on. */
   checked?: boolean
   /** A colour to show beside the title, in CSS. */
   swatch?: string
   /** The entries of a submenu. */
-  within?: Entries
+  submenu?: Entries
   run?: () => void
 }
 
@@ -27,7 +27,7 @@ interface ContextMenu {
   at: { x: number; y: number }
   entries: Entries
   /** Distinguishes consecutive openings. */
-  times: number
+  openCount: number
 }
 
 export const useContextMenu = create<ContextMenu>(() => ({
@@ -35,7 +35,7 @@ export const useContextMenu = create<ContextMenu>(() => ({
   label: '',
   at: { x: 0, y: 0 },
   entries: [],
-  times: 0,
+  openCount: 0,
 }))
 
 let focused: Element | null = null
@@ -43,13 +43,14 @@ let focused: Element | null = null
 /** Open a context menu at a point of the window; the focus returns when it is closed. */
 export function openMenu(label: string, at: { x: number; y: number }, entries: Entries): void {
   focused = document.activeElement
-  useContextMenu.setState((s) => ({ opened: true, label, at, entries, times: s.times + 1 }))
+  useContextMenu.setState((s) => ({ opened: true, label, at, entries, openCount: s.openCount + 1 }))
 }
 
 export function closeMenu(): void {
-  const inMenu = document.activeElement?.closest('.context-menu')
+  const focusInMenu = document.activeElement?.closest('.context-menu')
   useContextMenu.setState({ opened: false })
-  if (inMenu && focused instanceof HTMLElement && focused.isConnected) focused.focus({ preventScroll: true })
+  if (focusInMenu && focused instanceof HTMLElement && focused.isConnected)
+    focused.focus({ preventScroll: true })
 }
 
 /** Movement of a pressed right button, px, beyond which it is a drag and opens no menu. */
@@ -67,10 +68,10 @@ export function useMenuHandlers(open: (at: { x: number; y: number }, target: Ele
       if (event.button !== 2 || hasOwnMenu(event.target)) return
       const { clientX: x, clientY: y } = event
       const target = event.target as Element
-      const released = (up: PointerEvent) => {
-        if (up.button !== 2) return
+      const released = (pointerUp: PointerEvent) => {
+        if (pointerUp.button !== 2) return
         removeEventListener('pointerup', released, true)
-        if (Math.hypot(up.clientX - x, up.clientY - y) <= CLICK_PX) open({ x, y }, target)
+        if (Math.hypot(pointerUp.clientX - x, pointerUp.clientY - y) <= CLICK_PX) open({ x, y }, target)
       }
       addEventListener('pointerup', released, true)
     },
@@ -78,8 +79,8 @@ export function useMenuHandlers(open: (at: { x: number; y: number }, target: Ele
       if (hasOwnMenu(event.target)) return
       event.preventDefault()
       if (event.button === 2) return
-      const box = (event.target as Element).getBoundingClientRect()
-      open({ x: box.x + box.width / 2, y: box.y + box.height / 2 }, event.target as Element)
+      const bounds = (event.target as Element).getBoundingClientRect()
+      open({ x: bounds.x + bounds.width / 2, y: bounds.y + bounds.height / 2 }, event.target as Element)
     },
   }
 }

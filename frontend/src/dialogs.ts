@@ -20,18 +20,18 @@ type Dialog =
 interface Dialogs {
   open: Dialog | null
   /** Distinguishes consecutive openings of the dialog. */
-  times: number
+  openCount: number
   /** Text typed into the search lists. */
   typed: string
   /**
-   * The subsystem whose mask is edited; `''` is the model. `ofSheet`: the subsystem owns the visible sheet.
+   * The subsystem whose mask is edited; `''` is the model. `ownsVisibleSheet`: it owns the visible sheet.
    */
-  of: string
-  ofSheet: boolean
+  maskOwner: string
+  ownsVisibleSheet: boolean
   /** Position of a new block, screen px; `null` selects a free position. */
   at: { x: number; y: number } | null
   /** The port to which a new block is connected. */
-  end: { port: string; isOutput: boolean } | null
+  connectTo: { port: string; isOutput: boolean } | null
 }
 
 /**
@@ -39,23 +39,23 @@ interface Dialogs {
  */
 export const useDialogs = create<Dialogs>(() => ({
   open: null,
-  times: 0,
+  openCount: 0,
   typed: '',
-  of: '',
-  ofSheet: false,
+  maskOwner: '',
+  ownsVisibleSheet: false,
   at: null,
-  end: null,
+  connectTo: null,
 }))
 
 /** Open a dialog, or close the open one. */
-export function show(
+export function showDialog(
   open: Dialog | null,
   typed = '',
   at: Dialogs['at'] = null,
-  end: Dialogs['end'] = null,
+  connectTo: Dialogs['connectTo'] = null,
 ): void {
   // A closing dialog still shows its content for a moment.
-  useDialogs.setState((s) => (open ? { open, times: s.times + 1, typed, at, end } : { open }))
+  useDialogs.setState((s) => (open ? { open, openCount: s.openCount + 1, typed, at, connectTo } : { open }))
 }
 
 /** The visible stop of the tour; `null` while the tour is not shown. */
@@ -65,15 +65,18 @@ export const openTour = (): void => useTour.setState({ stop: 0 })
 
 /** The configuration parameters belong to a document. */
 export function openConfiguration(): void {
-  if (useStudio.getState().document) show('configuration')
+  if (useStudio.getState().document) showDialog('configuration')
 }
 
 /** Edit the mask of a subsystem on the sheet; without a block, the mask of the sheet. */
 export function openMask(block?: string): void {
   const { document } = useStudio.getState()
   if (!document) return
-  useDialogs.setState({ of: block ?? document.inside.at(-1) ?? '', ofSheet: block === undefined })
-  show('mask')
+  useDialogs.setState({
+    maskOwner: block ?? document.inside.at(-1) ?? '',
+    ownsVisibleSheet: block === undefined,
+  })
+  showDialog('mask')
 }
 
 /** Request the present files of the project folder and the recent files. */
@@ -86,5 +89,5 @@ export async function save(): Promise<void> {
   const { document } = useStudio.getState()
   if (!document) return
   if (document.state.path) await ask({ kind: 'save', document: document.state.document })
-  else show('save_as')
+  else showDialog('save_as')
 }

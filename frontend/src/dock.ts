@@ -7,23 +7,23 @@ export function setDock(api: DockviewApi): void {
   dock = api
 }
 
-const MARKED_MS = 1200
+const HIGHLIGHT_MS = 1200
 /** Time in which a chart is drawn at the first run, whose code is then loaded. */
-const PATIENCE_MS = 3000
+const CHART_TIMEOUT_MS = 3000
 
 /** Show the chart of a block in the panel of the scopes, and mark it for a moment. */
 export function showScope(path: string): void {
   dock?.getPanel('scopes')?.api.setActive()
-  const end = performance.now() + PATIENCE_MS
-  const mark = () => {
+  const end = performance.now() + CHART_TIMEOUT_MS
+  const highlight = () => {
     const chart = document.querySelector(`.scopes [data-view="${CSS.escape(path)}"]`)
     if (!chart) {
-      if (performance.now() < end) requestAnimationFrame(mark)
+      if (performance.now() < end) requestAnimationFrame(highlight)
       return
     }
     chart.scrollIntoView({ block: 'nearest', inline: 'nearest' })
     chart.classList.add('marked')
-    setTimeout(() => chart.classList.remove('marked'), MARKED_MS)
+    setTimeout(() => chart.classList.remove('marked'), HIGHLIGHT_MS)
   }
-  requestAnimationFrame(mark)
+  requestAnimationFrame(highlight)
 }

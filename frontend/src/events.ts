@@ -1,15 +1,15 @@
-import { lastShown, remember } from './documents/last_shown'
+import { lastShown, storeShown } from './documents/last_shown'
 import type { ChangeOf, ContentOf, DocumentKind, EventOf, ServerEvent } from './messages'
 import type { Checked, DocumentState, Wire } from './protocol'
-import { attachAgain, leaveEditor, robotChanged, robotOpened, toFront } from './robot/editor/desk'
-import { isFree } from './run/pace'
+import { reattachRobots, leaveEditor, robotChanged, robotOpened, showRobot } from './robot/editor/state'
+import { canDraw } from './run/pace'
 import * as runs from './run/runs'
 import { recoverable } from './model/recoverable'
-import { ask, bringToFront, line, refuse, showState, useStudio, type OpenDocument } from './store'
+import { ask, bringToFront, connection, refuse, showState, useStudio, type OpenDocument } from './store'
 
 const wireKey = (wire: Wire) => `${wire.source} -> ${wire.target}`
 
-function changed(document: OpenDocument, state: DocumentState, change: ChangeOf<'diagram'>): OpenDocument {
+function withChange(document: OpenDocument, state: DocumentState, change: ChangeOf<'diagram'>): OpenDocument {
   const { sheet, settings } = change
   const blocks = { ...document.blocks }
   for (const [name, block] of Object.entries(sheet.blocks)) {
@@ -18,8 +18,8 @@ function changed(document: OpenDocument, state: DocumentState, change: ChangeOf<
   }
   const removed = new Set(sheet.wires_removed.map(wireKey))
   const lines = { ...document.lines }
-  for (const [source, one] of Object.entries(sheet.lines)) {
-    if (one) lines[source] = one
+  for (const [source, wireLines] of Object.entries(sheet.lines)) {
+    if (wireLines) lines[source] = wireLines
     else delete lines[source]
   }
   return {
@@ -36,7 +36,7 @@ function changed(document: OpenDocument, state: DocumentState, change: ChangeOf<
   }
 }
 
-function checked(document: OpenDocument, event: Checked): OpenDocument {
+function withFindings(document: OpenDocument, event: Checked): OpenDocument {
   if (event.version !== document.state.version) return document
   // With an error in the diagram no new signal types are known; the previous ones remain displayed.
   const wireKinds = event.findings.length ? document.wireKinds : event.wires
@@ -44,7 +44,7 @@ function checked(document: OpenDocument, event: Checked): OpenDocument {
 }
 
 /** The changes of the state for each event of the server. */
-const HEARD: { [Kind in ServerEvent['kind']]: (event: EventOf<Kind>) => void } = {
+const EVENT_HANDLERS: { [Kind in ServerEvent['kind']]: (event: EventOf<Kind>) => void } = {
   welcome,
   documents: ({ documents, recoveries }) =>
     useStudio.setState({ documents, recoveries: recoverable(recoveries, documents) }),
@@ -52,27 +52,31 @@ const HEARD: { [Kind in ServerEvent['kind']]: (event: EventOf<Kind>) => void } =
   changed: documentChanged,
   checked: documentChecked,
   run_started: runStarted,
-  run_tuned: runs.tuned,
-  run_rewound: runs.rewound,
+  run_tuned: runs.onRunTuned,
+  run_rewound: runs.onRunRewound,
   run_progress: runProgressed,
   reply: () => {},
 }
 
 /** The changes of the state when a document of each kind is opened. */
-const OPENED: { [Kind in DocumentKind]: (event: EventOf<'opened'>, content: ContentOf<Kind>) => void } = {
+const OPEN_HANDLERS: {
+  [Kind in DocumentKind]: (event: EventOf<'opened'>, content: ContentOf<Kind>) => void
+} = {
   diagram: diagramOpened,
   robot: robotOpened,
 }
 
 /** The changes of the state when a document of each kind changes. */
-const CHANGED: { [Kind in DocumentKind]: (event: EventOf<'changed'>, change: ChangeOf<Kind>) => void } = {
+const CHANGE_HANDLERS: {
+  [Kind in DocumentKind]: (event: EventOf<'changed'>, change: ChangeOf<Kind>) => void
+} = {
   diagram: diagramChanged,
   robot: robotChanged,
 }
 
 /** Update the state after an event of the server. */
 export function receive<Kind extends ServerEvent['kind']>(event: EventOf<Kind> & { kind: Kind }): void {
-  HEARD[event.kind](event)
+  EVENT_HANDLERS[event.kind](event)
 }
 
 function welcome(event: EventOf<'welcome'>): void {
@@ -82,7 +86,7 @@ function welcome(event: EventOf<'welcome'>): void {
     documents: event.documents,
   })
   // Not earlier: a page that shows its document again offers no recovery of it.
-  void showAgain(event).then(() =>
+  void restoreDocuments(event).then(() =>
     useStudio.setState((s) => ({ recoveries: recoverable(event.recoveries, s.documents) })),
   )
 }
@@ -91,17 +95,17 @@ function opened<Kind extends DocumentKind>(
   event: EventOf<'opened'>,
   content: ContentOf<Kind> & { kind: Kind },
 ): void {
-  OPENED[content.kind](event, content)
+  OPEN_HANDLERS[content.kind](event, content)
 }
 
 function diagramOpened({ state, in_front }: EventOf<'opened'>, content: ContentOf<'diagram'>): void {
   const { document, run } = useStudio.getState()
   const { sheet, inside, settings } = content
-  const same = document?.state.document === state.document
-  if (!same && !in_front) return
-  const moved = same && document.inside.join('/') !== inside.join('/')
-  if (moved) useStudio.setState({ selection: new Set<string>(), editing: null })
-  if (same && run && (run.state === 'running' || run.state === 'paused') && content.run !== run.run)
+  const isShown = document?.state.document === state.document
+  if (!isShown && !in_front) return
+  const otherSheet = isShown && document.inside.join('/') !== inside.join('/')
+  if (otherSheet) useStudio.setState({ selection: new Set<string>(), editing: null })
+  if (isShown && run && (run.state === 'running' || run.state === 'paused') && content.run !== run.run)
     useStudio.setState({ run: { ...run, state: 'failed', message: 'The studio ended during this run.' } })
   useStudio.setState({
     ...showState({
@@ -109,18 +113,18 @@ function diagramOpened({ state, in_front }: EventOf<'opened'>, content: ContentO
       inside,
       settings,
       ...sheet,
-      findings: same ? document.findings : [],
-      wireKinds: same ? document.wireKinds : {},
+      findings: isShown ? document.findings : [],
+      wireKinds: isShown ? document.wireKinds : {},
     }),
-    ...(same ? {} : { run: null, selection: new Set<string>(), editing: null, strict: false }),
+    ...(isShown ? {} : { run: null, selection: new Set<string>(), editing: null, strict: false }),
     // Notices about another document are outdated.
-    ...(same || !document ? {} : { notices: [] }),
+    ...(isShown || !document ? {} : { notices: [] }),
   })
-  if (!same) {
-    runs.forget()
+  if (!isShown) {
+    runs.dropTrials()
     leaveEditor()
   }
-  remember(state, inside)
+  storeShown(state, inside)
 }
 
 function documentChanged(event: EventOf<'changed'>): void {
@@ -135,7 +139,7 @@ function contentChanged<Kind extends DocumentKind>(
   event: EventOf<'changed'>,
   change: ChangeOf<Kind> & { kind: Kind },
 ): void {
-  CHANGED[change.kind](event, change)
+  CHANGE_HANDLERS[change.kind](event, change)
 }
 
 function diagramChanged(event: EventOf<'changed'>, change: ChangeOf<'diagram'>): void {
@@ -144,20 +148,21 @@ function diagramChanged(event: EventOf<'changed'>, change: ChangeOf<'diagram'>):
   if (event.before !== document.state.version && event.state.version !== document.state.version)
     void ask({ kind: 'look', document: event.state.document, inside: document.inside })
   else {
-    useStudio.setState(showState(changed(document, event.state, change)))
-    remember(event.state, document.inside)
+    useStudio.setState(showState(withChange(document, event.state, change)))
+    storeShown(event.state, document.inside)
   }
 }
 
 function documentChecked(event: EventOf<'checked'>): void {
   const { document } = useStudio.getState()
-  if (document?.state.document === event.document) useStudio.setState({ document: checked(document, event) })
+  if (document?.state.document === event.document)
+    useStudio.setState({ document: withFindings(document, event) })
 }
 
 function runStarted(event: EventOf<'run_started'>): void {
   // Sent again after a reconnection: the samples are the same.
   if (useStudio.getState().run?.run === event.run) return
-  runs.began(event)
+  runs.onRunStarted(event)
   useStudio.setState({
     strict: false,
     notices: [],
@@ -181,11 +186,11 @@ function runStarted(event: EventOf<'run_started'>): void {
 
 function runProgressed(event: EventOf<'run_progress'>): void {
   const { run } = useStudio.getState()
-  runs.progressed(event)
+  runs.onRunProgress(event)
   // The progress of a run may be displayed later; other messages of a run are handled at once.
   if (
     run?.run === event.run &&
-    (event.state !== 'running' || run.state !== 'running' || isFree(performance.now()))
+    (event.state !== 'running' || run.state !== 'running' || canDraw(performance.now()))
   )
     useStudio.setState({
       run: {
@@ -205,39 +210,39 @@ function runProgressed(event: EventOf<'run_progress'>): void {
 }
 
 /** Reopen the last document of this page, or the one in its address; then send the pending requests. */
-async function showAgain(welcome: EventOf<'welcome'>): Promise<void> {
-  const robot = await attachAgain()
-  await showDiagramAgain(welcome)
-  if (robot) toFront(robot)
+async function restoreDocuments(welcome: EventOf<'welcome'>): Promise<void> {
+  const robot = await reattachRobots()
+  await restoreDiagram(welcome)
+  if (robot) showRobot(robot)
 }
 
-async function showDiagramAgain(welcome: EventOf<'welcome'>): Promise<void> {
-  const shown = useStudio.getState().document
-  const last = shown ? { ...shown.state, inside: shown.inside } : lastShown()
+async function restoreDiagram(welcome: EventOf<'welcome'>): Promise<void> {
+  const displayed = useStudio.getState().document
+  const last = displayed ? { ...displayed.state, inside: displayed.inside } : lastShown()
   if (last) {
     const { document, inside, path, origin } = last
     useStudio.setState({ returned: true })
-    const found = await ask({ kind: 'attach', document, document_kind: 'diagram', inside, path, origin })
-    if (found !== undefined) {
-      line.resend()
+    const key = await ask({ kind: 'attach', document, document_kind: 'diagram', inside, path, origin })
+    if (key !== undefined) {
+      connection.resend()
       return
     }
     useStudio.setState({ returned: false })
   }
-  line.resend()
-  if (!shown) await openFromAddress(welcome)
+  connection.resend()
+  if (!displayed) await openFromAddress(welcome)
 }
 
 async function openFromAddress(welcome: EventOf<'welcome'>): Promise<void> {
-  const wanted = decodeURIComponent(location.hash.slice(1))
-  if (wanted) {
-    const found = await ask(
-      wanted in welcome.examples
-        ? { kind: 'open_shipped', document_kind: 'diagram', name: wanted }
-        : { kind: 'open', path: wanted },
+  const name = decodeURIComponent(location.hash.slice(1))
+  if (name) {
+    const opened = await ask(
+      name in welcome.examples
+        ? { kind: 'open_shipped', document_kind: 'diagram', name }
+        : { kind: 'open', path: name },
     )
     // After a refusal, no other model is opened: an empty diagram offers the examples.
-    if (found === undefined) await ask({ kind: 'new', document_kind: 'diagram' })
+    if (opened === undefined) await ask({ kind: 'new', document_kind: 'diagram' })
     return
   }
   const open = welcome.documents.find(({ kind }) => kind === 'diagram')

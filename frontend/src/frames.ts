@@ -3,25 +3,25 @@
  * frame after a change and compares the present data with the drawn data. Without changes the page requests
  * no frames.
  */
-type Look = (now: number) => void
+type FrameCallback = (now: number) => void
 
-const looks = new Set<Look>()
+const callbacks = new Set<FrameCallback>()
 let requested = 0
 
 /** Run all views in the next animation frame. */
-export function changed(): void {
+export function scheduleFrame(): void {
   requested ||= requestAnimationFrame((now) => {
     requested = 0 // a view may request the frame after this one
-    for (const look of looks) look(now)
+    for (const callback of callbacks) callback(now)
   })
 }
 
 /**
- * Call `look` in the next animation frame and in the frame after every change. Returns a function that ends
- * this.
+ * Call `callback` in the next animation frame and in the frame after every change. Returns a function that
+ * ends the calls.
  */
-export function watch(look: Look): () => void {
-  looks.add(look)
-  changed()
-  return () => void looks.delete(look)
+export function onFrame(callback: FrameCallback): () => void {
+  callbacks.add(callback)
+  scheduleFrame()
+  return () => void callbacks.delete(callback)
 }

@@ -1,6 +1,6 @@
 /** Keys that are not commands, such as navigation keys, for one part of the page. */
 interface KeyGroup {
-  place: string
+  title: string
   /** The source files that handle these keys; a test compares them. */
   sources: string[]
   /** Key combinations, separated by a comma, and their effect. */
@@ -9,7 +9,7 @@ interface KeyGroup {
 
 export const KEYS: KeyGroup[] = [
   {
-    place: 'On the sheet',
+    title: 'On the sheet',
     sources: ['canvas/sheet_keys.ts'],
     keys: [
       ['letters', 'Add a block: type its name'],
@@ -29,7 +29,7 @@ export const KEYS: KeyGroup[] = [
     ],
   },
   {
-    place: 'With the mouse on the sheet',
+    title: 'With the mouse on the sheet',
     sources: ['canvas/pointer_drag.ts'],
     keys: [
       ['Shift+drag', 'Disconnect a block and connect its neighbours'],
@@ -47,7 +47,7 @@ export const KEYS: KeyGroup[] = [
     ],
   },
   {
-    place: 'Names and notes',
+    title: 'Names and notes',
     sources: ['canvas/block_node.tsx', 'canvas/note_node.tsx', 'canvas/signal_names.tsx'],
     keys: [
       ['Enter', 'Accept the name'],
@@ -56,7 +56,7 @@ export const KEYS: KeyGroup[] = [
     ],
   },
   {
-    place: 'Lists, fields and the tour',
+    title: 'Lists, fields and the tour',
     sources: [
       'library/pick_list.tsx',
       'documents/open_dialog.tsx',
@@ -72,7 +72,7 @@ export const KEYS: KeyGroup[] = [
     ],
   },
   {
-    place: 'Time line',
+    title: 'Time line',
     sources: ['run/timeline.tsx'],
     keys: [
       ['Space', 'Play or pause the playback'],
@@ -81,7 +81,7 @@ export const KEYS: KeyGroup[] = [
     ],
   },
   {
-    place: 'Scopes',
+    title: 'Scopes',
     sources: [],
     keys: [
       ['wheel', 'Zoom the time axis of all scopes; over the value axis zoom that scope\u2019s values'],
@@ -92,7 +92,7 @@ export const KEYS: KeyGroup[] = [
     ],
   },
   {
-    place: 'Robot view',
+    title: 'Robot view',
     sources: ['robot/stage.tsx'],
     keys: [
       ['arrows', 'Turn the view'],
@@ -103,7 +103,7 @@ export const KEYS: KeyGroup[] = [
     ],
   },
   {
-    place: 'Robot editor',
+    title: 'Robot editor',
     sources: ['robot/editor/robot_editor.tsx', 'robot/editor/table.tsx'],
     keys: [
       ['Ctrl+S', 'Save the robot'],

@@ -11,10 +11,10 @@ import { StrictMode } from 'react'
 import { createRoot } from 'react-dom/client'
 import { App } from './app'
 import { receive } from './events'
-import { line } from './store'
+import { connection } from './store'
 import { theme, themeManager } from './theme'
 
-line.open(receive)
+connection.open(receive)
 createRoot(document.getElementById('root')!).render(
   <StrictMode>
     <MantineProvider theme={theme} defaultColorScheme="auto" colorSchemeManager={themeManager}>

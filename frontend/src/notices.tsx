@@ -6,18 +6,18 @@ import { useStudio } from './store'
 /** Notices about refused requests and a lost connection, with remedies. */
 export function Notices() {
   const notices = useStudio((s) => s.notices)
-  const line = useStudio((s) => s.line)
+  const connectionState = useStudio((s) => s.connectionState)
   const started = useStudio((s) => s.welcome !== null)
   const dismiss = useStudio((s) => s.dismiss)
   return (
     <Stack className="notices" gap="xs" role="status" aria-live="polite">
-      {started && line === 'down' && (
+      {started && connectionState === 'down' && (
         <Alert color="orange" icon={<IconAlertTriangle />} title="The studio does not answer">
           Your edits are stored here and sent after reconnection. If the studio was ended, start it again in
           the same folder.
         </Alert>
       )}
-      {started && line === 'rejected' && (
+      {started && connectionState === 'rejected' && (
         <Alert
           color="orange"
           icon={<IconAlertTriangle />}

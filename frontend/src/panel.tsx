@@ -1,12 +1,12 @@
 import type { DockviewApi, IDockviewPanelProps } from 'dockview-react'
 import { useEffect, useState, type ComponentType, type FunctionComponent } from 'react'
 
-type Body = FunctionComponent<IDockviewPanelProps>
+type PanelComponent = FunctionComponent<IDockviewPanelProps>
 
 /** A panel of the studio. Each file in `panels/` exports one as `panel`; the file name is its key. */
 export interface Panel {
   title: string
-  component: Body
+  component: PanelComponent
   /** Order in which panels are added; each takes its space from the panel beside which it is placed. */
   order: number
   /**
@@ -21,9 +21,12 @@ export function panelsOf(files: Record<string, { panel: Panel }>) {
   const panels = Object.entries(files)
     .map(([path, { panel }]) => ({ id: path.replace(/^.*\/|\.tsx$/g, ''), ...panel }))
     .sort((one, other) => one.order - other.order)
-  const components: Record<string, Body> = Object.fromEntries(panels.map((one) => [one.id, one.component]))
+  const components: Record<string, PanelComponent> = Object.fromEntries(
+    panels.map((one) => [one.id, one.component]),
+  )
   const arrange = ({ api }: { api: Pick<DockviewApi, 'addPanel'> }): void => {
-    for (const { id, title, place } of panels) api.addPanel({ id, component: id, title, ...spot(place) })
+    for (const { id, title, place } of panels)
+      api.addPanel({ id, component: id, title, ...dockOptions(place) })
   }
   /** Add a panel again that was removed: at the right edge of the dock. */
   const addTo = (api: Pick<DockviewApi, 'addPanel'>, id: string): void => {
@@ -35,7 +38,7 @@ export function panelsOf(files: Record<string, { panel: Panel }>) {
   return { components, arrange, addTo }
 }
 
-function spot(place: Panel['place']) {
+function dockOptions(place: Panel['place']) {
   if (!place) return {}
   if ('behind' in place) return { position: { referencePanel: place.behind }, inactive: true }
   const { beside, side, size } = place
@@ -44,14 +47,14 @@ function spot(place: Panel['place']) {
 }
 
 /** A panel that is rendered when it is first visible, hidden panels are not rendered. */
-export function inFront(Part: ComponentType): Body {
+export function whenVisible(Part: ComponentType): PanelComponent {
   return function Panel({ api }) {
-    const [seen, setSeen] = useState(api.isVisible)
+    const [wasVisible, setWasVisible] = useState(api.isVisible)
     useEffect(() => {
-      if (api.isVisible) setSeen(true)
-      const watch = api.onDidVisibilityChange(({ isVisible }) => isVisible && setSeen(true))
-      return () => watch.dispose()
+      if (api.isVisible) setWasVisible(true)
+      const subscription = api.onDidVisibilityChange(({ isVisible }) => isVisible && setWasVisible(true))
+      return () => subscription.dispose()
     }, [api])
-    return seen ? <Part /> : null
+    return wasVisible ? <Part /> : null
   }
 }

@@ -12,38 +12,40 @@ const TUNE = 'tune'
 export const robotWidth = (): number => Math.min(640, 0.28 * innerWidth)
 
 /** Whether a robot view is of use: a block of the top sheet has a robot, or one of a sheet seen since. */
-export function hasRobot(blocks: Record<string, SheetBlock>, isTop: boolean, before: boolean): boolean {
-  return Object.values(blocks).some(({ parameters }) => parameters['robot']) || (!isTop && before)
+export function hasRobot(blocks: Record<string, SheetBlock>, isTop: boolean, previously: boolean): boolean {
+  return Object.values(blocks).some(({ parameters }) => parameters['robot']) || (!isTop && previously)
 }
 
 /** Show the robot view only for a model with a robot: without it, diagram and scopes take its room. */
-export function followRobot(api: DockviewApi, add: (id: string) => void): void {
-  let shown = true
-  const follow = ({ document }: { document: ReturnType<typeof useStudio.getState>['document'] }) => {
+export function showRobotPanelIfNeeded(api: DockviewApi, add: (id: string) => void): void {
+  let visible = true
+  const update = ({ document }: { document: ReturnType<typeof useStudio.getState>['document'] }) => {
     if (!document) return
-    const wanted = hasRobot(document.blocks, document.inside.length === 0, shown)
-    if (wanted === shown) return
-    shown = wanted
+    const needed = hasRobot(document.blocks, document.inside.length === 0, visible)
+    if (needed === visible) return
+    visible = needed
     const library = api.getPanel(LIBRARY)
     const width = library?.group.api.width
-    if (wanted) add(ROBOT)
+    if (needed) add(ROBOT)
     const [robot, scopes, tune] = [ROBOT, SCOPES, TUNE].map((id) => api.getPanel(id))
-    const to = wanted ? robot : scopes
-    if (tune && to && tune.group === (wanted ? scopes : robot)?.group) moveBehind(tune.api, to)
-    if (!wanted && robot) api.removePanel(robot)
+    const group = needed ? robot : scopes
+    if (tune && group && tune.group === (needed ? scopes : robot)?.group) moveBehind(tune.api, group)
+    if (!needed && robot) api.removePanel(robot)
     // The dock gives all panels in a row equal shares.
     if (width) library?.group.api.setSize({ width })
-    if (wanted) robot?.group.api.setSize({ width: robotWidth() })
+    if (needed) robot?.group.api.setSize({ width: robotWidth() })
   }
-  useStudio.subscribe((now, before) => now.document?.blocks !== before.document?.blocks && follow(now))
-  follow(useStudio.getState())
+  useStudio.subscribe(
+    (now, previously) => now.document?.blocks !== previously.document?.blocks && update(now),
+  )
+  update(useStudio.getState())
 }
 
 type Panel = NonNullable<ReturnType<DockviewApi['getPanel']>>
 
 /** Move a panel to the tabs of another one; it is visible there only if it was visible before. */
 function moveBehind(panel: DockviewPanelApi, other: Panel): void {
-  const front = panel.isVisible ? null : (other.group.activePanel ?? other)
+  const activePanel = panel.isVisible ? null : (other.group.activePanel ?? other)
   panel.moveTo({ group: other.group })
-  front?.api.setActive()
+  activePanel?.api.setActive()
 }

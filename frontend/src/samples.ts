@@ -1,10 +1,10 @@
-import { changed } from './frames'
+import { scheduleFrame } from './frames'
 import { RunSamples } from './model/run_samples'
 
 /** The samples of the displayed run; a new object for each run. */
 export let samples = new RunSamples('', [], {})
 
-export function showSamples(shown: RunSamples): void {
-  samples = shown
-  changed()
+export function showSamples(next: RunSamples): void {
+  samples = next
+  scheduleFrame()
 }

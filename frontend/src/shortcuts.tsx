@@ -1,34 +1,36 @@
 import { Kbd, Modal, Table } from '@mantine/core'
 import { Fragment } from 'react'
 import { commands } from './commands'
-import { show, useDialogs } from './dialogs'
+import { showDialog, useDialogs } from './dialogs'
 import { KEYS } from './key_list'
 
 /** The list of all keys, by the place where they are handled. */
 export function Shortcuts() {
   const opened = useDialogs((s) => s.open === 'keys')
-  const called = commands().flatMap(({ keys, title }): [string, string][] => (keys ? [[keys, title]] : []))
+  const commandKeys = commands().flatMap(({ keys, title }): [string, string][] =>
+    keys ? [[keys, title]] : [],
+  )
   return (
-    <Modal opened={opened} onClose={() => show(null)} title={<b>Keys</b>} size="lg">
+    <Modal opened={opened} onClose={() => showDialog(null)} title={<b>Keys</b>} size="lg">
       <Table className="keys" aria-label="Keys">
-        {[{ place: 'Commands', keys: called }, ...KEYS].map(({ place, keys }) => (
-          <Fragment key={place}>
+        {[{ title: 'Commands', keys: commandKeys }, ...KEYS].map(({ title, keys }) => (
+          <Fragment key={title}>
             <Table.Thead>
               <Table.Tr>
                 <Table.Th colSpan={2} scope="rowgroup">
-                  {place}
+                  {title}
                 </Table.Th>
               </Table.Tr>
             </Table.Thead>
             <Table.Tbody>
-              {keys.map(([ways, what]) => (
-                <Table.Tr key={ways}>
+              {keys.map(([combinations, effect]) => (
+                <Table.Tr key={combinations}>
                   <Table.Td className="ways">
-                    {ways.split(', ').map((way) => (
-                      <Kbd key={way}>{way}</Kbd>
+                    {combinations.split(', ').map((combination) => (
+                      <Kbd key={combination}>{combination}</Kbd>
                     ))}
                   </Table.Td>
-                  <Table.Td>{what}</Table.Td>
+                  <Table.Td>{effect}</Table.Td>
                 </Table.Tr>
               ))}
             </Table.Tbody>

@@ -1,8 +1,8 @@
 import { create } from 'zustand'
-import { Connection, Refusal, type Line } from './connection'
-import { changed as viewsChanged } from './frames'
+import { Connection, Refusal, type ConnectionState } from './connection'
+import { scheduleFrame } from './frames'
 import { newKey } from './keys'
-import { outstanding, pathOf, withMoves, type SentMove } from './model/ahead'
+import { outstanding, pathOf, withMoves, type SentMove } from './model/sent_moves'
 import type { Edit, EventOf, ReplyTo, Request } from './messages'
 import type {
   BlockType,
@@ -67,7 +67,7 @@ export interface Notice {
 }
 
 interface Studio {
-  line: Line
+  connectionState: ConnectionState
   /** The open and the recoverable documents of the server. */
   documents: DocumentState[]
   recoveries: Recovery[]
@@ -82,7 +82,7 @@ interface Studio {
   selection: ReadonlySet<string>
   editing: string | null
   /** A block that is to be centred in the window. */
-  sought: string | null
+  blockToCentre: string | null
   notices: Notice[]
   /** Whether the last run failed: unconnected inputs are then errors, before they are only marked. */
   strict: boolean
@@ -92,7 +92,7 @@ interface Studio {
 }
 
 export const useStudio = create<Studio>((set) => ({
-  line: 'down',
+  connectionState: 'down',
   documents: [],
   recoveries: [],
   returned: false,
@@ -103,23 +103,23 @@ export const useStudio = create<Studio>((set) => ({
   run: null,
   selection: new Set(),
   editing: null,
-  sought: null,
+  blockToCentre: null,
   notices: [],
   strict: false,
   select: (names) => set({ selection: new Set(names) }),
   edit: (editing) => set({ editing }),
   dismiss: (id) => set((s) => ({ notices: s.notices.filter((notice) => notice.id !== id) })),
 }))
-useStudio.subscribe(viewsChanged)
+useStudio.subscribe(scheduleFrame)
 
 /** The connection to the server; `events.ts` handles its events. */
-export const line = new Connection(
+export const connection = new Connection(
   (frame) => {
     samples.receive(frame)
-    viewsChanged()
+    scheduleFrame()
   },
-  (state) => useStudio.setState({ line: state }),
-  (reason) => refuse(reason),
+  (state) => useStudio.setState({ connectionState: state }),
+  (refusal) => refuse(refusal),
 )
 
 let notices = 0
@@ -136,7 +136,7 @@ export function refuse({ what, where, fix }: Pick<Fault, 'what' | 'where' | 'fix
 /** Send a request; a refusal is shown as a notice, and the promise then resolves to undefined. */
 export async function ask<R extends Request>(request: R): Promise<ReplyTo<R> | undefined> {
   try {
-    return await line.ask(request)
+    return await connection.ask(request)
   } catch (error) {
     if (!(error instanceof Refusal)) throw error
     refuse(error)
@@ -163,27 +163,27 @@ export async function change(edit: Edit): Promise<number | undefined> {
   const request = { kind: 'change' as const, ...alteration(state), inside, edit }
   if (edit.kind !== 'move') {
     const version = await ask(request)
-    if (version === undefined) look(inside)
+    if (version === undefined) openSheet(inside)
     return version
   }
   const { places = {}, notes = {} } = edit
   const { key } = request
-  showAhead({ key, document: state.document, inside: pathOf(inside), version: null, places, notes })
+  showMove({ key, document: state.document, inside: pathOf(inside), version: null, places, notes })
   const version = await ask(request)
   useStudio.setState((s) => ({
-    sent: s.sent.flatMap((move) =>
-      move.key !== key
-        ? [move]
+    sent: s.sent.flatMap((sentMove) =>
+      sentMove.key !== key
+        ? [sentMove]
         : version === undefined || version <= (s.document?.state.version ?? 0)
           ? []
-          : [{ ...move, version }],
+          : [{ ...sentMove, version }],
     ),
   }))
-  if (version === undefined) look(inside)
+  if (version === undefined) openSheet(inside)
   return version
 }
 
-function showAhead(move: SentMove): void {
+function showMove(move: SentMove): void {
   useStudio.setState((s) => ({
     sent: [...s.sent, move],
     document: s.document && withMoves(s.document, [move]),
@@ -199,11 +199,11 @@ export function showState(document: OpenDocument): Pick<Studio, 'document' | 'se
 /** Apply an edit to the sheet at a path of subsystems; a refusal is thrown to the caller. */
 export async function attempt(edit: Edit, inside: string[]): Promise<void> {
   const { document } = useStudio.getState()
-  if (document) await line.ask({ kind: 'change', ...alteration(document.state), inside, edit })
+  if (document) await connection.ask({ kind: 'change', ...alteration(document.state), inside, edit })
 }
 
 /** Undo or redo a step of a document, or reload its file. */
-export function alter(
+export function alterDocument(
   kind: 'undo' | 'redo' | 'reload',
   of: DocumentState | undefined = useStudio.getState().document?.state,
 ): void {
@@ -216,7 +216,7 @@ export function bringToFront({ document, kind, path, origin }: DocumentState): P
 }
 
 /** Show the sheet inside a subsystem; the empty path is the top sheet. */
-export function look(inside: string[]): void {
+export function openSheet(inside: string[]): void {
   const document = useStudio.getState().document
   if (document) void ask({ kind: 'look', document: document.state.document, inside })
 }
@@ -227,19 +227,19 @@ export async function showBlock(inside: string[], name: string): Promise<void> {
   if (!document) return
   if (document.inside.join('/') !== inside.join('/'))
     await ask({ kind: 'look', document: document.state.document, inside })
-  useStudio.setState({ selection: new Set([name]), sought: name })
+  useStudio.setState({ selection: new Set([name]), blockToCentre: name })
 }
 
 /** The names of the blocks and signals of the visible sheet, which a new block cannot have. */
-export function takenNames(): string[] {
+export function namesInUse(): string[] {
   const { blocks = {}, lines = {} } = useStudio.getState().document ?? {}
   return [...Object.keys(blocks), ...Object.values(lines).flatMap(({ name }) => (name ? [name] : []))]
 }
 
 /** An unused name for a new block: "Gain", "Gain 2", … */
-export function freeName(wish: string, taken: Iterable<string>): string {
-  const folded = new Set([...taken].map((name) => name.toLowerCase()))
-  if (!folded.has(wish.toLowerCase())) return wish
-  const stem = wish.replace(/ \d+$/, '')
+export function freeName(preferred: string, names: Iterable<string>): string {
+  const folded = new Set([...names].map((name) => name.toLowerCase()))
+  if (!folded.has(preferred.toLowerCase())) return preferred
+  const stem = preferred.replace(/ \d+$/, '')
   for (let k = 2; ; k++) if (!folded.has(`${stem} ${k}`.toLowerCase())) return `${stem} ${k}`
 }

@@ -24,9 +24,9 @@ export function ThemeSwitch() {
           value={colorScheme}
           onChange={(chosen) => setColorScheme(chosen as MantineColorScheme)}
         >
-          {THEMES.map(([theme, words]) => (
+          {THEMES.map(([theme, label]) => (
             <Menu.RadioItem key={theme} value={theme}>
-              {words}
+              {label}
             </Menu.RadioItem>
           ))}
         </Menu.RadioGroup>

@@ -1,5 +1,5 @@
 import { expect, test } from 'vitest'
-import { fitting, type RobotScene } from '../src/robot/scene'
+import { posesForScene, type RobotScene } from '../src/robot/scene'
 
 const scene: RobotScene = { name: 'arm', reach: 1, foot: 0, rows: 3, bodies: [], joints: [] }
 const row = [
@@ -8,10 +8,10 @@ const row = [
 ]
 
 test('bodies are not drawn with poses of another number of rows', () => {
-  const poses = fitting(scene, [row, row, row])
+  const poses = posesForScene(scene, [row, row, row])
   expect([poses?.(2, 3), poses?.(1, 4)]).toEqual([4, 5])
-  expect(fitting(scene, [row, row])).toBeUndefined()
-  expect(fitting(scene, [row, row, row, row])).toBeUndefined()
-  expect(fitting(scene, undefined)).toBeUndefined()
-  expect(fitting(null, [row])).toBeUndefined()
+  expect(posesForScene(scene, [row, row])).toBeUndefined()
+  expect(posesForScene(scene, [row, row, row, row])).toBeUndefined()
+  expect(posesForScene(scene, undefined)).toBeUndefined()
+  expect(posesForScene(null, [row])).toBeUndefined()
 })

@@ -15,12 +15,12 @@ import {
 import { useStudio } from '../store'
 import { align, distribute, flip, ground, rotate } from './arranging'
 
-const TURNS = [
+const BLOCK_COMMANDS = [
   { label: 'Rotate (Ctrl+R)', icon: IconRotateClockwise, run: rotate },
   { label: 'Flip (Ctrl+I)', icon: IconFlipVertical, run: flip },
   { label: 'Ground and terminate unconnected ports', icon: IconPlugX, run: ground },
 ]
-const ALIGNS = [
+const ALIGNMENTS = [
   { label: 'Align left edges', icon: IconLayoutAlignLeft, run: () => align('left') },
   { label: 'Align centres', icon: IconLayoutAlignCenter, run: () => align('centre') },
   { label: 'Align right edges', icon: IconLayoutAlignRight, run: () => align('right') },
@@ -28,7 +28,7 @@ const ALIGNS = [
   { label: 'Align middles', icon: IconLayoutAlignMiddle, run: () => align('middle') },
   { label: 'Align bottom edges', icon: IconLayoutAlignBottom, run: () => align('bottom') },
 ]
-const SPREADS = [
+const DISTRIBUTIONS = [
   { label: 'Equal gaps from left to right', icon: IconLayoutDistributeVertical, run: () => distribute('x') },
   {
     label: 'Equal gaps from top to bottom',
@@ -41,10 +41,10 @@ const SPREADS = [
 export function ArrangeBar() {
   const count = useStudio((s) => [...s.selection].filter((name) => s.document?.blocks[name]).length)
   if (count < 2) return null
-  const shown = [...TURNS, ...ALIGNS, ...(count > 2 ? SPREADS : [])]
+  const buttons = [...BLOCK_COMMANDS, ...ALIGNMENTS, ...(count > 2 ? DISTRIBUTIONS : [])]
   return (
     <div className="arrange-bar" role="toolbar" aria-label="Arrange the selected blocks">
-      {shown.map(({ label, icon: Icon, run }) => (
+      {buttons.map(({ label, icon: Icon, run }) => (
         <Tooltip key={label} label={label} openDelay={300}>
           <ActionIcon variant="subtle" color="gray" aria-label={label} onClick={run}>
             <Icon size={17} />

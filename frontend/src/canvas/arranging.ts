@@ -1,98 +1,106 @@
 import type { Place, SheetBlock } from '../protocol'
-import { change, freeName, takenNames, useStudio } from '../store'
+import { change, freeName, namesInUse, useStudio } from '../store'
 
 /** Commands on all selected blocks: each is one undo step. */
 
-export function chosenBlocks(): SheetBlock[] {
+export function selectedBlocks(): SheetBlock[] {
   const { document, selection } = useStudio.getState()
   return [...selection].map((name) => document?.blocks[name]).filter((block) => block !== undefined)
 }
 
-function place(change_: (block: SheetBlock) => Partial<Place>): void {
-  const chosen = chosenBlocks()
-  const places = Object.fromEntries(
-    chosen.map((block) => [block.name, { ...block.place, ...change_(block) }]),
+function changePlaces(change_: (block: SheetBlock) => Partial<Place>): void {
+  const selected = selectedBlocks()
+  const positions = Object.fromEntries(
+    selected.map((block) => [block.name, { ...block.place, ...change_(block) }]),
   )
-  const same = chosen.every((block) => JSON.stringify(places[block.name]) === JSON.stringify(block.place))
-  if (!same) void change({ kind: 'move', places })
+  const unchanged = selected.every(
+    (block) => JSON.stringify(positions[block.name]) === JSON.stringify(block.place),
+  )
+  if (!unchanged) void change({ kind: 'move', places: positions })
 }
 
-export const flip = (): void => place(({ place }) => ({ flipped: !place.flipped }))
+export const flip = (): void => changePlaces(({ place }) => ({ flipped: !place.flipped }))
 
 export function rotate(): void {
-  place(({ place }) => ({ rotation: (((place.rotation ?? 0) + 90) % 360) as 0 | 90 | 180 | 270 }))
+  changePlaces(({ place }) => ({ rotation: (((place.rotation ?? 0) + 90) % 360) as 0 | 90 | 180 | 270 }))
 }
 
 export const shift = (dx: number, dy: number): void =>
-  place(({ place }) => ({ x: place.x + dx, y: place.y + dy }))
+  changePlaces(({ place }) => ({ x: place.x + dx, y: place.y + dy }))
 
 export type Edge = 'left' | 'centre' | 'right' | 'top' | 'middle' | 'bottom'
 
-const right = ({ place, width }: SheetBlock) => place.x + width
-const bottom = ({ place, height }: SheetBlock) => place.y + height
+const rightOf = ({ place, width }: SheetBlock) => place.x + width
+const bottomOf = ({ place, height }: SheetBlock) => place.y + height
 
 /** Align the selected blocks: by an edge or by their centres. */
 export function align(edge: Edge): void {
-  const chosen = chosenBlocks()
-  const [left, far] = [Math.min(...chosen.map(({ place }) => place.x)), Math.max(...chosen.map(right))]
-  const [top, low] = [Math.min(...chosen.map(({ place }) => place.y)), Math.max(...chosen.map(bottom))]
-  const to: Record<Edge, (block: SheetBlock) => Partial<Place>> = {
+  const selected = selectedBlocks()
+  const [left, right] = [
+    Math.min(...selected.map(({ place }) => place.x)),
+    Math.max(...selected.map(rightOf)),
+  ]
+  const [top, bottom] = [
+    Math.min(...selected.map(({ place }) => place.y)),
+    Math.max(...selected.map(bottomOf)),
+  ]
+  const placeFor: Record<Edge, (block: SheetBlock) => Partial<Place>> = {
     left: () => ({ x: left }),
-    centre: ({ width }) => ({ x: (left + far - width) / 2 }),
-    right: ({ width }) => ({ x: far - width }),
+    centre: ({ width }) => ({ x: (left + right - width) / 2 }),
+    right: ({ width }) => ({ x: right - width }),
     top: () => ({ y: top }),
-    middle: ({ height }) => ({ y: (top + low - height) / 2 }),
-    bottom: ({ height }) => ({ y: low - height }),
+    middle: ({ height }) => ({ y: (top + bottom - height) / 2 }),
+    bottom: ({ height }) => ({ y: bottom - height }),
   }
-  place(to[edge])
+  changePlaces(placeFor[edge])
 }
 
 /** Make the gaps between the selected blocks equal; the outer two blocks do not move. */
 export function distribute(axis: 'x' | 'y'): void {
   const size = axis === 'x' ? 'width' : 'height'
-  const chosen = chosenBlocks().sort((a, b) => a.place[axis] - b.place[axis])
-  const [first, last] = [chosen[0], chosen.at(-1)]
-  if (!first || !last || chosen.length < 3) return
-  const room = last.place[axis] + last[size] - first.place[axis]
-  const gap = (room - chosen.reduce((sum, block) => sum + block[size], 0)) / (chosen.length - 1)
-  const at = new Map<string, number>()
-  let next = first.place[axis]
-  for (const block of chosen) {
-    at.set(block.name, next)
-    next += block[size] + gap
+  const selected = selectedBlocks().sort((a, b) => a.place[axis] - b.place[axis])
+  const [first, last] = [selected[0], selected.at(-1)]
+  if (!first || !last || selected.length < 3) return
+  const space = last.place[axis] + last[size] - first.place[axis]
+  const gap = (space - selected.reduce((sum, block) => sum + block[size], 0)) / (selected.length - 1)
+  const positions = new Map<string, number>()
+  let position = first.place[axis]
+  for (const block of selected) {
+    positions.set(block.name, position)
+    position += block[size] + gap
   }
-  place(({ name }) => ({ [axis]: at.get(name) }))
+  changePlaces(({ name }) => ({ [axis]: positions.get(name) }))
 }
 
 /** Comment the selected blocks out or through; if all of them are so already, remove their comments. */
-export function comment(how: 'out' | 'through'): void {
-  const chosen = chosenBlocks()
-  if (!chosen.length) return
-  const already = chosen.every((block) => block.comment === how)
-  const blocks = chosen.map(({ name }) => name)
-  void change({ kind: 'comment', blocks, comment: already ? '' : how })
+export function comment(mode: 'out' | 'through'): void {
+  const selected = selectedBlocks()
+  if (!selected.length) return
+  const allCommented = selected.every((block) => block.comment === mode)
+  const blocks = selected.map(({ name }) => name)
+  void change({ kind: 'comment', blocks, comment: allCommented ? '' : mode })
 }
 
 /** Set the side of the names of the selected blocks. */
 export function setNameSide(side: NonNullable<Place['name_side']>): void {
-  void change({ kind: 'appearance', blocks: chosenBlocks().map(({ name }) => name), name_side: side })
+  void change({ kind: 'appearance', blocks: selectedBlocks().map(({ name }) => name), name_side: side })
 }
 
 /** Set the background of the selected blocks. */
 export function setColour(colour: NonNullable<Place['colour']>): void {
-  void change({ kind: 'appearance', blocks: chosenBlocks().map(({ name }) => name), colour })
+  void change({ kind: 'appearance', blocks: selectedBlocks().map(({ name }) => name), colour })
 }
 
 /** Add Ground and Terminator blocks at the unconnected ports of the selected blocks, else of the sheet. */
 export function ground(): void {
-  void change({ kind: 'ground', blocks: chosenBlocks().map(({ name }) => name) })
+  void change({ kind: 'ground', blocks: selectedBlocks().map(({ name }) => name) })
 }
 
 /** Move the selected blocks into a new subsystem. */
 export function group(): void {
   const { document, select } = useStudio.getState()
-  const chosen = chosenBlocks()
-  if (!document || !chosen.length) return
-  const name = freeName('Subsystem', takenNames())
-  void change({ kind: 'group', blocks: chosen.map((block) => block.name), name }).then(() => select([name]))
+  const selected = selectedBlocks()
+  if (!document || !selected.length) return
+  const name = freeName('Subsystem', namesInUse())
+  void change({ kind: 'group', blocks: selected.map((block) => block.name), name }).then(() => select([name]))
 }

@@ -6,7 +6,7 @@ import { create } from 'zustand'
 import type { Finding, SheetPort, SheetBlock } from '../protocol'
 import { change } from '../store'
 import { ResizeHandles } from './resize_handles'
-import { nameWidth, PORT, side, WIDEST_NAME } from './sheet_layout'
+import { nameWidth, PORT, portSide, MAX_NAME_WIDTH } from './sheet_layout'
 
 export type BlockNodeType = Node<{ block: SheetBlock; findings: Finding[] }, 'block'>
 
@@ -35,16 +35,16 @@ export const BlockNode = memo(function BlockNode({
         aria-hidden
         dangerouslySetInnerHTML={{ __html: block.face }}
       />
-      {block.inputs.map((spot) => (
+      {block.inputs.map((port) => (
         <Port
-          key={`i${spot.name}`}
-          spot={spot}
+          key={`i${port.name}`}
+          port={port}
           output={false}
-          finding={findings.find(({ port }) => port === spot.name)}
+          finding={findings.find((finding) => finding.port === port.name)}
         />
       ))}
-      {block.outputs.map((spot) => (
-        <Port key={`o${spot.name}`} spot={spot} output finding={undefined} />
+      {block.outputs.map((port) => (
+        <Port key={`o${port.name}`} port={port} output finding={undefined} />
       ))}
       {block.link && <IconLink className="link" size={13} aria-label={`linked to ${block.link}`} />}
       <Name block={block} />
@@ -73,24 +73,24 @@ export const BlockNode = memo(function BlockNode({
 })
 
 interface PortProps {
-  spot: SheetPort
+  port: SheetPort
   output: boolean
   /** The error or warning about this port. */
   finding: Finding | undefined
 }
 
-function Port({ spot, output, finding }: PortProps) {
+function Port({ port, output, finding }: PortProps) {
   const marked = finding && (finding.severity === 'error' ? 'faulty' : 'unconnected')
-  const about = `${spot.name}: ${spot.doc}${spot.unit && `, ${spot.unit}`}`
+  const about = `${port.name}: ${port.doc}${port.unit && `, ${port.unit}`}`
   return (
     <Handle
-      id={spot.name}
+      id={port.name}
       type={output ? 'source' : 'target'}
-      position={side(spot, output)}
+      position={portSide(port, output)}
       className={marked ? `port ${marked}` : 'port'}
       style={{
-        left: spot.x - PORT / 2,
-        top: spot.y - PORT / 2,
+        left: port.x - PORT / 2,
+        top: port.y - PORT / 2,
         right: 'auto',
         bottom: 'auto',
         transform: 'none',
@@ -111,7 +111,7 @@ function Name({ block }: { block: SheetBlock }) {
   if (!editing)
     return (
       <div
-        className={`name ${block.name_at}${nameWidth(block.name) < WIDEST_NAME ? '' : ' long'}`}
+        className={`name ${block.name_at}${nameWidth(block.name) < MAX_NAME_WIDTH ? '' : ' long'}`}
         onDoubleClick={(event) => {
           event.stopPropagation()
           rename(block.name)

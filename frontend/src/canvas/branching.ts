@@ -1,13 +1,13 @@
 import type { ReactFlowInstance } from '@xyflow/react'
 import { create } from 'zustand'
-import { nearestInput, nearestOn } from '../model/branching'
+import { nearestInput, nearestPointOn } from '../model/branching'
 import type { Point } from '../model/wire_lines'
 import { change, useStudio } from '../store'
-import { endAt } from './connecting'
+import { connectAt } from './connecting'
 import { followPointer } from './pointer_drag'
 
 /** Distance from an input within which a new line ends there, screen px. */
-const REACH = 24
+const SNAP_PX = 24
 /** Movement from which a press on a line is a drag, screen px. */
 const DRAG_PX = 3
 
@@ -33,24 +33,24 @@ export function drawBranch(
   path: readonly Point[],
   pressed: PointerEvent | React.PointerEvent,
 ): void {
-  const point = (event: { clientX: number; clientY: number }): Point => {
+  const sheetPoint = (event: { clientX: number; clientY: number }): Point => {
     const { x, y } = flow.screenToFlowPosition({ x: event.clientX, y: event.clientY }, { snapToGrid: false })
     return [x, y]
   }
-  const from = nearestOn(path, point(pressed))
+  const from = nearestPointOn(path, sheetPoint(pressed))
   const move = (event: PointerEvent) => {
     const distance = Math.hypot(event.clientX - pressed.clientX, event.clientY - pressed.clientY)
     if (!useBranch.getState().branch && distance <= DRAG_PX) return
-    const at = point(event)
+    const pointer = sheetPoint(event)
     const blocks = Object.values(useStudio.getState().document?.blocks ?? {})
-    const found = nearestInput(blocks, at, REACH / flow.getZoom())
-    useBranch.setState({ branch: { source, from, to: found?.at ?? at, target: found?.port ?? null } })
+    const input = nearestInput(blocks, pointer, SNAP_PX / flow.getZoom())
+    useBranch.setState({ branch: { source, from, to: input?.at ?? pointer, target: input?.port ?? null } })
   }
   const drop = (event: PointerEvent) => {
     const { branch } = useBranch.getState()
     if (!branch) return
     if (branch.target) void change({ kind: 'connect', wire: { source, target: branch.target } })
-    else endAt({ x: event.clientX, y: event.clientY }, source, true)
+    else connectAt({ x: event.clientX, y: event.clientY }, source, true)
   }
-  followPointer(pressed, { move, drop, leave: () => useBranch.setState({ branch: null }) })
+  followPointer(pressed, { move, drop, finish: () => useBranch.setState({ branch: null }) })
 }

@@ -13,14 +13,14 @@ import {
   type NodeChange,
 } from '@xyflow/react'
 import { useRef, useState } from 'react'
-import { show } from '../dialogs'
+import { showDialog } from '../dialogs'
 import type { Places } from '../model/wires'
 import { WireValues } from '../run/wire_values'
-import { ask, change, look, useStudio } from '../store'
+import { ask, change, openSheet, useStudio } from '../store'
 import { ArrangeBar } from './arrange_bar'
 import { BlockNode } from './block_node'
-import { connectedTo } from './connecting'
-import { DragPreview, useCopies } from './copying'
+import { endConnection } from './connecting'
+import { DragPreview, useDraggedCopies } from './drag_preview'
 import { GRID } from './insert'
 import { NoteNode } from './note_node'
 import { Overview } from './overview'
@@ -31,9 +31,9 @@ import { useSheetDrawing } from './sheet_drawing'
 import type { SheetGraph, SheetNode } from './sheet_graph'
 import { useSheetKeys } from './sheet_keys'
 import { FIT } from './sheet_layout'
-import { useFitted, useNameScale, useSheetView, useSought } from './sheet_view'
+import { useFitView, useNameScale, useSheetView, useCentredBlock } from './sheet_view'
 import { SignalNames } from './signal_names'
-import { useSteady } from './steady'
+import { useStableHandlers } from './stable_handlers'
 import { Welcome } from './welcome'
 import { WireEdge, type WireEdgeType } from './wire_edge'
 
@@ -55,7 +55,7 @@ export function Canvas() {
               key={`${depth} ${name}`}
               component="button"
               size="sm"
-              onClick={() => look(inside.slice(0, depth))}
+              onClick={() => openSheet(inside.slice(0, depth))}
             >
               {name}
             </Anchor>
@@ -97,7 +97,7 @@ async function breakLink(linked: string[]): Promise<void> {
     inside: linked.slice(0, -1),
     edit: { kind: 'break_link', block },
   })
-  look(document.inside)
+  openSheet(document.inside)
 }
 
 function Sheet() {
@@ -107,40 +107,40 @@ function Sheet() {
   const scheme = useComputedColorScheme('light')
   const flow = useReactFlow<SheetNode, WireEdgeType>()
   const sheet = useRef<HTMLDivElement>(null)
-  const [chosenWires, setChosenWires] = useState<ReadonlySet<string>>(new Set())
-  const mouse = useSheetDrag(blocks, notes)
-  const { graph, nodes, edges, lines } = useSheetDrawing(mouse, chosenWires)
-  useSought(sheet, flow, blocks)
-  useSheetKeys(sheet, chosenWires, setChosenWires)
+  const [selectedWires, setSelectedWires] = useState<ReadonlySet<string>>(new Set())
+  const sheetDrag = useSheetDrag(blocks, notes)
+  const { graph, nodes, edges, lines } = useSheetDrawing(sheetDrag, selectedWires)
+  useCentredBlock(sheet, flow, blocks)
+  useSheetKeys(sheet, selectedWires, setSelectedWires)
   useSheetView(sheet, flow)
   useNameScale(sheet)
-  useFitted(sheet, flow)
-  const handlers = useSteady({
-    onNodesChange: (changes: NodeChange<SheetNode>[]) => nodesChanged(changes, graph, mouse),
-    onEdgesChange: (changes: EdgeChange<WireEdgeType>[]) => setChosenWires(chosenAfter(changes, chosenWires)),
-    ...dragHandlers(mouse, blocks, notes, wires, edges, flow.getZoom),
+  useFitView(sheet, flow)
+  const handlers = useStableHandlers({
+    onNodesChange: (changes: NodeChange<SheetNode>[]) => nodesChanged(changes, graph, sheetDrag),
+    onEdgesChange: (changes: EdgeChange<WireEdgeType>[]) =>
+      setSelectedWires(selectionAfter(changes, selectedWires)),
+    ...dragHandlers(sheetDrag, blocks, notes, wires, edges, flow.getZoom),
     onNodeClick: (event: React.MouseEvent, node: SheetNode) => {
-      if (!chooseAlone(event, node.id)) return
-      setChosenWires(new Set())
+      if (selectOnly(event, node.id)) setSelectedWires(new Set())
     },
     onNodeDoubleClick: (_: unknown, node: SheetNode) => node.type === 'block' && openBlock(node.data.block),
     onConnect: connect,
-    onConnectEnd: connectedTo,
+    onConnectEnd: endConnection,
   })
-  const right = useRightButton(flow, edges, setChosenWires)
-  const chosenEdge = chosenWires.size === 1 ? edges.find(({ selected }) => selected) : undefined
+  const rightButton = useRightButton(flow, edges, setSelectedWires)
+  const selectedEdge = selectedWires.size === 1 ? edges.find(({ selected }) => selected) : undefined
   const empty = Object.keys(blocks).length === 0 && Object.keys(notes).length === 0
   // An empty sheet would be fitted to the first block that is dropped on it, which would then jump.
-  const [begunWithBlocks] = useState(!empty)
+  const [initiallyFilled] = useState(!empty)
   return (
     <div
       className="canvas"
       ref={sheet}
       onFocus={selectFocused}
-      {...dropHandlers(mouse.setInto, flow, wires, edges)}
-      {...right}
+      {...dropHandlers(sheetDrag.setTargetWire, flow, wires, edges)}
+      {...rightButton}
     >
-      <WireHead />
+      <ArrowMarkers />
       <ReactFlow<SheetNode, WireEdgeType>
         nodes={nodes}
         edges={edges}
@@ -163,7 +163,7 @@ function Sheet() {
         zoomOnPinch
         minZoom={0.1}
         maxZoom={4}
-        fitView={begunWithBlocks}
+        fitView={initiallyFilled}
         fitViewOptions={FIT}
         elevateNodesOnSelect={false}
         aria-label="Diagram"
@@ -171,7 +171,7 @@ function Sheet() {
         <Background variant={BackgroundVariant.Dots} gap={20} size={1} />
         {!empty && <Controls showInteractive={false} fitViewOptions={FIT} />}
         <DragPreview />
-        <WireValues chosen={chosenEdge} />
+        <WireValues selectedEdge={selectedEdge} />
         <SignalNames lines={lines} />
         {Object.keys(blocks).length > 40 && <Overview blocks={blocks} />}
       </ReactFlow>
@@ -200,11 +200,11 @@ function selectFocused({ target }: React.FocusEvent): void {
 /** A double click on the empty sheet: choose a block by name and insert it there. */
 function insertAt(event: React.MouseEvent): void {
   if ((event.target as Element).classList.contains('react-flow__pane'))
-    show('insert', '', { x: event.clientX, y: event.clientY })
+    showDialog('insert', '', { x: event.clientX, y: event.clientY })
 }
 
 /** A click on one of several selected blocks selects it alone; whether it has changed the selection. */
-function chooseAlone({ ctrlKey, metaKey, shiftKey }: React.MouseEvent, id: string): boolean {
+function selectOnly({ ctrlKey, metaKey, shiftKey }: React.MouseEvent, id: string): boolean {
   const { selection, select } = useStudio.getState()
   if (ctrlKey || metaKey || shiftKey || selection.size < 2) return false
   select([id])
@@ -223,54 +223,58 @@ function connect({ source, sourceHandle, target, targetHandle }: Connection): vo
 function showCopies(places: Places): void {
   const { document } = useStudio.getState()
   const [first] = Object.keys(places)
-  const from = document?.blocks[first!]?.place ?? document?.notes[first!]
-  if (!from) return
+  const original = document?.blocks[first!]?.place ?? document?.notes[first!]
+  if (!original) return
   const { x, y } = places[first!]!
-  useCopies.setState({ names: Object.keys(places), shift: [x - from.x, y - from.y] })
+  useDraggedCopies.setState({ names: Object.keys(places), shift: [x - original.x, y - original.y] })
 }
 
 function nodesChanged(
   changes: NodeChange<SheetNode>[],
   graph: SheetGraph,
-  { setDrag, held }: SheetDrag,
+  { setDrag, effect }: SheetDrag,
 ): void {
   const places: Places = {}
-  let chosen: Set<string> | null = null
-  for (const one of changes) {
-    if (one.type === 'position' && one.position) places[one.id] = one.position
-    else if (one.type === 'select') {
-      chosen ??= new Set(useStudio.getState().selection)
-      if (one.selected) chosen.add(one.id)
-      else chosen.delete(one.id)
-    } else if (one.type === 'dimensions' && one.dimensions) graph.measured.set(one.id, one.dimensions)
+  let selected: Set<string> | null = null
+  for (const nodeChange of changes) {
+    if (nodeChange.type === 'position' && nodeChange.position) places[nodeChange.id] = nodeChange.position
+    else if (nodeChange.type === 'select') {
+      selected ??= new Set(useStudio.getState().selection)
+      if (nodeChange.selected) selected.add(nodeChange.id)
+      else selected.delete(nodeChange.id)
+    } else if (nodeChange.type === 'dimensions' && nodeChange.dimensions)
+      graph.measured.set(nodeChange.id, nodeChange.dimensions)
   }
   const names = Object.keys(places)
-  if (names.length && held.current.copies) showCopies(places)
+  if (names.length && effect.current.duplicates) showCopies(places)
   else if (names.length) setDrag((now) => ({ ...now, ...places }))
-  if (chosen) useStudio.getState().select(chosen)
+  if (selected) useStudio.getState().select(selected)
 }
 
 /** The selected wires after a selection change. */
-function chosenAfter(changes: EdgeChange<WireEdgeType>[], before: ReadonlySet<string>): ReadonlySet<string> {
-  const chosen = new Set(before)
-  for (const one of changes) {
-    if (one.type !== 'select') continue
-    if (one.selected) chosen.add(one.id)
-    else chosen.delete(one.id)
+function selectionAfter(
+  changes: EdgeChange<WireEdgeType>[],
+  previous: ReadonlySet<string>,
+): ReadonlySet<string> {
+  const selected = new Set(previous)
+  for (const edgeChange of changes) {
+    if (edgeChange.type !== 'select') continue
+    if (edgeChange.selected) selected.add(edgeChange.id)
+    else selected.delete(edgeChange.id)
   }
-  return chosen
+  return selected
 }
 
-const WIRE_HEADS = [
+const ARROW_MARKERS = [
   ['wire-head', 'f-wire'],
   ['selected-wire-head', 'f-accent'],
 ] as const
 
 /** The arrow heads that all wires share. */
-function WireHead() {
+function ArrowMarkers() {
   return (
     <svg className="defs" width="0" height="0" aria-hidden>
-      {WIRE_HEADS.map(([id, tone]) => (
+      {ARROW_MARKERS.map(([id, tone]) => (
         <marker
           key={id}
           id={id}

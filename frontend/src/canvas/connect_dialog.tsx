@@ -1,7 +1,7 @@
 import { Button, Group, Modal, Select, Stack } from '@mantine/core'
 import { useEffect, useMemo, useState } from 'react'
-import { show, useDialogs } from '../dialogs'
-import { SCROLLED } from '../scrolled'
+import { showDialog, useDialogs } from '../dialogs'
+import { SCROLLED } from '../dropdown_scrolling'
 import { change, useStudio } from '../store'
 
 /**
@@ -9,7 +9,7 @@ import { change, useStudio } from '../store'
  * option in a timer after the list opens; on a busy machine this happens after the first keys, and Enter
  * selects nothing.
  */
-const TYPED = {
+const PORT_SELECT = {
   ...SCROLLED,
   searchable: true,
   selectFirstOptionOnChange: true,
@@ -22,10 +22,10 @@ export function ConnectDialog() {
   const blocks = useStudio((s) => s.document?.blocks)
   const wires = useStudio((s) => s.document?.wires)
   const selection = useStudio((s) => s.selection)
-  const end = useDialogs((s) => s.end)
+  const connectTo = useDialogs((s) => s.connectTo)
   const [source, setSource] = useState<string | null>(null)
   const [target, setTarget] = useState<string | null>(null)
-  const close = () => show(null)
+  const close = () => showDialog(null)
   const sources = useMemo(
     () =>
       Object.values(blocks ?? {}).flatMap(({ name, outputs }) =>
@@ -41,14 +41,15 @@ export function ConnectDialog() {
   }, [blocks, wires])
   useEffect(() => {
     if (!opened) return
-    const of = (ports: string[]) =>
+    const portOfSelection = (ports: string[]) =>
       ports.find((port) => [...selection].some((name) => port.startsWith(`${name}/`))) ?? null
-    setSource(end?.isOutput ? end.port : end ? null : of(sources))
-    setTarget(end && !end.isOutput ? end.port : !end && selection.size > 1 ? of(targets) : null)
+    setSource(connectTo?.isOutput ? connectTo.port : connectTo ? null : portOfSelection(sources))
+    if (connectTo) setTarget(connectTo.isOutput ? null : connectTo.port)
+    else setTarget(selection.size > 1 ? portOfSelection(targets) : null)
     // The suggestion is computed once, when the dialog opens.
     // eslint-disable-next-line react-hooks/exhaustive-deps
   }, [opened])
-  const draw = () => {
+  const connect = () => {
     if (!source || !target) return
     close()
     void change({ kind: 'connect', wire: { source, target } })
@@ -58,12 +59,12 @@ export function ConnectDialog() {
       <form
         onSubmit={(event) => {
           event.preventDefault()
-          draw()
+          connect()
         }}
       >
         <Stack gap="sm">
           <Select
-            {...TYPED}
+            {...PORT_SELECT}
             label="From the output"
             data={sources}
             value={source}
@@ -72,7 +73,7 @@ export function ConnectDialog() {
             nothingFoundMessage="no such output"
           />
           <Select
-            {...TYPED}
+            {...PORT_SELECT}
             label="To the input"
             data={targets}
             value={target}

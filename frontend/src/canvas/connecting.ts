@@ -1,13 +1,13 @@
 import type { FinalConnectionState } from '@xyflow/react'
-import { show } from '../dialogs'
+import { showDialog } from '../dialogs'
 import { freePort } from '../model/free_port'
 import { change, useStudio } from '../store'
 
 /** The end of a drag from a port, unless it ends at another port. */
-export function connectedTo(event: MouseEvent | TouchEvent, state: FinalConnectionState): void {
+export function endConnection(event: MouseEvent | TouchEvent, state: FinalConnectionState): void {
   const { fromHandle, fromNode, toHandle, isValid } = state
   if (toHandle || isValid || !fromHandle?.id || !fromNode || !('clientX' in event)) return
-  endAt(
+  connectAt(
     { x: event.clientX, y: event.clientY },
     `${fromNode.id}/${fromHandle.id}`,
     fromHandle.type === 'source',
@@ -18,18 +18,18 @@ export function connectedTo(event: MouseEvent | TouchEvent, state: FinalConnecti
  * The end of a new line at a point of the window. On the body of a block the line takes its first free port.
  * On the empty sheet the list of blocks opens, and the chosen block is connected.
  */
-export function endAt(at: { x: number; y: number }, port: string, isOutput: boolean): void {
+export function connectAt(at: { x: number; y: number }, port: string, isOutput: boolean): void {
   const { document } = useStudio.getState()
   if (!document) return
-  const under = window.document.elementFromPoint(at.x, at.y)
-  const node = under?.closest('.react-flow__node')?.getAttribute('data-id')
-  if (node) {
-    const block = port.startsWith(`${node}/`) ? undefined : document.blocks[node]
+  const element = window.document.elementFromPoint(at.x, at.y)
+  const nodeName = element?.closest('.react-flow__node')?.getAttribute('data-id')
+  if (nodeName) {
+    const block = port.startsWith(`${nodeName}/`) ? undefined : document.blocks[nodeName]
     const other = block && freePort(block, isOutput, document.wires)
     if (other)
       void change({
         kind: 'connect',
         wire: isOutput ? { source: port, target: other } : { source: other, target: port },
       })
-  } else if (under?.closest('.canvas')) show('insert', '', at, { port, isOutput })
+  } else if (element?.closest('.canvas')) showDialog('insert', '', at, { port, isOutput })
 }

@@ -1,8 +1,8 @@
 import { create } from 'zustand'
-import { show } from '../dialogs'
+import { showDialog } from '../dialogs'
 import { ask, refuse, useStudio } from '../store'
-import { named } from './table_choice'
-import { insertBlock, placeAt } from './insert'
+import { withColumnNames } from './table_choice'
+import { insertBlock, sheetPointAt } from './insert'
 
 const SUFFIXES = /\.(csv|npz|mat|parquet)$/i
 
@@ -19,34 +19,34 @@ export interface DroppedTable {
 export const useDroppedTable = create<{ waiting: DroppedTable | null }>(() => ({ waiting: null }))
 
 /** Store a dropped table in the project folder and add a block with it, unless another file has its name. */
-export async function dropTable(name: string, content: string, at: DroppedTable['at']): Promise<void> {
+export async function dropTable(name: string, content: string, position: DroppedTable['at']): Promise<void> {
   if (!useStudio.getState().document) {
     refuse({ what: 'no diagram is open', where: name, fix: 'open a diagram, and drop the file on its sheet' })
     return
   }
-  const kept = await ask({ kind: 'keep_file', name, content })
-  if (!kept) return
-  if (kept.stored) return addTableBlock(kept.path, at)
-  useDroppedTable.setState({ waiting: { name, content, at } })
-  show('dropped_table')
+  const stored = await ask({ kind: 'keep_file', name, content })
+  if (!stored) return
+  if (stored.stored) return addTableBlock(stored.path, position)
+  useDroppedTable.setState({ waiting: { name, content, at: position } })
+  showDialog('dropped_table')
 }
 
 /** Replace the file of the same name. */
-export async function replaceTable({ name, content, at }: DroppedTable): Promise<void> {
-  const kept = await ask({ kind: 'keep_file', name, content, replace: true })
-  if (kept) await addTableBlock(kept.path, at)
+export async function replaceTable({ name, content, at: position }: DroppedTable): Promise<void> {
+  const stored = await ask({ kind: 'keep_file', name, content, replace: true })
+  if (stored) await addTableBlock(stored.path, position)
 }
 
 /** Add a block whose parameter is the table of a file, and open its dialog for the choice of columns. */
-export async function addTableBlock(file: string, at: DroppedTable['at']): Promise<void> {
-  for (const kind of useStudio.getState().library.values()) {
-    const rule = kind.parameters.find((parameter) => parameter.kind === 'table')
+export async function addTableBlock(file: string, position: DroppedTable['at']): Promise<void> {
+  for (const blockType of useStudio.getState().library.values()) {
+    const rule = blockType.parameters.find((parameter) => parameter.kind === 'table')
     if (!rule) continue
     const stem = file.replace(/^.*\//, '').replace(SUFFIXES, '')
     const choice = { file, time: '', columns: [] }
     const preview = await ask({ kind: 'preview_table', ...choice })
-    const parameters = { [rule.name]: preview ? named(choice, preview) : choice }
-    const name = await insertBlock(kind.type, placeAt(at), { parameters, name: stem })
+    const parameters = { [rule.name]: preview ? withColumnNames(choice, preview) : choice }
+    const name = await insertBlock(blockType.type, sheetPointAt(position), { parameters, name: stem })
     if (name !== undefined) useStudio.getState().edit(name)
     return
   }

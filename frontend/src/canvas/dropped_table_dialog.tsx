@@ -1,14 +1,14 @@
 import { Button, Group, Modal, Stack, Text } from '@mantine/core'
-import { show, useDialogs } from '../dialogs'
+import { showDialog, useDialogs } from '../dialogs'
 import { addTableBlock, replaceTable, useDroppedTable } from './dropped_table'
 
 /** Another file of the project has the name of a dropped table. */
 export function DroppedTableDialog() {
   const opened = useDialogs((s) => s.open === 'dropped_table')
   const waiting = useDroppedTable((s) => s.waiting)
-  const close = () => show(null)
+  const close = () => showDialog(null)
   if (!waiting) return null
-  const go = (act: () => Promise<void>) => {
+  const closeThen = (act: () => Promise<void>) => {
     close()
     void act()
   }
@@ -23,10 +23,10 @@ export function DroppedTableDialog() {
           <Button variant="default" onClick={close} data-autofocus>
             Cancel
           </Button>
-          <Button variant="default" onClick={() => go(() => addTableBlock(waiting.name, waiting.at))}>
+          <Button variant="default" onClick={() => closeThen(() => addTableBlock(waiting.name, waiting.at))}>
             Use the present file
           </Button>
-          <Button color="red" onClick={() => go(() => replaceTable(waiting))}>
+          <Button color="red" onClick={() => closeThen(() => replaceTable(waiting))}>
             Replace
           </Button>
         </Group>

@@ -1,6 +1,6 @@
 import { freeBelow, freeInView, type Rectangle } from '../model/free_place'
 import type { BlockType, Place, Wire } from '../protocol'
-import { change, freeName, takenNames, useStudio } from '../store'
+import { change, freeName, namesInUse, useStudio } from '../store'
 import { sheetView } from './sheet_actions'
 
 /** Drag data from the library: a block type. */
@@ -13,9 +13,9 @@ interface Insertion {
   /** The wire into which the block is inserted. */
   wire?: Wire
   /** Height of the wire that enters the first input, which is then exactly straight. */
-  level?: number
+  wireY?: number
   /** A port to which the block is connected; the point is then at the edge of the block. */
-  end?: { port: string; isOutput: boolean }
+  connectTo?: { port: string; isOutput: boolean }
   /** Whether the view is moved so that the block is visible. */
   reveal?: boolean
   /** The values of its parameters that differ from the defaults. */
@@ -28,56 +28,56 @@ interface Insertion {
 export async function insertBlock(
   type: string,
   at: { x: number; y: number },
-  { wire, level, end, reveal = false, parameters = {}, name: wish }: Insertion = {},
+  { wire, wireY, connectTo, reveal = false, parameters = {}, name: preferredName }: Insertion = {},
 ): Promise<string | undefined> {
   const { document, library, select } = useStudio.getState()
-  const kind = library.get(type)
-  if (!document || !kind) return undefined
-  const name = freeName((wish ?? kind.title).replace(/[/.]/g, ' '), takenNames())
-  const entry = level === undefined ? undefined : sideEntry(kind)
-  const part = !end ? 0.5 : end.isOutput ? 0 : 1
+  const blockType = library.get(type)
+  if (!document || !blockType) return undefined
+  const name = freeName((preferredName ?? blockType.title).replace(/[/.]/g, ' '), namesInUse())
+  const inputY = wireY === undefined ? undefined : leftInputY(blockType)
+  const fraction = !connectTo ? 0.5 : connectTo.isOutput ? 0 : 1
   const place: Place = {
-    x: GRID * Math.round((at.x - part * kind.width) / GRID),
-    y: entry === undefined ? GRID * Math.round((at.y - kind.height / 2) / GRID) : level! - entry,
+    x: GRID * Math.round((at.x - fraction * blockType.width) / GRID),
+    y: inputY === undefined ? GRID * Math.round((at.y - blockType.height / 2) / GRID) : wireY! - inputY,
   }
-  const [input, output] = [kind.inputs[0], kind.outputs[0]]
-  const between = wire && input && output
+  const [input, output] = [blockType.inputs[0], blockType.outputs[0]]
+  const splitsWire = wire && input && output
   const version = await change({
     kind: 'add',
     blocks: [{ name, type, place, parameters }],
-    wires: end
+    wires: connectTo
       ? [
-          end.isOutput
-            ? { source: end.port, target: `${name}/${input}` }
-            : { source: `${name}/${output}`, target: end.port },
+          connectTo.isOutput
+            ? { source: connectTo.port, target: `${name}/${input}` }
+            : { source: `${name}/${output}`, target: connectTo.port },
         ]
-      : between
+      : splitsWire
         ? [
             { source: wire.source, target: `${name}/${input}` },
             { source: `${name}/${output}`, target: wire.target },
           ]
         : [],
-    instead: between ? [wire] : [],
+    instead: splitsWire ? [wire] : [],
   })
   if (version === undefined) return undefined
   select([name])
-  if (reveal) sheetView.reveal?.({ ...place, width: kind.width, height: kind.height })
+  if (reveal) sheetView.reveal?.({ ...place, width: blockType.width, height: blockType.height })
   return name
 }
 
 /** The point of the sheet at a point of the window. */
-export function placeAt(at: { x: number; y: number }): { x: number; y: number } {
+export function sheetPointAt(clientPoint: { x: number; y: number }): { x: number; y: number } {
   const pane = document.querySelector('.react-flow__viewport')
   const matrix = new DOMMatrix(pane ? getComputedStyle(pane).transform : undefined)
   const corner = document.querySelector('.react-flow')?.getBoundingClientRect()
   return {
-    x: (at.x - (corner?.x ?? 0) - matrix.e) / matrix.a,
-    y: (at.y - (corner?.y ?? 0) - matrix.f) / matrix.a,
+    x: (clientPoint.x - (corner?.x ?? 0) - matrix.e) / matrix.a,
+    y: (clientPoint.y - (corner?.y ?? 0) - matrix.f) / matrix.a,
   }
 }
 
 /** Height of the first input, if it is at the left edge. */
-function sideEntry({ input_y, height }: BlockType): number | undefined {
+function leftInputY({ input_y, height }: BlockType): number | undefined {
   const [first] = input_y
   return first !== undefined && first > 0 && first < height ? first : undefined
 }
@@ -86,24 +86,24 @@ function sideEntry({ input_y, height }: BlockType): number | undefined {
 const GAP = 60
 
 /** Add a block by its name: right of the selected block, or else in the middle of the visible part. */
-export function addBlock(kind: BlockType): void {
+export function addBlock(blockType: BlockType): void {
   const { document, selection } = useStudio.getState()
   const blocks = Object.values(document?.blocks ?? {})
   const boxes = blocks.map(({ place: { x, y }, width, height }) => ({ x, y, width, height }))
-  const last = blocks.find(({ name }) => selection.has(name))
-  const { width, height } = kind
-  if (!last) {
+  const selected = blocks.find(({ name }) => selection.has(name))
+  const { width, height } = blockType
+  if (!selected) {
     const view = sheetView.visible?.() ?? { x: 0, y: 0, width: 600, height: 400 }
-    void insertBlock(kind.type, middleOf(freeInView({ width, height }, view, boxes)), { reveal: true })
+    void insertBlock(blockType.type, centreOf(freeInView({ width, height }, view, boxes)), { reveal: true })
     return
   }
-  const output = last.outputs.find(({ dx }) => dx > 0)
-  const level = last.place.y + (output?.y ?? last.height / 2)
-  const y = level - (sideEntry(kind) ?? height / 2)
-  const wanted = { x: last.place.x + last.width + GAP, y, width, height }
-  const found = freeBelow(wanted, boxes)
-  const straight = output ? { level: level + found.y - y } : {}
-  void insertBlock(kind.type, middleOf(found), { ...straight, reveal: true })
+  const output = selected.outputs.find(({ dx }) => dx > 0)
+  const level = selected.place.y + (output?.y ?? selected.height / 2)
+  const y = level - (leftInputY(blockType) ?? height / 2)
+  const preferred = { x: selected.place.x + selected.width + GAP, y, width, height }
+  const free = freeBelow(preferred, boxes)
+  const wireOption = output ? { wireY: level + free.y - y } : {}
+  void insertBlock(blockType.type, centreOf(free), { ...wireOption, reveal: true })
 }
 
-const middleOf = ({ x, y, width, height }: Rectangle) => ({ x: x + width / 2, y: y + height / 2 })
+const centreOf = ({ x, y, width, height }: Rectangle) => ({ x: x + width / 2, y: y + height / 2 })

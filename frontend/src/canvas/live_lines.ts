@@ -2,10 +2,10 @@ import { useEffect, useRef, useState } from 'react'
 import type { Lines } from '../model/wire_lines'
 import type { Places } from '../model/wires'
 import type { RouteWires, BlockCorner, Wire } from '../protocol'
-import { line, useStudio } from '../store'
+import { connection, useStudio } from '../store'
 
 /** The layout of a sheet during a drag, which differs from the document. */
-interface Dragged {
+interface DraggedLayout {
   places: Places
   /** The displayed wires, if they differ from those of the document. */
   wires: Wire[] | null
@@ -19,67 +19,68 @@ interface Routed {
 }
 
 /** The next request, and whether a request is pending. */
-interface Asking {
-  wanted: { request: RouteWires; base: Lines } | null
-  busy: boolean
+interface RouteRequests {
+  next: { request: RouteWires; base: Lines } | null
+  pending: boolean
   dragging: boolean
 }
 
 /** Time without a reply after which the wires of the moved blocks are drawn dashed, ms. */
-const LATE_MS = 120
+const OVERDUE_MS = 120
 
 /**
  * The lines of the displayed sheet. During a drag the server routes them: one request at a time, with the
- * latest layout. `late` is true if a reply is overdue.
+ * latest layout. `overdue` is true if a reply is overdue.
  */
-export function useLiveLines(dragged: Dragged | null): { lines: Lines; late: boolean } {
-  const kept = useStudio((s) => s.document!.lines)
+export function useLiveLines(dragged: DraggedLayout | null): { lines: Lines; overdue: boolean } {
+  const documentLines = useStudio((s) => s.document!.lines)
   const document = useStudio((s) => s.document!.state.document)
   const inside = useStudio((s) => s.document!.inside)
   const [routed, setRouted] = useState<Routed | null>(null)
-  const [late, setLate] = useState(false)
-  const asking = useRef<Asking>({ wanted: null, busy: false, dragging: false })
+  const [overdue, setOverdue] = useState(false)
+  const requests = useRef<RouteRequests>({ next: null, pending: false, dragging: false })
   useEffect(() => {
-    const now = asking.current
-    now.dragging = dragged !== null
-    const request = (of: Dragged): RouteWires => ({
+    const state = requests.current
+    state.dragging = dragged !== null
+    const request = (layout: DraggedLayout): RouteWires => ({
       kind: 'route',
       document,
       inside,
-      places: spots(of.places),
-      wires: of.wires,
-      passed: of.passed,
+      places: positions(layout.places),
+      wires: layout.wires,
+      passed: layout.passed,
     })
-    now.wanted = dragged && { request: request(dragged), base: kept }
+    state.next = dragged && { request: request(dragged), base: documentLines }
     if (!dragged) {
       setRouted(null)
-      setLate(false)
-    } else if (!now.busy) void follow(now, setRouted, setLate)
-  }, [dragged, document, inside, kept])
+      setOverdue(false)
+    } else if (!state.pending) void requestRoutes(state, setRouted, setOverdue)
+  }, [dragged, document, inside, documentLines])
   // Lines that were routed before the last change of the document are outdated, as at the end of a drag.
-  const lines = dragged && routed?.base === kept ? { ...kept, ...routed.lines } : kept
-  return { lines, late: late && dragged !== null }
+  const lines =
+    dragged && routed?.base === documentLines ? { ...documentLines, ...routed.lines } : documentLines
+  return { lines, overdue: overdue && dragged !== null }
 }
 
 /** Request the lines of the latest layout, until no newer layout is waiting. */
-async function follow(
-  now: Asking,
-  answer: (routed: Routed) => void,
-  setLate: (late: boolean) => void,
+async function requestRoutes(
+  state: RouteRequests,
+  setRouted: (routed: Routed) => void,
+  setOverdue: (overdue: boolean) => void,
 ): Promise<void> {
-  now.busy = true
-  while (now.wanted) {
-    const { request, base } = now.wanted
-    now.wanted = null
-    const timer = setTimeout(() => setLate(true), LATE_MS)
+  state.pending = true
+  while (state.next) {
+    const { request, base } = state.next
+    state.next = null
+    const timer = setTimeout(() => setOverdue(true), OVERDUE_MS)
     // The request is refused if the sheet has changed meanwhile: its lines are sent with the change.
-    const lines = await line.ask(request).catch(() => null)
+    const lines = await connection.ask(request).catch(() => null)
     clearTimeout(timer)
-    setLate(false)
-    if (lines && now.dragging) answer({ base, lines })
+    setOverdue(false)
+    if (lines && state.dragging) setRouted({ base, lines })
   }
-  now.busy = false
+  state.pending = false
 }
 
-const spots = (places: Places): Record<string, BlockCorner> =>
+const positions = (places: Places): Record<string, BlockCorner> =>
   Object.fromEntries(Object.entries(places).map(([name, { x, y }]) => [name, { x, y }]))

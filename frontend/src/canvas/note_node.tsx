@@ -7,42 +7,43 @@ import { change, useStudio } from '../store'
 export type NoteNodeType = Node<{ note: SheetNote }, 'note'>
 
 /** The note that is being edited, including new ones that are not on the sheet yet. */
-const useWriting = create<{ id: string | null }>(() => ({ id: null }))
+const useNoteEditing = create<{ id: string | null }>(() => ({ id: null }))
 
 /** Start a note at a position on the sheet. */
-export function writeNote(x: number, y: number): void {
+export function createNote(x: number, y: number): void {
   const { document, select } = useStudio.getState()
   if (!document) return
-  const taken = Object.keys(document.notes).map((id) => Number(id.slice(1)) || 0)
-  const id = `/${Math.max(0, ...taken) + 1}`
+  const numbers = Object.keys(document.notes).map((id) => Number(id.slice(1)) || 0)
+  const id = `/${Math.max(0, ...numbers) + 1}`
   void change({ kind: 'notes', notes: { [id]: { x: Math.round(x), y: Math.round(y), text: 'Note' } } }).then(
     (version) => {
       if (version === undefined) return
       select([id])
-      useWriting.setState({ id })
+      useNoteEditing.setState({ id })
     },
   )
 }
 
-export const editNote = (id: string): void => useWriting.setState({ id })
+export const editNote = (id: string): void => useNoteEditing.setState({ id })
 
 /** An annotation on the sheet; a double click edits it in place. */
 export const NoteNode = memo(function NoteNode({ id, data: { note }, selected }: NodeProps<NoteNodeType>) {
-  const writing = useWriting((s) => s.id === id)
+  const editing = useNoteEditing((s) => s.id === id)
   return (
     <div className={selected ? 'note selected' : 'note'} onDoubleClick={() => editNote(id)}>
-      {writing ? <Writing id={id} note={note} /> : note.text}
+      {editing ? <NoteEditor id={id} note={note} /> : note.text}
     </div>
   )
 })
 
-function Writing({ id, note }: { id: string; note: SheetNote }) {
+function NoteEditor({ id, note }: { id: string; note: SheetNote }) {
   const [text, setText] = useState(note.text)
-  const done = () => {
-    useWriting.setState({ id: null })
-    const said = text.trimEnd()
-    if (!said) void change({ kind: 'remove', notes: [id] })
-    else if (said !== note.text) void change({ kind: 'notes', notes: { [id]: { ...note, text: said } } })
+  const commit = () => {
+    useNoteEditing.setState({ id: null })
+    const trimmed = text.trimEnd()
+    if (!trimmed) void change({ kind: 'remove', notes: [id] })
+    else if (trimmed !== note.text)
+      void change({ kind: 'notes', notes: { [id]: { ...note, text: trimmed } } })
   }
   const field = useRef<HTMLTextAreaElement>(null)
   // A new note cannot have the focus before React Flow has measured and shown it.
@@ -66,11 +67,11 @@ function Writing({ id, note }: { id: string; note: SheetNote }) {
       value={text}
       onFocus={(event) => event.target.select()}
       onChange={(event) => setText(event.target.value)}
-      onBlur={done}
+      onBlur={commit}
       onKeyDown={(event) => {
         event.stopPropagation()
         if (event.key === 'Enter' && (event.ctrlKey || event.metaKey)) event.currentTarget.blur()
-        if (event.key === 'Escape') useWriting.setState({ id: null })
+        if (event.key === 'Escape') useNoteEditing.setState({ id: null })
       }}
     />
   )

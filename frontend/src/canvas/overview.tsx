@@ -4,7 +4,7 @@ import type { SheetBlock } from '../protocol'
 
 /** A small map of the sheet, shown while part of the sheet is outside the window. */
 export function Overview({ blocks }: { blocks: Record<string, SheetBlock> }) {
-  const [left, top, right, low] = useMemo(() => {
+  const [left, top, right, bottom] = useMemo(() => {
     const all = Object.values(blocks)
     return [
       Math.min(...all.map(({ place }) => place.x)),
@@ -13,13 +13,13 @@ export function Overview({ blocks }: { blocks: Record<string, SheetBlock> }) {
       Math.max(...all.map(({ place, height }) => place.y + height)),
     ]
   }, [blocks])
-  const beyond = useCallback(
+  const exceedsWindow = useCallback(
     ({ transform: [x, y, zoom], width, height }: ReactFlowState) =>
-      left * zoom + x < 0 || top * zoom + y < 0 || right * zoom + x > width || low * zoom + y > height,
-    [left, top, right, low],
+      left * zoom + x < 0 || top * zoom + y < 0 || right * zoom + x > width || bottom * zoom + y > height,
+    [left, top, right, bottom],
   )
   return (
-    useStore(beyond) && (
+    useStore(exceedsWindow) && (
       <MiniMap pannable zoomable ariaLabel="Map of the sheet" style={{ width: 160, height: 110 }} />
     )
   )

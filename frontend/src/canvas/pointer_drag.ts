@@ -2,39 +2,42 @@
 interface Drag {
   move: (event: PointerEvent) => void
   drop: (event: PointerEvent) => void
-  leave: () => void
+  finish: () => void
 }
 
 /**
  * Follow a pressed pointer until its button is released. Escape or a cancelled pointer ends the drag without
  * a drop.
  */
-export function followPointer(pressed: PointerEvent | React.PointerEvent, { move, drop, leave }: Drag): void {
-  const { button, pointerId } = pressed
-  const listening = new AbortController()
-  const { signal } = listening
-  const end = () => {
-    listening.abort()
-    leave()
+export function followPointer(
+  pointerDown: PointerEvent | React.PointerEvent,
+  { move, drop, finish }: Drag,
+): void {
+  const { button, pointerId } = pointerDown
+  const listeners = new AbortController()
+  const { signal } = listeners
+  const cancel = () => {
+    listeners.abort()
+    finish()
   }
   addEventListener('pointermove', (event) => event.pointerId === pointerId && move(event), { signal })
   addEventListener(
     'pointerup',
     (event) => {
       if (event.button !== button) return
-      listening.abort()
+      listeners.abort()
       drop(event)
-      leave()
+      finish()
     },
     { signal },
   )
-  addEventListener('pointercancel', end, { signal })
+  addEventListener('pointercancel', cancel, { signal })
   addEventListener(
     'keydown',
     (event) => {
       if (event.key !== 'Escape') return
       event.stopPropagation()
-      end()
+      cancel()
     },
     { signal, capture: true },
   )

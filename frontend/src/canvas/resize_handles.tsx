@@ -18,25 +18,30 @@ export function ResizeHandles({ block }: { block: SheetBlock }) {
   const [size, setSize] = useState<ReturnType<typeof resized> | null>(null)
   if (!alone) return null
   const { place, width, height } = block
-  const box = { x: place.x, y: place.y, width, height }
-  const take = (corner: Corner) => (event: React.PointerEvent<HTMLDivElement>) => {
+  const original = { x: place.x, y: place.y, width, height }
+  const startResize = (corner: Corner) => (event: React.PointerEvent<HTMLDivElement>) => {
     if (event.button !== 0) return
     event.stopPropagation()
     const [x, y] = [event.clientX, event.clientY]
     const handle = event.currentTarget
     handle.setPointerCapture(event.pointerId)
-    let now = box
+    let rectangle = original
     const ports = Math.max(block.inputs.length, block.outputs.length)
-    handle.onpointermove = (at) => {
+    handle.onpointermove = (move) => {
       const zoom = flow.getZoom()
-      now = resized(box, corner, { x: (at.clientX - x) / zoom, y: (at.clientY - y) / zoom }, ports)
-      setSize(now)
+      rectangle = resized(
+        original,
+        corner,
+        { x: (move.clientX - x) / zoom, y: (move.clientY - y) / zoom },
+        ports,
+      )
+      setSize(rectangle)
     }
     const end = (apply: boolean) => () => {
       handle.onpointermove = handle.onpointerup = handle.onpointercancel = null
       setSize(null)
-      if (apply && (now.width !== width || now.height !== height))
-        void change({ kind: 'move', places: { [block.name]: { ...place, ...now } } })
+      if (apply && (rectangle.width !== width || rectangle.height !== height))
+        void change({ kind: 'move', places: { [block.name]: { ...place, ...rectangle } } })
     }
     handle.onpointerup = end(true)
     handle.onpointercancel = end(false)
@@ -52,7 +57,7 @@ export function ResizeHandles({ block }: { block: SheetBlock }) {
             top: corner[1] < 0 ? -5 : height - 3,
             cursor: corner[0] === corner[1] ? 'nwse-resize' : 'nesw-resize',
           }}
-          onPointerDown={take(corner)}
+          onPointerDown={startResize(corner)}
         />
       ))}
       {size && (

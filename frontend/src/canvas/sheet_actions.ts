@@ -1,8 +1,8 @@
 import { showScope } from '../dock'
 import type { Rectangle } from '../model/free_place'
 import type { Place, SheetBlock, SheetNote, Wire } from '../protocol'
-import { change, look, useStudio } from '../store'
-import { writeNote } from './note_node'
+import { change, openSheet, useStudio } from '../store'
+import { createNote } from './note_node'
 import type { Places } from '../model/wires'
 
 /** Commands of the visible sheet; `null` while there is none. */
@@ -27,7 +27,7 @@ export const ZOOM_STEP = 1.25
 /** Start a note in the centre of the visible part. */
 export function addNote(): void {
   const view = sheetView.visible?.()
-  if (view) writeNote(view.x + view.width / 2, view.y + view.height / 2)
+  if (view) createNote(view.x + view.width / 2, view.y + view.height / 2)
 }
 
 /** The kinds of views with a chart in the panel of the scopes. */
@@ -45,22 +45,25 @@ export function openBlock(block: SheetBlock): void {
   const { document, edit } = useStudio.getState()
   const path = [...(document?.inside ?? []), block.name].join('/')
   if (chartOf(path)) showScope(path)
-  else if (block.opens && !block.mask.length && document) look([...document.inside, block.name])
+  else if (block.opens && !block.mask.length && document) openSheet([...document.inside, block.name])
   else edit(block.name)
 }
 
 /** Send the present positions of blocks and notes as one step; some wires may be rerouted. */
-export async function move(to: Places, wiring?: { wires: Wire[]; instead: Wire[] }): Promise<void> {
+export async function moveNodes(
+  positions: Places,
+  rewiring?: { wires: Wire[]; instead: Wire[] },
+): Promise<void> {
   const { document } = useStudio.getState()
   const places: Record<string, Place> = {}
   const notes: Record<string, SheetNote> = {}
-  for (const [id, at] of Object.entries(to)) {
-    const { x, y } = at
+  for (const [id, position] of Object.entries(positions)) {
+    const { x, y } = position
     const place = document?.blocks[id]?.place
     const note = document?.notes[id]
-    if (place && (wiring || place.x !== x || place.y !== y)) places[id] = { ...place, ...at }
+    if (place && (rewiring || place.x !== x || place.y !== y)) places[id] = { ...place, ...position }
     if (note && (note.x !== x || note.y !== y)) notes[id] = { ...note, x, y }
   }
   if (Object.keys(places).length || Object.keys(notes).length)
-    await change({ kind: 'move', places, notes, ...wiring })
+    await change({ kind: 'move', places, notes, ...rewiring })
 }

@@ -1,25 +1,32 @@
 import type { ReactFlowInstance } from '@xyflow/react'
 import { useEffect, useRef, useState } from 'react'
-import { isLoose, levelled, putInto, rewired, takenOut, wireAt } from '../model/rewiring'
+import {
+  isInsertable,
+  alignedPosition,
+  insertIntoWire,
+  wireDifference,
+  disconnectBlocks,
+  wireAt,
+} from '../model/rewiring'
 import { wireKey, type Places } from '../model/wires'
 import type { SheetBlock, SheetNote, Wire } from '../protocol'
 import { useStudio } from '../store'
 import { duplicateAt } from './clipboard'
-import { noCopies } from './copying'
+import { clearCopies } from './drag_preview'
 import { alignment, useGuides } from './guides'
 import { BLOCK_TYPE, insertBlock } from './insert'
-import { move } from './sheet_actions'
+import { moveNodes } from './sheet_actions'
 import type { SheetNode } from './sheet_graph'
 import type { WireEdgeType } from './wire_edge'
 
 /**
- * The dragged blocks that change wires: blocks that are disconnected, and an unconnected block that is
- * inserted into the wire on which it is dropped. `copies`: the drag duplicates the blocks.
+ * The effect of a drag on wires: names of disconnected blocks, and of an unconnected block that is inserted
+ * into the wire on which it is dropped. `duplicates`: the drag duplicates the blocks.
  */
-const NOTHING_HELD: { freed: readonly string[]; loose: string | null; copies: boolean } = {
-  freed: [],
-  loose: null,
-  copies: false,
+const NO_EFFECT: { disconnected: readonly string[]; insertable: string | null; duplicates: boolean } = {
+  disconnected: [],
+  insertable: null,
+  duplicates: false,
 }
 
 /**
@@ -28,83 +35,98 @@ const NOTHING_HELD: { freed: readonly string[]; loose: string | null; copies: bo
  */
 export function useSheetDrag(blocks: Record<string, SheetBlock>, notes: Record<string, SheetNote>) {
   const [drag, setDrag] = useState<Places>({})
-  const [{ freed, loose }, setHeld] = useState(NOTHING_HELD)
-  /** The blocks that change wires, available before the next rendering. */
-  const held = useRef(NOTHING_HELD)
+  const [{ disconnected, insertable }, setEffect] = useState(NO_EFFECT)
+  /** The effect of the drag, available before the next rendering. */
+  const effect = useRef(NO_EFFECT)
   /** The wire into which a dragged block would be inserted. */
-  const [into, setInto] = useState<string | null>(null)
-  const settled = useStudio((s) => s.sent.length === 0)
+  const [targetWire, setTargetWire] = useState<string | null>(null)
+  const synchronised = useStudio((s) => s.sent.length === 0)
   // When the server has applied the new positions, the displacements of the drag are discarded.
   useEffect(() => {
-    if (settled) setDrag((now) => (Object.keys(now).length ? {} : now))
-  }, [blocks, notes, settled])
-  return { drag, setDrag, freed, loose, held, setHeld, into, setInto }
+    if (synchronised) setDrag((now) => (Object.keys(now).length ? {} : now))
+  }, [blocks, notes, synchronised])
+  return { drag, setDrag, disconnected, insertable, effect, setEffect, targetWire, setTargetWire }
 }
 
 export type SheetDrag = ReturnType<typeof useSheetDrag>
 
 /** The handlers of a drag of blocks on the sheet. */
 export function dragHandlers(
-  { held, setHeld, setInto, setDrag }: SheetDrag,
+  { effect, setEffect, setTargetWire, setDrag }: SheetDrag,
   blocks: Record<string, SheetBlock>,
   notes: Record<string, SheetNote>,
   wires: Wire[],
   edges: WireEdgeType[],
   zoom: () => number,
 ) {
-  const takeHold = (event: MouseEvent | TouchEvent | React.MouseEvent, _: SheetNode, nodes: SheetNode[]) => {
-    const taken = present(
+  const startDrag = (event: MouseEvent | TouchEvent | React.MouseEvent, _: SheetNode, nodes: SheetNode[]) => {
+    const dragged = blocksByName(
       blocks,
       nodes.map(({ id }) => id),
     )
     if (event.ctrlKey || event.metaKey) {
-      setHeld((held.current = { ...NOTHING_HELD, copies: true }))
+      setEffect((effect.current = { ...NO_EFFECT, duplicates: true }))
       return
     }
-    const freed = event.shiftKey || event.altKey ? taken.map(({ name }) => name) : []
-    const [one] = taken
-    const alone = taken.length === 1 && one && isLoose(one, freed.length ? takenOut(taken, wires) : wires)
-    if (freed.length || alone)
-      setHeld((held.current = { freed, loose: alone ? one.name : null, copies: false }))
+    const disconnected = event.shiftKey || event.altKey ? dragged.map(({ name }) => name) : []
+    const [first] = dragged
+    const alone =
+      dragged.length === 1 &&
+      first &&
+      isInsertable(first, disconnected.length ? disconnectBlocks(dragged, wires) : wires)
+    if (disconnected.length || alone)
+      setEffect((effect.current = { disconnected, insertable: alone ? first.name : null, duplicates: false }))
   }
   /** Align the dragged blocks, unless Alt is pressed or the drag duplicates them. */
   const aligned = (event: MouseEvent | TouchEvent | React.MouseEvent, nodes: SheetNode[]) =>
-    event.altKey || held.current.copies ? NOT_ALIGNED : alignment(nodes, blocks, zoom())
-  const carry = (event: MouseEvent | TouchEvent | React.MouseEvent, node: SheetNode, nodes: SheetNode[]) => {
+    event.altKey || effect.current.duplicates ? NOT_ALIGNED : alignment(nodes, blocks, zoom())
+  const whileDragging = (
+    event: MouseEvent | TouchEvent | React.MouseEvent,
+    node: SheetNode,
+    nodes: SheetNode[],
+  ) => {
     const { dx, dy, guides } = aligned(event, nodes)
     useGuides.setState({ guides })
     if (dx || dy) setDrag((now) => ({ ...now, ...shifted(nodes, dx, dy) }))
-    const block = node.id === held.current.loose ? blocks[node.id] : undefined
-    if (block) setInto(keyOf(wireAt(middleOf(block, node.position), edges, wires)?.wire))
+    const block = node.id === effect.current.insertable ? blocks[node.id] : undefined
+    if (block) setTargetWire(keyOrNull(wireAt(centreOf(block, node.position), edges, wires)?.wire))
   }
-  const letGo = (event: MouseEvent | TouchEvent | React.MouseEvent, node: SheetNode, moved: SheetNode[]) => {
+  const endDrag = (
+    event: MouseEvent | TouchEvent | React.MouseEvent,
+    node: SheetNode,
+    moved: SheetNode[],
+  ) => {
     const { dx, dy } = aligned(event, moved)
     useGuides.setState({ guides: [] })
-    const to = shifted(moved, dx, dy)
-    const { freed, loose, copies } = held.current
-    held.current = NOTHING_HELD
-    if (copies) {
-      setHeld(NOTHING_HELD)
+    const positions = shifted(moved, dx, dy)
+    const { disconnected, insertable, duplicates } = effect.current
+    effect.current = NO_EFFECT
+    if (duplicates) {
+      setEffect(NO_EFFECT)
       setDrag({})
-      const from = blocks[node.id]?.place ?? notes[node.id]
-      const shift = from && ([node.position.x - from.x, node.position.y - from.y] as [number, number])
-      const chosen = moved.map(({ id }) => id)
-      noCopies()
-      if (shift && (shift[0] || shift[1])) void duplicateAt(chosen, shift)
+      const original = blocks[node.id]?.place ?? notes[node.id]
+      const offset =
+        original && ([node.position.x - original.x, node.position.y - original.y] as [number, number])
+      const names = moved.map(({ id }) => id)
+      clearCopies()
+      if (offset && (offset[0] || offset[1])) void duplicateAt(names, offset)
       return
     }
-    const left = freed.length ? takenOut(present(blocks, freed), wires) : wires
-    const block = loose === null ? undefined : blocks[loose]
-    const found = block && wireAt(middleOf(block, node.position), edges, wires)
-    if (found) to[block.name] = levelled(block, node.position, found)
-    const after = found ? putInto(block, found.wire, left) : left
+    const remainingWires = disconnected.length
+      ? disconnectBlocks(blocksByName(blocks, disconnected), wires)
+      : wires
+    const block = insertable === null ? undefined : blocks[insertable]
+    const target = block && wireAt(centreOf(block, node.position), edges, wires)
+    if (target) positions[block.name] = alignedPosition(block, node.position, target)
+    const wiresAfter = target ? insertIntoWire(block, target.wire, remainingWires) : remainingWires
     // The wires remain as drawn until the server has applied the edit.
-    void move(to, freed.length || found ? rewired(wires, after) : undefined).finally(() =>
-      setHeld((now) => (now === held.current ? now : NOTHING_HELD)),
-    )
-    setInto(null)
+    void moveNodes(
+      positions,
+      disconnected.length || target ? wireDifference(wires, wiresAfter) : undefined,
+    ).finally(() => setEffect((now) => (now === effect.current ? now : NO_EFFECT)))
+    setTargetWire(null)
   }
-  return { onNodeDragStart: takeHold, onNodeDrag: carry, onNodeDragStop: letGo }
+  return { onNodeDragStart: startDrag, onNodeDrag: whileDragging, onNodeDragStop: endDrag }
 }
 
 const NOT_ALIGNED = { dx: 0, dy: 0, guides: [] }
@@ -115,7 +137,7 @@ const shifted = (nodes: SheetNode[], dx: number, dy: number): Places =>
 
 /** The handlers of a drag of a block type from the library to the sheet. */
 export function dropHandlers(
-  setInto: SheetDrag['setInto'],
+  setTargetWire: SheetDrag['setTargetWire'],
   flow: ReactFlowInstance<SheetNode, WireEdgeType>,
   wires: Wire[],
   edges: WireEdgeType[],
@@ -124,17 +146,18 @@ export function dropHandlers(
     const type = event.dataTransfer.getData(BLOCK_TYPE)
     if (!type) return
     event.preventDefault()
-    const at = flow.screenToFlowPosition({ x: event.clientX, y: event.clientY }, { snapToGrid: false })
-    const found = wireAt(at, edges, wires)
-    setInto(null)
-    if (found) void insertBlock(type, { x: at.x, y: found.y }, { wire: found.wire, level: found.y })
-    else void insertBlock(type, at)
+    const point = flow.screenToFlowPosition({ x: event.clientX, y: event.clientY }, { snapToGrid: false })
+    const segment = wireAt(point, edges, wires)
+    setTargetWire(null)
+    if (segment)
+      void insertBlock(type, { x: point.x, y: segment.y }, { wire: segment.wire, wireY: segment.y })
+    else void insertBlock(type, point)
   }
   const hover = (event: React.DragEvent) => {
     event.preventDefault()
     if (!event.dataTransfer.types.includes(BLOCK_TYPE)) return
-    setInto(
-      keyOf(
+    setTargetWire(
+      keyOrNull(
         wireAt(
           flow.screenToFlowPosition({ x: event.clientX, y: event.clientY }, { snapToGrid: false }),
           edges,
@@ -143,15 +166,15 @@ export function dropHandlers(
       ),
     )
   }
-  return { onDragOver: hover, onDragLeave: () => setInto(null), onDrop: drop }
+  return { onDragOver: hover, onDragLeave: () => setTargetWire(null), onDrop: drop }
 }
 
-const keyOf = (wire: Wire | undefined): string | null => (wire ? wireKey(wire) : null)
+const keyOrNull = (wire: Wire | undefined): string | null => (wire ? wireKey(wire) : null)
 
-export const present = (blocks: Record<string, SheetBlock>, names: readonly string[]): SheetBlock[] =>
+export const blocksByName = (blocks: Record<string, SheetBlock>, names: readonly string[]): SheetBlock[] =>
   names.map((name) => blocks[name]).filter((block) => block !== undefined)
 
-const middleOf = ({ width, height }: SheetBlock, at: { x: number; y: number }) => ({
+const centreOf = ({ width, height }: SheetBlock, at: { x: number; y: number }) => ({
   x: at.x + width / 2,
   y: at.y + height / 2,
 })

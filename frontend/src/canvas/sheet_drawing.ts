@@ -1,48 +1,52 @@
 import { useMemo, useState } from 'react'
-import { takenOut } from '../model/rewiring'
+import { disconnectBlocks } from '../model/rewiring'
 import { wireKey, type Places } from '../model/wires'
 import type { Finding } from '../protocol'
 import { useStudio } from '../store'
-import { present, type SheetDrag } from './sheet_drag'
+import { blocksByName, type SheetDrag } from './sheet_drag'
 import { SheetGraph } from './sheet_graph'
 import { useLiveLines } from './live_lines'
 import { useBending } from './wire_edge'
 
 /** The nodes and edges of the visible sheet, including the present drag. */
-export function useSheetDrawing({ drag, freed, loose, into }: SheetDrag, chosenWires: ReadonlySet<string>) {
+export function useSheetDrawing(
+  { drag, disconnected, insertable, targetWire }: SheetDrag,
+  selectedWires: ReadonlySet<string>,
+) {
   const blocks = useStudio((s) => s.document!.blocks)
   const wires = useStudio((s) => s.document!.wires)
   const notes = useStudio((s) => s.document!.notes)
-  const found = useStudio((s) => s.document!.findings)
+  const checkFindings = useStudio((s) => s.document!.findings)
   const strict = useStudio((s) => s.strict)
   const findings = useMemo(
-    () => (strict ? found.map((one): Finding => ({ ...one, severity: 'error' })) : found),
-    [found, strict],
+    () =>
+      strict ? checkFindings.map((finding): Finding => ({ ...finding, severity: 'error' })) : checkFindings,
+    [checkFindings, strict],
   )
   const kinds = useStudio((s) => s.document!.wireKinds)
-  const level = useStudio((s) => s.document!.inside.map((name) => `${name}/`).join(''))
+  const pathPrefix = useStudio((s) => s.document!.inside.map((name) => `${name}/`).join(''))
   const selection = useStudio((s) => s.selection)
   const sent = useStudio((s) => s.sent)
   const bending = useBending((s) => s.wire)
   const [graph] = useState(() => new SheetGraph())
-  const shown = useMemo(() => {
+  const drawnWires = useMemo(() => {
     if (bending) return wires.map((wire) => (wireKey(wire) === wireKey(bending) ? bending : wire))
-    return freed.length ? takenOut(present(blocks, freed), wires) : wires
-  }, [wires, bending, freed, blocks])
+    return disconnected.length ? disconnectBlocks(blocksByName(blocks, disconnected), wires) : wires
+  }, [wires, bending, disconnected, blocks])
   const dragged = useMemo(
     () =>
-      shown === wires && loose === null && !Object.keys(drag).length
+      drawnWires === wires && insertable === null && !Object.keys(drag).length
         ? null
-        : { places: drag, wires: shown === wires ? null : shown, passed: loose },
-    [drag, shown, wires, loose],
+        : { places: drag, wires: drawnWires === wires ? null : drawnWires, passed: insertable },
+    [drag, drawnWires, wires, insertable],
   )
-  const { lines, late } = useLiveLines(dragged)
+  const { lines, overdue } = useLiveLines(dragged)
   const nodes = useMemo(
-    () => graph.nodes(blocks, notes, findings, level, drag, selection),
-    [graph, blocks, notes, findings, level, drag, selection],
+    () => graph.nodes(blocks, notes, findings, pathPrefix, drag, selection),
+    [graph, blocks, notes, findings, pathPrefix, drag, selection],
   )
   /** Blocks whose wires the server has not routed again yet. */
-  const moved = useMemo(
+  const pendingPlaces = useMemo(
     () => Object.assign({}, ...sent.map(({ places }) => places), drag) as Places,
     [sent, drag],
   )
@@ -50,16 +54,16 @@ export function useSheetDrawing({ drag, freed, loose, into }: SheetDrag, chosenW
     () =>
       graph.edges({
         blocks,
-        wires: shown,
-        drag: moved,
+        wires: drawnWires,
+        drag: pendingPlaces,
         lines,
-        late,
+        overdue,
         kinds,
-        level,
-        chosen: chosenWires,
-        into,
+        pathPrefix,
+        selectedWires,
+        targetWire,
       }),
-    [graph, blocks, shown, moved, lines, late, kinds, level, chosenWires, into],
+    [graph, blocks, drawnWires, pendingPlaces, lines, overdue, kinds, pathPrefix, selectedWires, targetWire],
   )
   return { graph, nodes, edges, lines }
 }

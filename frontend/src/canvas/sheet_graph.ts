@@ -1,11 +1,11 @@
 import type { NodeHandle } from '@xyflow/react'
 import type { Finding, SheetPort, SheetBlock, SheetNote, Wire, WireKind, WireLines } from '../protocol'
 import type { BlockNodeType } from './block_node'
-import { wholeWay } from '../model/bends'
+import { completeRoute } from '../model/bends'
 import type { NoteNodeType } from './note_node'
-import { attached, endsOf, fits, type Lines, type Point } from '../model/wire_lines'
+import { stretchedToPorts, endsOf, endsAtPorts, type Lines, type Point } from '../model/wire_lines'
 import { blockOf, portOf, wireKey, type Places } from '../model/wires'
-import { PORT, side } from './sheet_layout'
+import { PORT, portSide } from './sheet_layout'
 import type { WireEdgeType, WireTag } from './wire_edge'
 
 export type SheetNode = BlockNodeType | NoteNodeType
@@ -20,21 +20,23 @@ const SCALAR: WireKind = { shape: [], unit: '' }
  * A cache of objects by name. An object is created again only if its inputs have changed, so that an edit
  * renders only what it affects.
  */
-class Kept<T> {
-  private known = new Map<string, { from: readonly unknown[]; made: T }>()
-  private seen = new Map<string, { from: readonly unknown[]; made: T }>()
+class ObjectCache<T> {
+  private previous = new Map<string, { from: readonly unknown[]; object: T }>()
+  private current = new Map<string, { from: readonly unknown[]; object: T }>()
 
-  get(name: string, from: readonly unknown[], make: () => T): T {
-    const old = this.known.get(name)
-    const entry = old?.from.every((value, k) => Object.is(value, from[k])) ? old : { from, made: make() }
-    this.seen.set(name, entry)
-    return entry.made
+  get(name: string, inputs: readonly unknown[], create: () => T): T {
+    const cached = this.previous.get(name)
+    const entry = cached?.from.every((value, k) => Object.is(value, inputs[k]))
+      ? cached
+      : { from: inputs, object: create() }
+    this.current.set(name, entry)
+    return entry.object
   }
 
   /** Drop entries that were not used since the last call. */
-  turn(): void {
-    this.known = this.seen
-    this.seen = new Map()
+  dropUnused(): void {
+    this.previous = this.current
+    this.current = new Map()
   }
 }
 
@@ -45,40 +47,40 @@ interface DrawnWires {
   drag: Places
   lines: Lines
   /** Whether the server's routes for the dragged blocks are overdue. */
-  late: boolean
+  overdue: boolean
   kinds: Record<string, WireKind>
-  level: string
-  chosen: ReadonlySet<string>
-  into: string | null
+  pathPrefix: string
+  selectedWires: ReadonlySet<string>
+  targetWire: string | null
 }
 
 /** The nodes and edges of one sheet, for React Flow. */
 export class SheetGraph {
   /** Sizes of notes, measured by React Flow. */
   readonly measured = new Map<string, { width: number; height: number }>()
-  private blocks = new Kept<BlockNodeType>()
-  private notes = new Kept<NoteNodeType>()
-  private wires = new Kept<WireEdgeType>()
-  private lastNodes: SheetNode[] = []
-  private lastEdges: WireEdgeType[] = []
+  private blocks = new ObjectCache<BlockNodeType>()
+  private notes = new ObjectCache<NoteNodeType>()
+  private wires = new ObjectCache<WireEdgeType>()
+  private previousNodes: SheetNode[] = []
+  private previousEdges: WireEdgeType[] = []
 
   nodes(
     blocks: Record<string, SheetBlock>,
     notes: Record<string, SheetNote>,
     findings: Finding[],
-    level: string,
+    pathPrefix: string,
     drag: Places,
     selection: ReadonlySet<string>,
   ): SheetNode[] {
-    const found = byBlock(findings, level)
-    const made: SheetNode[] = Object.values(blocks).map((block) => {
+    const findingsByBlock = groupByBlock(findings, pathPrefix)
+    const nodes: SheetNode[] = Object.values(blocks).map((block) => {
       const { name } = block
-      const own = found.get(name) ?? NO_FINDINGS
+      const blockFindings = findingsByBlock.get(name) ?? NO_FINDINGS
       const [x, y] = [drag[name]?.x ?? block.place.x, drag[name]?.y ?? block.place.y]
       const selected = selection.has(name)
       return this.blocks.get(
         name,
-        [block, own === NO_FINDINGS ? '' : JSON.stringify(own), x, y, selected],
+        [block, blockFindings === NO_FINDINGS ? '' : JSON.stringify(blockFindings), x, y, selected],
         () => ({
           id: name,
           type: 'block',
@@ -89,11 +91,11 @@ export class SheetGraph {
           // All sizes are known, so React Flow need not measure blocks.
           measured: { width: block.width, height: block.height },
           handles: [
-            ...block.inputs.map((spot) => port(spot, false)),
-            ...block.outputs.map((spot) => port(spot, true)),
+            ...block.inputs.map((portSpot) => port(portSpot, false)),
+            ...block.outputs.map((portSpot) => port(portSpot, true)),
           ],
           ariaLabel: [name, block.title, COMMENTED[block.comment ?? '']].filter(Boolean).join(', '),
-          data: { block, findings: own },
+          data: { block, findings: blockFindings },
         }),
       )
     })
@@ -101,7 +103,7 @@ export class SheetGraph {
       const [x, y] = [drag[id]?.x ?? note.x, drag[id]?.y ?? note.y]
       const measured = this.measured.get(id)
       const selected = selection.has(id)
-      made.push(
+      nodes.push(
         this.notes.get(id, [note, x, y, measured, selected], () => ({
           id,
           type: 'note',
@@ -113,29 +115,37 @@ export class SheetGraph {
         })),
       )
     }
-    this.blocks.turn()
-    this.notes.turn()
-    return (this.lastNodes = unlessSame(this.lastNodes, made))
+    this.blocks.dropUnused()
+    this.notes.dropUnused()
+    return (this.previousNodes = reuseIfEqual(this.previousNodes, nodes))
   }
 
-  edges({ wires, lines, kinds, level, chosen, into, ...drawn }: DrawnWires): WireEdgeType[] {
+  edges({
+    wires,
+    lines,
+    kinds,
+    pathPrefix,
+    selectedWires,
+    targetWire,
+    ...drawn
+  }: DrawnWires): WireEdgeType[] {
     const dotted = new Set<string>()
     const labelled = new Set<string>()
-    const made = wires.map((wire) => {
+    const edges = wires.map((wire) => {
       const net = lines[wire.source]
-      const kind = kinds[level + wire.source] ?? SCALAR
+      const kind = kinds[pathPrefix + wire.source] ?? SCALAR
       const key = wireKey(wire)
       const dots = dotted.has(wire.source) ? NO_POINTS : (net?.dots ?? NO_POINTS)
       dotted.add(wire.source)
       const { path, pending } = this.path(wire, net, drawn)
       const tags = path.length || !net ? NO_TAGS : tagsOf(wire, net.label, drawn, labelled)
       const rank = kind.bus ? 3 : Math.min(kind.shape.length, 2)
-      const carried = [kind.shape.join(' × '), kind.unit].filter(Boolean)
-      const label = [`${wire.source} to ${wire.target}`, ...carried].join(', ')
-      const selected = chosen.has(key)
-      const place = tags.map(({ x, y }) => `${x} ${y}`).join(' ')
-      const from = [path, dots, net, rank, label, selected, wire, key === into, pending, place]
-      return this.wires.get(key, from, () => ({
+      const valueType = [kind.shape.join(' × '), kind.unit].filter(Boolean)
+      const label = [`${wire.source} to ${wire.target}`, ...valueType].join(', ')
+      const selected = selectedWires.has(key)
+      const tagPositions = tags.map(({ x, y }) => `${x} ${y}`).join(' ')
+      const inputs = [path, dots, net, rank, label, selected, wire, key === targetWire, pending, tagPositions]
+      return this.wires.get(key, inputs, () => ({
         id: key,
         type: 'wire',
         source: blockOf(wire.source),
@@ -143,7 +153,7 @@ export class SheetGraph {
         target: blockOf(wire.target),
         targetHandle: portOf(wire.target),
         selected,
-        className: key === into ? 'into' : '',
+        className: key === targetWire ? 'into' : '',
         ariaLabel: `wire from ${wire.source} to ${wire.target}`,
         data: {
           path,
@@ -153,19 +163,19 @@ export class SheetGraph {
           bent: Boolean(wire.bends?.length),
           pending,
           tags,
-          way: () => (net ? wholeWay(net, wire.target) : []),
+          route: () => (net ? completeRoute(net, wire.target) : []),
         },
       }))
     })
-    this.wires.turn()
-    return (this.lastEdges = unlessSame(this.lastEdges, made))
+    this.wires.dropUnused()
+    return (this.previousEdges = reuseIfEqual(this.previousEdges, edges))
   }
 
   /** The path of a wire; `pending`: the server has not routed the wire yet. */
   private path(
     wire: Wire,
     net: WireLines | undefined,
-    { blocks, drag, late }: Pick<DrawnWires, 'blocks' | 'drag' | 'late'>,
+    { blocks, drag, overdue }: Pick<DrawnWires, 'blocks' | 'drag' | 'overdue'>,
   ): { path: readonly Point[]; pending: boolean } {
     const path = net?.paths[wire.target]
     if (path && !(blockOf(wire.source) in drag) && !(blockOf(wire.target) in drag))
@@ -173,8 +183,8 @@ export class SheetGraph {
     const ends = endsOf(wire, blocks, drag)
     const branches = Boolean(path?.[0] && net?.dots.some(([x, y]) => x === path[0]![0] && y === path[0]![1]))
     if (!ends || path?.length === 0) return { path: NO_POINTS, pending: false }
-    if (path && fits(path, branches, ends)) return { path, pending: false }
-    return { path: attached(path ?? NO_POINTS, branches, ends), pending: late || !path }
+    if (path && endsAtPorts(path, branches, ends)) return { path, pending: false }
+    return { path: stretchedToPorts(path ?? NO_POINTS, branches, ends), pending: overdue || !path }
   }
 }
 
@@ -187,33 +197,33 @@ function tagsOf(
 ): WireTag[] {
   const ends = endsOf(wire, blocks, drag)
   if (!ends) return NO_TAGS
-  const shown = labelled.has(wire.source) ? ends.slice(1) : ends
+  const unlabelledEnds = labelled.has(wire.source) ? ends.slice(1) : ends
   labelled.add(wire.source)
-  return shown.map((end) => ({ ...end, text }))
+  return unlabelledEnds.map((end) => ({ ...end, text }))
 }
 
-const port = (spot: SheetPort, output: boolean): NodeHandle => ({
-  id: spot.name,
+const port = (portSpot: SheetPort, output: boolean): NodeHandle => ({
+  id: portSpot.name,
   type: output ? 'source' : 'target',
-  position: side(spot, output),
-  x: spot.x - PORT / 2,
-  y: spot.y - PORT / 2,
+  position: portSide(portSpot, output),
+  x: portSpot.x - PORT / 2,
+  y: portSpot.y - PORT / 2,
   width: PORT,
   height: PORT,
 })
 
 /** Return the previous list if it has the same elements, so that React renders nothing. */
-function unlessSame<T>(before: T[], now: T[]): T[] {
-  return before.length === now.length && now.every((one, k) => one === before[k]) ? before : now
+function reuseIfEqual<T>(before: T[], next: T[]): T[] {
+  return before.length === next.length && next.every((one, k) => one === before[k]) ? before : next
 }
 
 /** The findings of the check, by the block of this sheet. */
-function byBlock(findings: Finding[], level: string): Map<string, Finding[]> {
-  const found = new Map<string, Finding[]>()
+function groupByBlock(findings: Finding[], pathPrefix: string): Map<string, Finding[]> {
+  const findingsByBlock = new Map<string, Finding[]>()
   for (const finding of findings) {
-    if (!finding.block.startsWith(level)) continue
-    const name = finding.block.slice(level.length).split('/')[0]!
-    found.set(name, [...(found.get(name) ?? []), finding])
+    if (!finding.block.startsWith(pathPrefix)) continue
+    const name = finding.block.slice(pathPrefix.length).split('/')[0]!
+    findingsByBlock.set(name, [...(findingsByBlock.get(name) ?? []), finding])
   }
-  return found
+  return findingsByBlock
 }

@@ -1,23 +1,23 @@
 import { useEffect, type RefObject } from 'react'
 import { commandOf } from '../commands'
-import { show, useDialogs } from '../dialogs'
-import { change, look, useStudio } from '../store'
-import { chosenBlocks } from './arranging'
+import { showDialog, useDialogs } from '../dialogs'
+import { change, openSheet, useStudio } from '../store'
+import { selectedBlocks } from './arranging'
 import { rename } from './block_node'
 import { editNote } from './note_node'
-import { addNote, move, openBlock, sheetView, ZOOM_STEP } from './sheet_actions'
+import { addNote, moveNodes, openBlock, sheetView, ZOOM_STEP } from './sheet_actions'
 import { wireKey, type Places } from '../model/wires'
 
-const NUDGE = 5
+const ARROW_STEP = 5
 
 /** Keys typed before the list of blocks has the focus. */
-function typedSoFar(): string {
+function pendingText(): string {
   const { open, typed } = useDialogs.getState()
   return open === 'insert' ? typed : ''
 }
 
 /** Keys that press a button or leave it; all others are keys of the sheet also after a button was pressed. */
-const PRESSING = new Set(['Enter', ' ', 'Tab'])
+const BUTTON_KEYS = new Set(['Enter', ' ', 'Tab'])
 
 /** Whether an element is a button whose group does not use the arrow keys. */
 const isButton = (element: Element | null): boolean =>
@@ -25,9 +25,9 @@ const isButton = (element: Element | null): boolean =>
   !element.closest('[role="tablist"], [role="radiogroup"], [role="listbox"], .timeline, .stage')
 
 /** Delete the selected blocks, notes and wires. */
-export function removeChosen(chosenWires: ReadonlySet<string>): void {
+export function removeSelected(selectedWires: ReadonlySet<string>): void {
   const { document, selection, select } = useStudio.getState()
-  const wires = (document?.wires ?? []).filter((wire) => chosenWires.has(wireKey(wire)))
+  const wires = (document?.wires ?? []).filter((wire) => selectedWires.has(wireKey(wire)))
   const blocks = [...selection].filter((name) => document?.blocks[name])
   const notes = [...selection].filter((name) => document?.notes[name])
   if (blocks.length || wires.length || notes.length) void change({ kind: 'remove', blocks, wires, notes })
@@ -37,18 +37,18 @@ export function removeChosen(chosenWires: ReadonlySet<string>): void {
 /** The keys of the sheet: active while the sheet or nothing has the focus. */
 export function useSheetKeys(
   sheet: RefObject<HTMLDivElement | null>,
-  chosenWires: ReadonlySet<string>,
-  chooseWires: (keys: ReadonlySet<string>) => void,
+  selectedWires: ReadonlySet<string>,
+  selectWires: (keys: ReadonlySet<string>) => void,
 ): void {
   const remove = () => {
-    removeChosen(chosenWires)
-    chooseWires(new Set())
+    removeSelected(selectedWires)
+    selectWires(new Set())
   }
 
-  const plain = (event: KeyboardEvent): boolean => {
+  const handlePlainKey = (event: KeyboardEvent): boolean => {
     const { document, selection, select } = useStudio.getState()
     if (!document) return false
-    const step = event.shiftKey ? 1 : NUDGE
+    const step = event.shiftKey ? 1 : ARROW_STEP
     const arrows: Record<string, [number, number]> = {
       ArrowLeft: [-step, 0],
       ArrowRight: [step, 0],
@@ -61,25 +61,25 @@ export function useSheetKeys(
     else if (event.key === 'F2' && first && document.notes[first]) editNote(first)
     else if (event.key === 'F2' && first) rename(first)
     else if (event.key === 'Enter' && first && document.notes[first]) editNote(first)
-    else if (event.key === 'Enter' && chosenBlocks()[0]) openBlock(chosenBlocks()[0]!)
+    else if (event.key === 'Enter' && selectedBlocks()[0]) openBlock(selectedBlocks()[0]!)
     else if (arrow && selection.size) {
-      const to: Places = {}
+      const positions: Places = {}
       for (const id of selection) {
-        const at = document.blocks[id]?.place ?? document.notes[id]
-        if (at) to[id] = { x: at.x + arrow[0], y: at.y + arrow[1] }
+        const position = document.blocks[id]?.place ?? document.notes[id]
+        if (position) positions[id] = { x: position.x + arrow[0], y: position.y + arrow[1] }
       }
-      void move(to)
-    } else if (event.key === '>') show('connect')
-    else if (event.key === '?') show('keys')
+      void moveNodes(positions)
+    } else if (event.key === '>') showDialog('connect')
+    else if (event.key === '?') showDialog('keys')
     else if (event.key === '"') addNote()
     else if (event.key === ' ') sheetView.fit?.()
     else if (event.key === '+' || event.key === '=') sheetView.zoom?.(ZOOM_STEP)
     else if (event.key === '-') sheetView.zoom?.(1 / ZOOM_STEP)
     else if (event.key === '1') sheetView.zoom?.(null)
     else if (event.key === 'Escape' && document.inside.length && !selection.size)
-      look(document.inside.slice(0, -1))
+      openSheet(document.inside.slice(0, -1))
     else if (event.key === 'Escape') select([])
-    else if (/^\p{L}$/u.test(event.key)) show('insert', typedSoFar() + event.key)
+    else if (/^\p{L}$/u.test(event.key)) showDialog('insert', pendingText() + event.key)
     else return false
     return true
   }
@@ -94,12 +94,12 @@ export function useSheetKeys(
     )
       return
     if (event.defaultPrevented) return
-    const ours = focused === window.document.body || sheet.current?.contains(focused)
-    if (!ours && (PRESSING.has(event.key) || (event.key.length > 1 && !isButton(focused)))) return
+    const forSheet = focused === window.document.body || sheet.current?.contains(focused)
+    if (!forSheet && (BUTTON_KEYS.has(event.key) || (event.key.length > 1 && !isButton(focused)))) return
     const command = commandOf(event, true)
     if (command) {
-      if (command.possible?.() ?? true) command.run()
-    } else if (event.ctrlKey || event.metaKey || event.altKey || !plain(event)) return
+      if (command.enabled?.() ?? true) command.run()
+    } else if (event.ctrlKey || event.metaKey || event.altKey || !handlePlainKey(event)) return
     event.preventDefault()
     event.stopPropagation()
   }

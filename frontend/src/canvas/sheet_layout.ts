@@ -5,12 +5,12 @@ import type { SheetPort, SheetBlock } from '../protocol'
 const NAME_SIZE = 11
 const NAME_FONT = `${NAME_SIZE}px 'Inter Variable', sans-serif`
 /** Maximum width of a name, px; longer names are cut. */
-export const WIDEST_NAME = 168
+export const MAX_NAME_WIDTH = 168
 /** Width and height of a port, px. */
 export const PORT = 9
 
 /** The side of a block at which a port is. */
-export function side({ dx, dy }: SheetPort, output: boolean): Position {
+export function portSide({ dx, dy }: SheetPort, output: boolean): Position {
   const [x, y] = output ? [dx, dy] : [-dx, -dy]
   return x > 0 ? Position.Right : x < 0 ? Position.Left : y > 0 ? Position.Bottom : Position.Top
 }
@@ -18,22 +18,22 @@ export function side({ dx, dy }: SheetPort, output: boolean): Position {
 /** The sides of a block with ports. */
 export const portSides = ({ inputs, outputs }: SheetBlock): Set<string> =>
   new Set(
-    [...inputs.map((spot) => side(spot, false)), ...outputs.map((spot) => side(spot, true))].map(
+    [...inputs.map((port) => portSide(port, false)), ...outputs.map((port) => portSide(port, true))].map(
       (position) => (position === Position.Top ? 'above' : position === Position.Bottom ? 'below' : position),
     ),
   )
 
-let ruler: CanvasRenderingContext2D | null | undefined
+let measuringContext: CanvasRenderingContext2D | null | undefined
 const widths = new Map<string, number>()
 
 /** Width of a block's name, px. */
 export function nameWidth(name: string): number {
-  const known = widths.get(name)
-  if (known !== undefined) return known
-  ruler ??= document.createElement('canvas').getContext('2d')
-  if (!ruler) return 6 * name.length
-  ruler.font = NAME_FONT
-  const width = Math.min(ruler.measureText(name).width, WIDEST_NAME)
+  const cached = widths.get(name)
+  if (cached !== undefined) return cached
+  measuringContext ??= document.createElement('canvas').getContext('2d')
+  if (!measuringContext) return 6 * name.length
+  measuringContext.font = NAME_FONT
+  const width = Math.min(measuringContext.measureText(name).width, MAX_NAME_WIDTH)
   // Before the page's font is loaded, a fallback font is measured.
   if (document.fonts.check(NAME_FONT)) widths.set(name, width)
   return width

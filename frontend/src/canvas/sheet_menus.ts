@@ -1,72 +1,72 @@
 import { commands } from '../commands'
 import { openMenu, type Entries, type Entry } from '../context_menu_state'
-import { show } from '../dialogs'
+import { showDialog } from '../dialogs'
 import { showScope } from '../dock'
 import { blockOf, portOf, wireKey } from '../model/wires'
 import type { SheetBlock, Wire } from '../protocol'
-import { useValues } from '../run/wire_values'
-import { change, look, useStudio, type OpenDocument } from '../store'
-import { chosenBlocks, setColour, setNameSide } from './arranging'
+import { useShownValues } from '../run/wire_values'
+import { change, openSheet, useStudio, type OpenDocument } from '../store'
+import { selectedBlocks, setColour, setNameSide } from './arranging'
 import { pasteAt } from './clipboard'
-import { placeAt } from './insert'
-import { editNote, writeNote } from './note_node'
-import { nodeAt, wireAtElement } from './right_button'
+import { sheetPointAt } from './insert'
+import { editNote, createNote } from './note_node'
+import { nodeNameAt, wireKeyAt } from './right_button'
 import { chartOf } from './sheet_actions'
-import { removeChosen } from './sheet_keys'
+import { removeSelected } from './sheet_keys'
 import { portSides } from './sheet_layout'
 import { nameSignal } from './signal_names'
 
 type Point = { x: number; y: number }
 
 /** Open the context menu of an element of the sheet: a port, block, note, line, or the sheet itself. */
-export function openSheetMenu(at: Point, element: Element, selectWire: (key: string) => void): void {
+export function openSheetMenu(point: Point, element: Element, selectWire: (key: string) => void): void {
   const { document, selection, select } = useStudio.getState()
   if (!document) return
   const handle = element.closest('.react-flow__handle')
-  const node = nodeAt(element)
-  const wire = document.wires.find((one) => wireKey(one) === wireAtElement(element))
+  const node = nodeNameAt(element)
+  const wire = document.wires.find((candidate) => wireKey(candidate) === wireKeyAt(element))
   if (node && handle) {
     const port = `${node}/${handle.getAttribute('data-handleid')}`
-    openMenu(port, at, portEntries(document, port, handle.classList.contains('source'), at))
+    openMenu(port, point, portEntries(document, port, handle.classList.contains('source'), point))
   } else if (node) {
     if (!selection.has(node)) select([node])
     const block = document.blocks[node]
-    openMenu(block?.name ?? 'Note', at, block ? blockEntries(document, block) : noteEntries(node))
+    openMenu(block?.name ?? 'Note', point, block ? blockEntries(document, block) : noteEntries(node))
   } else if (wire) {
     selectWire(wireKey(wire))
-    openMenu(`Line from ${wire.source}`, at, lineEntries(document, wire, at))
-  } else openMenu('Sheet', at, sheetEntries(document, at))
+    openMenu(`Line from ${wire.source}`, point, lineEntries(document, wire, point))
+  } else openMenu('Sheet', point, sheetEntries(document, point))
 }
 
 /** A command as an entry. */
-function command(title: string): Entry {
-  const found = commands().find((one) => one.title === title)
-  if (!found) throw new Error(`There is no command "${title}".`)
-  return { title, keys: found.keys, possible: found.possible?.() ?? true, run: found.run }
+function commandEntry(title: string): Entry {
+  const command = commands().find((candidate) => candidate.title === title)
+  if (!command) throw new Error(`There is no command "${title}".`)
+  return { title, keys: command.keys, enabled: command.enabled?.() ?? true, run: command.run }
 }
 
-function sheetEntries(document: OpenDocument, at: Point): Entries {
+function sheetEntries(document: OpenDocument, point: Point): Entries {
   return [
-    { title: 'Add a block here …', run: () => show('insert', '', at) },
-    { title: 'Write a note here', run: () => writeNote(placeAt(at).x, placeAt(at).y) },
-    { title: 'Paste here', run: () => void pasteAt(placeAt(at)) },
-    command('Select all'),
+    { title: 'Add a block here …', run: () => showDialog('insert', '', point) },
+    { title: 'Write a note here', run: () => createNote(sheetPointAt(point).x, sheetPointAt(point).y) },
+    { title: 'Paste here', run: () => void pasteAt(sheetPointAt(point)) },
+    commandEntry('Select all'),
     null,
-    command('Undo'),
-    command('Redo'),
+    commandEntry('Undo'),
+    commandEntry('Redo'),
     null,
-    command('Arrange the sheet'),
-    command('Ground and terminate unconnected ports'),
-    command('Fit the sheet into the window'),
-    command('Show the sheet at 100 %'),
-    ...(document.inside.length ? [command('Leave the subsystem')] : []),
+    commandEntry('Arrange the sheet'),
+    commandEntry('Ground and terminate unconnected ports'),
+    commandEntry('Fit the sheet into the window'),
+    commandEntry('Show the sheet at 100 %'),
+    ...(document.inside.length ? [commandEntry('Leave the subsystem')] : []),
     null,
-    command('Find blocks, types and values'),
-    command('Configuration parameters'),
+    commandEntry('Find blocks, types and values'),
+    commandEntry('Configuration parameters'),
     {
       title: 'Export the sheet',
-      within: ['SVG', 'PNG', 'PDF'].map((kind) => ({
-        ...command(`Export the sheet as ${kind}`),
+      submenu: ['SVG', 'PNG', 'PDF'].map((kind) => ({
+        ...commandEntry(`Export the sheet as ${kind}`),
         title: kind,
       })),
     },
@@ -75,31 +75,31 @@ function sheetEntries(document: OpenDocument, at: Point): Entries {
 
 function blockEntries(document: OpenDocument, block: SheetBlock): Entries {
   const path = [...document.inside, block.name]
-  const several = chosenBlocks().length > 1
+  const several = selectedBlocks().length > 1
   const chart = chartOf(path.join('/'))
   const opens: Entries = [
     ...(chart ? [{ title: 'Show its chart', run: () => showScope(path.join('/')) }] : []),
-    ...(block.opens ? [{ title: 'Open the sheet inside', run: () => look(path) }] : []),
+    ...(block.opens ? [{ title: 'Open the sheet inside', run: () => openSheet(path) }] : []),
     { title: 'Parameters …', run: () => useStudio.getState().edit(block.name) },
-    ...(block.opens ? [command('Edit the mask: parameters of the subsystem or the model')] : []),
-    command('Rename'),
+    ...(block.opens ? [commandEntry('Edit the mask: parameters of the subsystem or the model')] : []),
+    commandEntry('Rename'),
     null,
   ]
   return [
     ...(several ? [] : opens),
-    command('Cut'),
-    command('Copy'),
-    command('Duplicate'),
-    { title: 'Delete', keys: 'Del', run: () => removeChosen(new Set()) },
+    commandEntry('Cut'),
+    commandEntry('Copy'),
+    commandEntry('Duplicate'),
+    { title: 'Delete', keys: 'Del', run: () => removeSelected(new Set()) },
     null,
-    command('Rotate'),
-    command('Flip'),
-    ...(several ? [{ title: 'Align', within: ALIGNMENTS.map(command) }] : []),
-    { title: several ? 'Names' : 'Name', within: nameEntries(chosenBlocks()) },
-    { title: 'Colour', within: colourEntries(chosenBlocks()) },
-    command('Group into a subsystem'),
-    command('Comment out, or uncomment'),
-    command('Comment through, or uncomment'),
+    commandEntry('Rotate'),
+    commandEntry('Flip'),
+    ...(several ? [{ title: 'Align', submenu: ALIGNMENTS.map(commandEntry) }] : []),
+    { title: several ? 'Names' : 'Name', submenu: nameEntries(selectedBlocks()) },
+    { title: 'Colour', submenu: colourEntries(selectedBlocks()) },
+    commandEntry('Group into a subsystem'),
+    commandEntry('Comment out, or uncomment'),
+    commandEntry('Comment through, or uncomment'),
   ]
 }
 
@@ -145,10 +145,10 @@ function noteEntries(note: string): Entries {
   return [
     { title: 'Edit the note', keys: 'Enter', run: () => editNote(note) },
     null,
-    command('Cut'),
-    command('Copy'),
-    command('Duplicate'),
-    { title: 'Delete', keys: 'Del', run: () => removeChosen(new Set()) },
+    commandEntry('Cut'),
+    commandEntry('Copy'),
+    commandEntry('Duplicate'),
+    { title: 'Delete', keys: 'Del', run: () => removeSelected(new Set()) },
   ]
 }
 
@@ -165,9 +165,9 @@ function signalEntries(document: OpenDocument, port: string): Entries {
     },
     {
       title: 'Show its value on the sheet',
-      checked: useValues.getState().pinned.has(path),
+      checked: useShownValues.getState().pinned.has(path),
       run: () =>
-        useValues.setState((s) => {
+        useShownValues.setState((s) => {
           const pinned = new Set(s.pinned)
           if (!pinned.delete(path)) pinned.add(path)
           return { pinned }
@@ -176,15 +176,15 @@ function signalEntries(document: OpenDocument, port: string): Entries {
   ]
 }
 
-function lineEntries(document: OpenDocument, wire: Wire, at: Point): Entries {
+function lineEntries(document: OpenDocument, wire: Wire, point: Point): Entries {
   const end = { port: wire.source, isOutput: true }
   return [
-    { title: 'Branch to a new block …', run: () => show('insert', '', at, end) },
+    { title: 'Branch to a new block …', run: () => showDialog('insert', '', point, end) },
     ...signalEntries(document, wire.source),
     null,
     {
       title: 'Reset the route',
-      possible: Boolean(wire.bends?.length),
+      enabled: Boolean(wire.bends?.length),
       run: () => void change({ kind: 'bend', wires: [{ source: wire.source, target: wire.target }] }),
     },
     {
@@ -195,23 +195,29 @@ function lineEntries(document: OpenDocument, wire: Wire, at: Point): Entries {
   ]
 }
 
-function portEntries(document: OpenDocument, port: string, isOutput: boolean, at: Point): Entries {
+function portEntries(document: OpenDocument, port: string, isOutput: boolean, point: Point): Entries {
   const wires = document.wires.filter((wire) => (isOutput ? wire.source : wire.target) === port)
   const connect: Entries = [
     {
       title: 'Connect to a new block …',
-      possible: isOutput || !wires.length,
-      run: () => show('insert', '', { x: at.x + (isOutput ? AWAY : -AWAY), y: at.y }, { port, isOutput }),
+      enabled: isOutput || !wires.length,
+      run: () =>
+        showDialog(
+          'insert',
+          '',
+          { x: point.x + (isOutput ? NEW_BLOCK_DISTANCE : -NEW_BLOCK_DISTANCE), y: point.y },
+          { port, isOutput },
+        ),
     },
     {
       title: isOutput ? 'Connect to an input by name …' : 'Connect to an output by name …',
       keys: '>',
-      possible: isOutput || !wires.length,
-      run: () => show('connect', '', null, { port, isOutput }),
+      enabled: isOutput || !wires.length,
+      run: () => showDialog('connect', '', null, { port, isOutput }),
     },
     {
       title: wires.length > 1 ? 'Delete its lines' : 'Delete its line',
-      possible: wires.length > 0,
+      enabled: wires.length > 0,
       run: () => void change({ kind: 'remove', wires }),
     },
   ]
@@ -222,4 +228,4 @@ function portEntries(document: OpenDocument, port: string, isOutput: boolean, at
 }
 
 /** Distance of a new block from the port to which it is connected, screen px. */
-const AWAY = 60
+const NEW_BLOCK_DISTANCE = 60

@@ -8,20 +8,20 @@ import { sheetView } from './sheet_actions'
 import { FIT } from './sheet_layout'
 import type { WireEdgeType } from './wire_edge'
 
-const SETTLE_MS = 120
+const LAYOUT_DELAY_MS = 120
 /** Height of the name below a block, px. */
-const NAME_ROOM = 18
+const NAME_HEIGHT = 18
 
 type Sheet = RefObject<HTMLDivElement | null>
 type Flow = ReactFlowInstance<SheetNode, WireEdgeType>
 
 /** Centre and focus a block that was found by a search. */
-export function useSought(sheet: Sheet, flow: Flow, blocks: Record<string, SheetBlock>): void {
-  const sought = useStudio((s) => s.sought)
+export function useCentredBlock(sheet: Sheet, flow: Flow, blocks: Record<string, SheetBlock>): void {
+  const blockToCentre = useStudio((s) => s.blockToCentre)
   useEffect(() => {
-    const block = sought === null ? undefined : blocks[sought]
+    const block = blockToCentre === null ? undefined : blocks[blockToCentre]
     if (!block) return
-    useStudio.setState({ sought: null })
+    useStudio.setState({ blockToCentre: null })
     const { place, width, height } = block
     // Executed after a newly opened sheet has been fitted into the window.
     setTimeout(() => {
@@ -32,55 +32,55 @@ export function useSought(sheet: Sheet, flow: Flow, blocks: Record<string, Sheet
       sheet.current
         ?.querySelector<HTMLElement>(`.react-flow__node[data-id="${CSS.escape(block.name)}"]`)
         ?.focus({ preventScroll: true })
-    }, 2 * SETTLE_MS)
-  }, [sheet, sought, blocks, flow])
+    }, 2 * LAYOUT_DELAY_MS)
+  }, [sheet, blockToCentre, blocks, flow])
 }
 
 /** Distance from the edge of the panel within which a new block is moved farther into view, px. */
 const MARGIN = 24
 
 /** Move the view, without zooming, so that all of a block is visible. */
-function bringIntoView(
+function revealBlock(
   flow: Pick<Flow, 'getViewport' | 'setViewport'>,
   panel: { width: number; height: number },
   block: Rectangle,
 ): void {
   const { x, y, zoom } = flow.getViewport()
-  const shift = (from: number, size: number, room: number) => {
-    const [low, high] = [from - MARGIN, from + size + MARGIN - room]
+  const shift = (start: number, size: number, available: number) => {
+    const [low, high] = [start - MARGIN, start + size + MARGIN - available]
     return low < 0 ? -low : Math.min(0, -Math.min(high, low))
   }
   const dx = shift(block.x * zoom + x, block.width * zoom, panel.width)
-  const dy = shift(block.y * zoom + y, (block.height + NAME_ROOM) * zoom, panel.height)
+  const dy = shift(block.y * zoom + y, (block.height + NAME_HEIGHT) * zoom, panel.height)
   if (dx || dy) void flow.setViewport({ x: x + dx, y: y + dy, zoom }, { duration: 150 })
 }
 
 /** The sheet is fitted to its panel, at every panel size, until the user moves it. */
-export function useFitted(sheet: Sheet, flow: Flow): void {
+export function useFitView(sheet: Sheet, flow: Flow): void {
   useEffect(() => {
     const element = sheet.current
     if (!element) return
     let timer = 0
-    const sized = new ResizeObserver(() => {
+    const observer = new ResizeObserver(() => {
       clearTimeout(timer)
       // React Flow would fit an empty sheet to the first block that is dropped on it, which would then jump.
-      timer = window.setTimeout(() => flow.getNodes().length && void flow.fitView(FIT), SETTLE_MS)
+      timer = window.setTimeout(() => flow.getNodes().length && void flow.fitView(FIT), LAYOUT_DELAY_MS)
     })
-    const leave = () => {
+    const stop = () => {
       clearTimeout(timer)
-      sized.disconnect()
+      observer.disconnect()
     }
-    sized.observe(element)
+    observer.observe(element)
     for (const kind of ['pointerdown', 'wheel', 'keydown', 'drop'])
-      element.addEventListener(kind, leave, { once: true })
-    return leave
+      element.addEventListener(kind, stop, { once: true })
+    return stop
   }, [sheet, flow])
 }
 
 /** Names are larger on a sheet that is zoomed out, as on a small screen: below the blocks they have room. */
 export function nameScale(zoom: number): number {
-  const wanted = Math.min(Math.max(0.9 / zoom, 1), 1.25)
-  return Math.round(20 * wanted) / 20
+  const scale = Math.min(Math.max(0.9 / zoom, 1), 1.25)
+  return Math.round(20 * scale) / 20
 }
 
 /** Set the size of the names for the present zoom. */
@@ -102,7 +102,7 @@ export function useSheetView(sheet: Sheet, flow: Flow): void {
     }
     sheetView.reveal = (block) => {
       const { clientWidth: width, clientHeight: height } = sheet.current!
-      bringIntoView(flow, { width, height }, block)
+      revealBlock(flow, { width, height }, block)
     }
     return () => {
       sheetView.fit = null

@@ -7,7 +7,7 @@ import { dragged } from '../model/bends'
 import { drawBranch } from './branching'
 import { GRID } from './insert'
 import { nameSignal } from './signal_names'
-import { isFlat, svgPath, type Point, type PortPlace } from '../model/wire_lines'
+import { isFlat, svgPath, type Point, type PortPosition } from '../model/wire_lines'
 
 export type WireEdgeType = Edge<
   {
@@ -23,20 +23,20 @@ export type WireEdgeType = Edge<
     /**
      * The complete route from the source; `path` is its last part if the wire branches from another wire.
      */
-    way: () => Point[]
+    route: () => Point[]
   },
   'wire'
 >
 
 /** A label at a port. */
-export interface WireTag extends PortPlace {
+export interface WireTag extends PortPosition {
   text: string
 }
 
 /** The wire whose route is being drawn, with its present bends. */
 export const useBending = create<{ wire: Required<Wire> | null }>(() => ({ wire: null }))
 
-const SNAP = 7
+const SNAP_PX = 7
 
 /**
  * A wire on its route: thin for a scalar, thicker for a vector, double for a matrix, three lines for a bus.
@@ -46,10 +46,10 @@ export const WireEdge = memo(function WireEdge({ id, data, selected }: EdgeProps
   if (!data) return null
   const { path, rank } = data
   const line = svgPath(path, data.dots)
-  const named = ['wire', selected && 'selected', data.pending && 'pending'].filter(Boolean).join(' ')
+  const className = ['wire', selected && 'selected', data.pending && 'pending'].filter(Boolean).join(' ')
   if (!path.length)
     return (
-      <g className={named} onDoubleClick={() => nameSignal(id.slice(0, id.indexOf(' -> ')))}>
+      <g className={className} onDoubleClick={() => nameSignal(id.slice(0, id.indexOf(' -> ')))}>
         {data.tags.map((tag) => (
           <Tag key={`${tag.x} ${tag.y}`} tag={tag} selected={Boolean(selected)} />
         ))}
@@ -57,7 +57,7 @@ export const WireEdge = memo(function WireEdge({ id, data, selected }: EdgeProps
       </g>
     )
   return (
-    <g className={named} onDoubleClick={() => nameSignal(id.slice(0, id.indexOf(' -> ')))}>
+    <g className={className} onDoubleClick={() => nameSignal(id.slice(0, id.indexOf(' -> ')))}>
       <BaseEdge
         id={id}
         path={line}
@@ -70,8 +70,8 @@ export const WireEdge = memo(function WireEdge({ id, data, selected }: EdgeProps
       {data.dots.map(([x, y]) => (
         <circle key={`${x} ${y}`} cx={x} cy={y} r={2.6 + 0.3 * rank} className="dot" />
       ))}
-      {path.slice(1).map((_, piece) => (
-        <Piece key={piece} id={id} path={path} piece={piece} way={data.way} />
+      {path.slice(1).map((_, segment) => (
+        <Segment key={segment} id={id} path={path} segment={segment} route={data.route} />
       ))}
       <title>{data.label}</title>
     </g>
@@ -102,49 +102,56 @@ function Tag({ tag: { x, y, dx, dy, text }, selected }: { tag: WireTag; selected
 }
 
 /** One segment of a wire, which can be dragged. */
-function Piece({
+function Segment({
   id,
   path,
-  piece,
-  way,
+  segment,
+  route,
 }: {
   id: string
   path: readonly Point[]
-  piece: number
-  way: () => Point[]
+  segment: number
+  route: () => Point[]
 }) {
   const flow = useReactFlow()
-  const [[x1, y1], [x2, y2]] = [path[piece]!, path[piece + 1]!]
-  const flat = isFlat(path, piece)
-  const take = (event: React.PointerEvent<SVGLineElement>) => {
+  const [[x1, y1], [x2, y2]] = [path[segment]!, path[segment + 1]!]
+  const flat = isFlat(path, segment)
+  const startDrag = (event: React.PointerEvent<SVGLineElement>) => {
     if (event.button !== 0) return
     if (event.ctrlKey || event.metaKey) {
       drawBranch(flow, id.slice(0, id.indexOf(' -> ')), path, event)
       return
     }
-    const whole = way()
-    const index = whole.length - path.length + piece
-    if (index < 0 || index > whole.length - 2) return
+    const complete = route()
+    const index = complete.length - path.length + segment
+    if (index < 0 || index > complete.length - 2) return
     const [source, target] = [id.slice(0, id.indexOf(' -> ')), id.slice(id.indexOf(' -> ') + 4)]
     const start = { x: event.clientX, y: event.clientY }
     const sheet = event.currentTarget.closest<HTMLElement>('.react-flow')!
-    const move = (at: PointerEvent) => {
-      const gone = flat ? at.clientY - start.y : at.clientX - start.x
-      if (Math.abs(gone) < 3 && !useBending.getState().wire) return
+    const move = (pointer: PointerEvent) => {
+      const distance = flat ? pointer.clientY - start.y : pointer.clientX - start.x
+      if (Math.abs(distance) < 3 && !useBending.getState().wire) return
       // The sheet captures the pointer: this segment may disappear while the route is being drawn.
       sheet.setPointerCapture(event.pointerId)
-      const place = flow.screenToFlowPosition({ x: at.clientX, y: at.clientY }, { snapToGrid: false })
+      const point = flow.screenToFlowPosition(
+        { x: pointer.clientX, y: pointer.clientY },
+        { snapToGrid: false },
+      )
       useBending.setState({
-        wire: { source, target, bends: dragged(whole, index, level(whole, index, flat ? place.y : place.x)) },
+        wire: {
+          source,
+          target,
+          bends: dragged(complete, index, snapped(complete, index, flat ? point.y : point.x)),
+        },
       })
     }
-    const end = (at: PointerEvent) => {
+    const end = (pointer: PointerEvent) => {
       window.removeEventListener('pointermove', move)
       window.removeEventListener('pointerup', end)
       window.removeEventListener('pointercancel', end)
       const { wire } = useBending.getState()
       if (!wire) return
-      if (at.type === 'pointerup')
+      if (pointer.type === 'pointerup')
         void change({ kind: 'bend', wires: [wire] }).finally(() => useBending.setState({ wire: null }))
       else useBending.setState({ wire: null })
     }
@@ -159,7 +166,7 @@ function Piece({
       x2={x2}
       y2={y2}
       className={flat ? 'piece nopan flat' : 'piece nopan'}
-      onPointerDown={take}
+      onPointerDown={startDrag}
     />
   )
 }
@@ -167,9 +174,9 @@ function Piece({
 /**
  * The position of a dragged segment: aligned with near parallel segments, otherwise on the grid.
  */
-function level(way: Point[], piece: number, wanted: number): number {
-  const axis = isFlat(way, piece) ? 1 : 0
-  const others = way.filter((_, k) => k !== piece && k !== piece + 1).map((point) => point[axis])
-  const near = others.find((other) => Math.abs(other - wanted) < SNAP)
-  return near ?? GRID * Math.round(wanted / GRID)
+function snapped(route: Point[], segment: number, coordinate: number): number {
+  const axis = isFlat(route, segment) ? 1 : 0
+  const others = route.filter((_, k) => k !== segment && k !== segment + 1).map((point) => point[axis])
+  const aligned = others.find((other) => Math.abs(other - coordinate) < SNAP_PX)
+  return aligned ?? GRID * Math.round(coordinate / GRID)
 }

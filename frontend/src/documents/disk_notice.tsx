@@ -1,9 +1,9 @@
 import { Alert, Button, Group } from '@mantine/core'
 import { IconAlertTriangle, IconFileAlert, IconHistory } from '@tabler/icons-react'
 import type { DocumentState } from '../protocol'
-import { useDesk } from '../robot/editor/desk'
-import { alter, ask, useStudio } from '../store'
-import { show } from '../dialogs'
+import { useRobotEditor } from '../robot/editor/state'
+import { alterDocument, ask, useStudio } from '../store'
+import { showDialog } from '../dialogs'
 
 /**
  * Notice that another program has changed the file of a document, or that its journal cannot be written,
@@ -18,7 +18,7 @@ function FileNotice({ state, saveAs }: { state: DocumentState; saveAs: () => voi
           {dirty ? 'Your edits are here and in the journal.' : 'You have no unsaved edits.'} Reloading can be
           undone.
           <Group gap="xs" mt="xs">
-            <Button size="compact-sm" onClick={() => alter('reload', state)}>
+            <Button size="compact-sm" onClick={() => alterDocument('reload', state)}>
               Reload
             </Button>
             <Button
@@ -50,26 +50,30 @@ function FileNotice({ state, saveAs }: { state: DocumentState; saveAs: () => voi
 
 /** Notices about the visible document, and about other unsaved documents. */
 export function DiskNotice() {
-  const lost = useStudio((s) => (s.returned ? s.recoveries.length : 0))
-  const robot = useDesk((s) => (s.current ? s.robots[s.current] : undefined))
+  const otherRecoveries = useStudio((s) => (s.returned ? s.recoveries.length : 0))
+  const robot = useRobotEditor((s) => (s.current ? s.robots[s.current] : undefined))
   const diagram = useStudio((s) => s.document?.state)
   const state = robot?.state ?? diagram
   const saveAs = () => {
     if (robot) void import('../robot/editor/save_dialog').then(({ saveRobotAs }) => saveRobotAs(robot))
-    else show('save_as')
+    else showDialog('save_as')
   }
   return (
     <>
-      {lost > 0 && (
+      {otherRecoveries > 0 && (
         <Alert
           color="blue"
           icon={<IconHistory />}
-          title={lost === 1 ? 'Another document was not saved' : `${lost} other documents were not saved`}
+          title={
+            otherRecoveries === 1
+              ? 'Another document was not saved'
+              : `${otherRecoveries} other documents were not saved`
+          }
         >
           The studio ended before; its journal has kept what was edited.
           <Group gap="xs" mt="xs">
-            <Button size="compact-sm" variant="default" onClick={() => show('recovery')}>
-              Look at {lost === 1 ? 'it' : 'them'}
+            <Button size="compact-sm" variant="default" onClick={() => showDialog('recovery')}>
+              Look at {otherRecoveries === 1 ? 'it' : 'them'}
             </Button>
           </Group>
         </Alert>

@@ -1,6 +1,6 @@
 import { useStudio } from '../store'
 
-const CHECK = { headers: { 'X-Armblocks': '1' } }
+const REQUEST_OPTIONS = { headers: { 'X-Armblocks': '1' } }
 
 /**
  * Save a drawing of the visible sheet, as `armblocks diagram` does; SVG and PNG have the theme of this page.
@@ -16,10 +16,10 @@ export function exportDrawing(kind: 'svg' | 'png' | 'pdf'): void {
 }
 
 async function download(path: string, name: string): Promise<void> {
-  const answer = await fetch(path, CHECK)
-  if (!answer.ok) throw new Error(await answer.text())
+  const response = await fetch(path, REQUEST_OPTIONS)
+  if (!response.ok) throw new Error(await response.text())
   const link = window.document.createElement('a')
-  link.href = URL.createObjectURL(await answer.blob())
+  link.href = URL.createObjectURL(await response.blob())
   link.download = name
   link.click()
   setTimeout(() => URL.revokeObjectURL(link.href), 1000)

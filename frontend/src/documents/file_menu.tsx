@@ -10,19 +10,19 @@ import {
   IconX,
 } from '@tabler/icons-react'
 import type { DocumentState } from '../protocol'
-import { closeRobot } from '../robot/editor/desk'
+import { closeRobot } from '../robot/editor/state'
 import { ask, bringToFront, useStudio } from '../store'
-import { save, show } from '../dialogs'
+import { save, showDialog } from '../dialogs'
 
 /** Maximum number of files in the menu; the dialog lists all. */
-const MOST_FILES = 12
+const MAX_FILES = 12
 
 /** The menu of documents: new, open, save, open documents, recoverable documents, examples. */
 export function FileMenu() {
   const welcome = useStudio((s) => s.welcome)
   const recoveries = useStudio((s) => s.recoveries)
-  const known = useStudio((s) => s.document !== null)
-  const files = (welcome?.files ?? []).slice(0, MOST_FILES)
+  const hasDocument = useStudio((s) => s.document !== null)
+  const files = (welcome?.files ?? []).slice(0, MAX_FILES)
   return (
     <Menu position="bottom-start" shadow="md" width={340}>
       <Menu.Target>
@@ -46,14 +46,14 @@ export function FileMenu() {
         <Menu.Item
           leftSection={<IconFolderOpen size={15} />}
           rightSection={<Kbd size="xs">Ctrl+O</Kbd>}
-          onClick={() => show('open')}
+          onClick={() => showDialog('open')}
         >
           Open …
         </Menu.Item>
         <Menu.Item
           leftSection={<IconDeviceFloppy size={15} />}
           rightSection={<Kbd size="xs">Ctrl+S</Kbd>}
-          disabled={!known}
+          disabled={!hasDocument}
           onClick={() => void save()}
         >
           Save
@@ -61,8 +61,8 @@ export function FileMenu() {
         <Menu.Item
           leftSection={<IconDeviceFloppy size={15} />}
           rightSection={<Kbd size="xs">Ctrl+Shift+S</Kbd>}
-          disabled={!known}
-          onClick={() => show('save_as')}
+          disabled={!hasDocument}
+          onClick={() => showDialog('save_as')}
         >
           Save as …
         </Menu.Item>
@@ -70,7 +70,7 @@ export function FileMenu() {
           <Menu.Item
             leftSection={<IconHistory size={15} />}
             rightSection={<Badge size="sm">{recoveries.length}</Badge>}
-            onClick={() => show('recovery')}
+            onClick={() => showDialog('recovery')}
           >
             Recover …
           </Menu.Item>
@@ -121,8 +121,8 @@ function Shipped() {
 /** The other open diagrams, and the robots. */
 function OpenDocuments() {
   const documents = useStudio((s) => s.documents)
-  const here = useStudio((s) => s.document?.state.document)
-  const others = documents.filter(({ document }) => document !== here)
+  const current = useStudio((s) => s.document?.state.document)
+  const others = documents.filter(({ document }) => document !== current)
   const diagrams = others.filter(({ kind }) => kind === 'diagram')
   const robots = others.filter(({ kind }) => kind === 'robot')
   return (

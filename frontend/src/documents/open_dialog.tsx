@@ -2,15 +2,15 @@ import { Badge, Modal, NavLink, Stack, Text, TextInput } from '@mantine/core'
 import { IconFile, IconHistory, IconPencil, IconRobot } from '@tabler/icons-react'
 import { useEffect, useState } from 'react'
 import { ask, bringToFront, useStudio } from '../store'
-import { projectFiles, show, useDialogs } from '../dialogs'
+import { projectFiles, showDialog, useDialogs } from '../dialogs'
 
 /** The Open dialog: open documents, recent files, and all files of the project folder. */
 export function OpenDialog() {
   const opened = useDialogs((s) => s.open === 'open')
-  const times = useDialogs((s) => s.times)
+  const openCount = useDialogs((s) => s.openCount)
   return (
-    <Modal opened={opened} onClose={() => show(null)} title="Open" size="lg">
-      <OpenList key={times} />
+    <Modal opened={opened} onClose={() => showDialog(null)} title="Open" size="lg">
+      <OpenList key={openCount} />
     </Modal>
   )
 }
@@ -18,17 +18,17 @@ export function OpenDialog() {
 function OpenList() {
   const documents = useStudio((s) => s.documents)
   const current = useStudio((s) => s.document?.state.document)
-  const [found, setFound] = useState<{ files: string[]; recent: string[] } | null>(null)
+  const [listing, setListing] = useState<{ files: string[]; recent: string[] } | null>(null)
   const [query, setQuery] = useState('')
-  useEffect(() => void projectFiles().then(setFound), [])
+  useEffect(() => void projectFiles().then(setListing), [])
   const matches = (name: string) => name.toLowerCase().includes(query.trim().toLowerCase())
   const closeAnd = (open: () => Promise<unknown>) => {
-    show(null)
+    showDialog(null)
     void open()
   }
   const open = documents.filter((entry) => entry.document !== current && matches(entry.path ?? entry.title))
-  const recent = found?.recent.filter(matches) ?? []
-  const files = found?.files.filter((file) => matches(file) && !recent.includes(file)) ?? []
+  const recent = listing?.recent.filter(matches) ?? []
+  const files = listing?.files.filter((file) => matches(file) && !recent.includes(file)) ?? []
   const openFirst = () => {
     const path = recent[0] ?? files[0]
     if (open[0]) closeAnd(() => bringToFront(open[0]!))
@@ -76,7 +76,7 @@ function OpenList() {
             <FileLink key={path} icon={IconFile} path={path} closeAnd={closeAnd} />
           ))}
         </Section>
-        {found && !open.length && !recent.length && !files.length && (
+        {listing && !open.length && !recent.length && !files.length && (
           <p className="empty">
             {query
               ? 'No file matches.'

@@ -2,12 +2,12 @@ import { Badge, Button, Group, Modal, Paper, Stack, Text } from '@mantine/core'
 import { useEffect, useState } from 'react'
 import type { Recovery } from '../protocol'
 import { ask, useStudio } from '../store'
-import { show, useDialogs } from '../dialogs'
+import { showDialog, useDialogs } from '../dialogs'
 
-const when = (seconds: number) =>
+const dateText = (seconds: number) =>
   new Date(1000 * seconds).toLocaleString(undefined, { dateStyle: 'medium', timeStyle: 'short' })
 
-const counted = (count: number, thing: string) => `${count} ${thing}${count === 1 ? '' : 's'}`
+const counted = (count: number, noun: string) => `${count} ${noun}${count === 1 ? '' : 's'}`
 
 /** Unsaved work of the last session; offered when a page connects, and later in the menu. */
 export function RecoveryDialog() {
@@ -17,30 +17,30 @@ export function RecoveryDialog() {
   useEffect(() => {
     if (recoveries.length && !offered) {
       setOffered(true)
-      if (!useStudio.getState().returned) show('recovery')
+      if (!useStudio.getState().returned) showDialog('recovery')
     }
-    if (!recoveries.length && useDialogs.getState().open === 'recovery') show(null)
+    if (!recoveries.length && useDialogs.getState().open === 'recovery') showDialog(null)
   }, [recoveries, offered])
   return (
-    <Modal opened={opened} onClose={() => show(null)} title="Unsaved work" size="lg">
+    <Modal opened={opened} onClose={() => showDialog(null)} title="Unsaved work" size="lg">
       <Stack gap="sm">
         <Text size="sm" c="dimmed">
           The studio ended before these documents were saved. They can be recovered from its journal; no file
           has been changed. Entries without a choice remain in the menu.
         </Text>
         {recoveries.map((recovery) => (
-          <Offer key={recovery.document} recovery={recovery} />
+          <RecoveryItem key={recovery.document} recovery={recovery} />
         ))}
       </Stack>
     </Modal>
   )
 }
 
-function Offer({ recovery }: { recovery: Recovery }) {
-  const [sure, setSure] = useState(false)
+function RecoveryItem({ recovery }: { recovery: Recovery }) {
+  const [confirming, setConfirming] = useState(false)
   const { kind, document, title, path, began, last, edits, parts, disk, missing } = recovery
   const act = (action: 'open' | 'keep_both' | 'discard') => {
-    if (action !== 'discard' && useStudio.getState().recoveries.length === 1) show(null)
+    if (action !== 'discard' && useStudio.getState().recoveries.length === 1) showDialog(null)
     void ask({ kind: 'recover', document, action })
   }
   return (
@@ -49,7 +49,7 @@ function Offer({ recovery }: { recovery: Recovery }) {
         <div>
           <Text fw={600}>{path ?? `${title}, never saved`}</Text>
           <Text size="sm">
-            {counted(edits, 'edit')} from {when(began)} to {when(last)};{' '}
+            {counted(edits, 'edit')} from {dateText(began)} to {dateText(last)};{' '}
             {counted(parts, kind === 'robot' ? 'link' : 'block')}
           </Text>
         </div>
@@ -74,10 +74,10 @@ function Offer({ recovery }: { recovery: Recovery }) {
         <Button
           variant="subtle"
           color="red"
-          onClick={() => (sure ? act('discard') : setSure(true))}
-          onBlur={() => setSure(false)}
+          onClick={() => (confirming ? act('discard') : setConfirming(true))}
+          onBlur={() => setConfirming(false)}
         >
-          {sure ? 'Discard permanently' : 'Discard'}
+          {confirming ? 'Discard permanently' : 'Discard'}
         </Button>
         {disk === 'changed' ? (
           <>

@@ -1,19 +1,19 @@
 import { Alert, Autocomplete, Button, Group, Modal, Stack, Text } from '@mantine/core'
 import { useEffect, useState } from 'react'
 import { Refusal } from '../connection'
-import { SCROLLED } from '../scrolled'
-import { line, useStudio } from '../store'
-import { projectFiles, show, useDialogs } from '../dialogs'
+import { SCROLLED } from '../dropdown_scrolling'
+import { connection, useStudio } from '../store'
+import { projectFiles, showDialog, useDialogs } from '../dialogs'
 
-const named = (typed: string) => (/\.json$/i.test(typed.trim()) ? typed.trim() : `${typed.trim()}.json`)
+const withSuffix = (typed: string) => (/\.json$/i.test(typed.trim()) ? typed.trim() : `${typed.trim()}.json`)
 
 /** Save as: a name in the project folder; an existing file is overwritten only on request. */
 export function SaveDialog() {
   const opened = useDialogs((s) => s.open === 'save_as')
-  const times = useDialogs((s) => s.times)
+  const openCount = useDialogs((s) => s.openCount)
   return (
-    <Modal opened={opened} onClose={() => show(null)} title="Save as" size="md">
-      <SaveAs key={times} />
+    <Modal opened={opened} onClose={() => showDialog(null)} title="Save as" size="md">
+      <SaveAs key={openCount} />
     </Modal>
   )
 }
@@ -24,17 +24,18 @@ function SaveAs() {
   const [files, setFiles] = useState<string[]>([])
   const [fault, setFault] = useState<Refusal | null>(null)
   useEffect(
-    () => void projectFiles().then((found) => setFiles(found.files.filter((file) => file.endsWith('.json')))),
+    () =>
+      void projectFiles().then((listing) => setFiles(listing.files.filter((file) => file.endsWith('.json')))),
     [],
   )
   if (!document) return null
-  const path = named(typed)
-  const taken = files.includes(path) && path !== document.state.path
+  const path = withSuffix(typed)
+  const exists = files.includes(path) && path !== document.state.path
 
   const save = async () => {
     try {
-      await line.ask({ kind: 'save', document: document.state.document, path, overwrite: taken })
-      show(null)
+      await connection.ask({ kind: 'save', document: document.state.document, path, overwrite: exists })
+      showDialog(null)
     } catch (error) {
       if (!(error instanceof Refusal)) throw error
       setFault(error)
@@ -63,24 +64,24 @@ function SaveAs() {
             setTyped(value)
             setFault(null)
           }}
-          error={fault && !taken ? fault.what : undefined}
+          error={fault && !exists ? fault.what : undefined}
         />
-        {fault && !taken && (
+        {fault && !exists && (
           <Text size="xs" c="dimmed">
             {fault.fix}
           </Text>
         )}
-        {taken && (
+        {exists && (
           <Alert color="yellow" title={`${path} exists already`}>
             Its content will be replaced by this diagram.
           </Alert>
         )}
         <Group justify="flex-end" gap="xs">
-          <Button variant="default" onClick={() => show(null)}>
+          <Button variant="default" onClick={() => showDialog(null)}>
             Cancel
           </Button>
-          <Button type="submit" color={taken ? 'red' : undefined} disabled={!typed.trim()}>
-            {taken ? 'Overwrite' : 'Save'}
+          <Button type="submit" color={exists ? 'red' : undefined} disabled={!typed.trim()}>
+            {exists ? 'Overwrite' : 'Save'}
           </Button>
         </Group>
       </Stack>

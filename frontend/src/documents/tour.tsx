@@ -3,7 +3,7 @@ import { useEffect, useLayoutEffect, useState } from 'react'
 import { openTour, useTour } from '../dialogs'
 import { useStudio } from '../store'
 
-const SEEN = 'armblocks-tour-seen'
+const SEEN_KEY = 'armblocks-tour-seen'
 const WIDTH = 320
 const GAP = 14
 
@@ -63,9 +63,9 @@ const STOPS: Stop[] = [
   },
 ]
 
-function leave(): void {
+function closeTour(): void {
   useTour.setState({ stop: null })
-  localStorage.setItem(SEEN, 'yes')
+  localStorage.setItem(SEEN_KEY, 'yes')
 }
 
 /** A tour of the page, about two minutes; offered at the first visit and in the menu. */
@@ -73,25 +73,25 @@ export function Tour() {
   const { stop } = useTour()
   const offered = useStudio((s) => s.document !== null)
   const [box, setBox] = useState<DOMRect | null>(null)
-  const [asked, setAsked] = useState(() => localStorage.getItem(SEEN) === 'yes')
-  const here = stop === null ? undefined : STOPS[stop]
+  const [answered, setAnswered] = useState(() => localStorage.getItem(SEEN_KEY) === 'yes')
+  const current = stop === null ? undefined : STOPS[stop]
   useLayoutEffect(() => {
-    const found = here && document.querySelector(here.at)
-    setBox(found ? found.getBoundingClientRect() : null)
-  }, [here])
+    const element = current && document.querySelector(current.at)
+    setBox(element ? element.getBoundingClientRect() : null)
+  }, [current])
   useEffect(() => {
     if (stop === null) return
     const onKey = (event: KeyboardEvent) => {
       if (event.key !== 'Escape') return
-      leave()
+      closeTour()
       event.stopPropagation()
     }
     addEventListener('keydown', onKey, true)
     return () => removeEventListener('keydown', onKey, true)
   }, [stop])
-  if (!here) {
-    if (asked || !offered) return null
-    return <Offer done={() => setAsked(true)} />
+  if (!current) {
+    if (answered || !offered) return null
+    return <Offer done={() => setAnswered(true)} />
   }
   const last = stop === STOPS.length - 1
   return (
@@ -108,15 +108,15 @@ export function Tour() {
         shadow="lg"
         p="sm"
         role="dialog"
-        aria-label={here.title}
+        aria-label={current.title}
         style={beside(box)}
       >
         <Group justify="space-between" wrap="nowrap">
-          <Text fw={600}>{here.title}</Text>
-          <CloseButton size="sm" aria-label="Leave the tour" onClick={leave} />
+          <Text fw={600}>{current.title}</Text>
+          <CloseButton size="sm" aria-label="Leave the tour" onClick={closeTour} />
         </Group>
         <Text size="sm" my={6}>
-          {here.text}
+          {current.text}
         </Text>
         <Group justify="space-between">
           <Text size="xs" c="dimmed">
@@ -137,7 +137,7 @@ export function Tour() {
               data-autofocus
               autoFocus
               key={stop}
-              onClick={() => (last ? leave() : useTour.setState({ stop: stop! + 1 }))}
+              onClick={() => (last ? closeTour() : useTour.setState({ stop: stop! + 1 }))}
             >
               {last ? 'Done' : 'Next'}
             </Button>
@@ -150,8 +150,8 @@ export function Tour() {
 
 /** Offers the tour at the first visit. */
 function Offer({ done }: { done: () => void }) {
-  const answered = () => {
-    localStorage.setItem(SEEN, 'yes')
+  const answer = () => {
+    localStorage.setItem(SEEN_KEY, 'yes')
     done()
   }
   return (
@@ -160,10 +160,10 @@ function Offer({ done }: { done: () => void }) {
         New here? The tour takes two minutes.
       </Text>
       <Group gap="xs" mt={8}>
-        <Button size="compact-sm" onClick={() => (answered(), openTour())}>
+        <Button size="compact-sm" onClick={() => (answer(), openTour())}>
           Take the tour
         </Button>
-        <Button size="compact-sm" variant="default" onClick={answered}>
+        <Button size="compact-sm" variant="default" onClick={answer}>
           Not now
         </Button>
       </Group>

@@ -2,7 +2,7 @@ import { Button, Code, Group, Modal, NativeSelect, Stack, Switch, Text, TextInpu
 import { useEffect, useMemo, useState } from 'react'
 import { Refusal } from '../connection'
 import type { ParameterRule, SheetBlock } from '../protocol'
-import { change, line, look, useStudio } from '../store'
+import { change, connection, openSheet, useStudio } from '../store'
 import { openMask } from '../dialogs'
 import { FunctionField } from './function_field'
 import { TableField, tableRows, tableText } from './table_field'
@@ -22,36 +22,36 @@ export function BlockDialog() {
 }
 
 function Dialog({ block, onClose }: { block: SheetBlock; onClose: () => void }) {
-  const kind = useStudio((s) => s.library.get(block.type))
-  const [before] = useState(() => document.activeElement)
+  const blockType = useStudio((s) => s.library.get(block.type))
+  const [previousFocus] = useState(() => document.activeElement)
   useEffect(
     () => () => {
-      if (before instanceof HTMLElement) before.focus({ preventScroll: true })
+      if (previousFocus instanceof HTMLElement) previousFocus.focus({ preventScroll: true })
     },
-    [before],
+    [previousFocus],
   )
-  const rules = useMemo(() => [...(kind?.parameters ?? []), ...block.mask], [block, kind])
-  const start = useMemo(
+  const rules = useMemo(() => [...(blockType?.parameters ?? []), ...block.mask], [block, blockType])
+  const initialTexts = useMemo(
     () =>
       Object.fromEntries(
         rules.map((rule) => [rule.name, block.formulas[rule.name] ?? textOf(rule, valueOf(block, rule))]),
       ),
     [block, rules],
   )
-  const [typed, setTyped] = useState<Record<string, string>>(start)
+  const [typed, setTyped] = useState<Record<string, string>>(initialTexts)
   const [faults, setFaults] = useState<Record<string, string>>({})
-  if (!kind) return null
-  const changed = rules.filter(({ name }) => typed[name] !== start[name])
-  const wrong = Object.values(faults).some(Boolean)
+  if (!blockType) return null
+  const changed = rules.filter(({ name }) => typed[name] !== initialTexts[name])
+  const invalid = Object.values(faults).some(Boolean)
   const apply = async () => {
-    if (wrong) return false
+    if (invalid) return false
     if (!changed.length) return true
     const values = Object.fromEntries(
-      changed.map((rule) => [rule.name, sent(rule, typed[rule.name] ?? '', rule.name in block.formulas)]),
+      changed.map((rule) => [rule.name, sentValue(rule, typed[rule.name] ?? '', block)]),
     )
     return (await change({ kind: 'parameters', block: block.name, values })) !== undefined
   }
-  const [summary, ...rest] = kind.documentation.split('\n\n')
+  const [summary, ...rest] = blockType.documentation.split('\n\n')
   return (
     <Modal
       opened
@@ -60,7 +60,7 @@ function Dialog({ block, onClose }: { block: SheetBlock; onClose: () => void }) 
         <Group gap="xs">
           <b>{block.name}</b>
           <Text size="sm" c="dimmed">
-            {kind.title}
+            {blockType.title}
           </Text>
         </Group>
       }
@@ -74,14 +74,14 @@ function Dialog({ block, onClose }: { block: SheetBlock; onClose: () => void }) 
       >
         <Stack gap="sm">
           <Text size="sm">{summary}</Text>
-          <More paragraphs={rest} />
+          <MoreDocumentation paragraphs={rest} />
           {rules.map((rule, index) => (
             <Field
               key={rule.name}
               rule={rule}
               block={block}
               text={typed[rule.name] ?? ''}
-              start={start[rule.name] ?? ''}
+              initial={initialTexts[rule.name] ?? ''}
               focus={index === 0}
               onText={(text) => setTyped((now) => ({ ...now, [rule.name]: text }))}
               onFault={(fault) =>
@@ -90,14 +90,14 @@ function Dialog({ block, onClose }: { block: SheetBlock; onClose: () => void }) 
             />
           ))}
           {rules.length === 0 && <Text size="sm">This block has no parameters.</Text>}
-          <Actions block={block} wrong={wrong} changed={changed.length > 0} apply={apply} onClose={onClose} />
+          <Actions {...{ block, invalid, apply, onClose }} changed={changed.length > 0} />
         </Stack>
       </form>
     </Modal>
   )
 }
 
-function More({ paragraphs }: { paragraphs: string[] }) {
+function MoreDocumentation({ paragraphs }: { paragraphs: string[] }) {
   if (!paragraphs.length) return null
   return (
     <details className="more">
@@ -113,13 +113,13 @@ function More({ paragraphs }: { paragraphs: string[] }) {
 
 interface ActionsProps {
   block: SheetBlock
-  wrong: boolean
+  invalid: boolean
   changed: boolean
   apply: () => Promise<boolean>
   onClose: () => void
 }
 
-function Actions({ block, wrong, changed, apply, onClose }: ActionsProps) {
+function Actions({ block, invalid, changed, apply, onClose }: ActionsProps) {
   return (
     <Group justify="flex-end" gap="xs" className="dialog-actions">
       {block.opens && (
@@ -127,7 +127,10 @@ function Actions({ block, wrong, changed, apply, onClose }: ActionsProps) {
           <Button
             variant="subtle"
             px="xs"
-            onClick={() => (onClose(), look([...(useStudio.getState().document?.inside ?? []), block.name]))}
+            onClick={() => (
+              onClose(),
+              openSheet([...(useStudio.getState().document?.inside ?? []), block.name])
+            )}
           >
             Look under the mask
           </Button>
@@ -141,10 +144,10 @@ function Actions({ block, wrong, changed, apply, onClose }: ActionsProps) {
       <Button variant="default" onClick={onClose}>
         Cancel
       </Button>
-      <Button variant="default" disabled={wrong || !changed} onClick={() => void apply()}>
+      <Button variant="default" disabled={invalid || !changed} onClick={() => void apply()}>
         Apply
       </Button>
-      <Button type="submit" disabled={wrong}>
+      <Button type="submit" disabled={invalid}>
         OK
       </Button>
     </Group>
@@ -155,13 +158,13 @@ interface FieldProps {
   rule: ParameterRule
   block: SheetBlock
   text: string
-  start: string
+  initial: string
   focus: boolean
   onText: (text: string) => void
   onFault: (fault: string) => void
 }
 
-function Field({ rule, block, text, start, focus, onText, onFault }: FieldProps) {
+function Field({ rule, block, text, initial, focus, onText, onFault }: FieldProps) {
   const robots = useStudio((s) => s.welcome?.robots)
   const files = useStudio((s) => s.welcome?.files)
   const { fault, value } = useCheck(rule, block, text, onFault)
@@ -171,7 +174,12 @@ function Field({ rule, block, text, start, focus, onText, onFault }: FieldProps)
       {rule.unit && <span className="unit"> {rule.unit}</span>}
     </>
   )
-  const common = { label, description: rule.doc, size: 'sm' as const, 'data-autofocus': focus || undefined }
+  const fieldProps = {
+    label,
+    description: rule.doc,
+    size: 'sm' as const,
+    'data-autofocus': focus || undefined,
+  }
   const formula = rule.name in block.formulas
   if (rule.kind === 'boolean' && !formula)
     return (
@@ -185,18 +193,18 @@ function Field({ rule, block, text, start, focus, onText, onFault }: FieldProps)
   if (rule.kind === 'choice' && !formula)
     return (
       <NativeSelect
-        {...common}
+        {...fieldProps}
         data={rule.choices}
         value={text}
         onChange={(event) => onText(event.currentTarget.value)}
       />
     )
   if (rule.kind === 'robot' && !formula) {
-    const known = [...(robots ?? []), ...(files ?? [])]
+    const robotFiles = [...(robots ?? []), ...(files ?? [])]
     return (
       <NativeSelect
-        {...common}
-        data={known.includes(text) ? known : [text, ...known]}
+        {...fieldProps}
+        data={robotFiles.includes(text) ? robotFiles : [text, ...robotFiles]}
         value={text}
         onChange={(event) => onText(event.currentTarget.value)}
       />
@@ -206,10 +214,10 @@ function Field({ rule, block, text, start, focus, onText, onFault }: FieldProps)
     const rows = tableRows(valueOf(block, rule))
     return <TableField {...{ rule, text, rows, focus, onText, onFault }} />
   }
-  if (rule.kind === 'function') return <FunctionField {...{ rule, block, text, start, focus, onText }} />
+  if (rule.kind === 'function') return <FunctionField {...{ rule, block, text, initial, focus, onText }} />
   return (
     <TextInput
-      {...common}
+      {...fieldProps}
       value={text}
       onChange={(event) => onText(event.currentTarget.value)}
       error={fault || undefined}
@@ -238,7 +246,7 @@ function useCheck(rule: ParameterRule, block: SheetBlock, text: string, onFault:
     const timer = setTimeout(() => {
       const { document } = useStudio.getState()
       const where = { document: document?.state.document, inside: document?.inside, block: block.name }
-      line.ask({ kind: 'typed', ...where, type: block.type, parameter: rule.name, text }).then(
+      connection.ask({ kind: 'typed', ...where, type: block.type, parameter: rule.name, text }).then(
         (value) => report('', valueText(value)),
         (error: unknown) =>
           error instanceof Refusal && report(`${error.what}. Allowed: ${error.allowed}`, ''),
@@ -253,10 +261,11 @@ function useCheck(rule: ParameterRule, block: SheetBlock, text: string, onFault:
   return state
 }
 
-function sent(rule: ParameterRule, text: string, formula: boolean): unknown {
+/** The value of a parameter in the request. */
+function sentValue(rule: ParameterRule, text: string, { formulas }: SheetBlock): unknown {
   // An empty text is the default: rows in the diagram, or the function of a new block.
   if (namesFile(rule)) return text ? (rule.kind === 'table' ? JSON.parse(text) : text) : null
-  return rule.kind === 'boolean' && !formula ? text === 'true' : text
+  return rule.kind === 'boolean' && !(rule.name in formulas) ? text === 'true' : text
 }
 
 const namesFile = ({ kind }: ParameterRule): boolean => kind === 'table' || kind === 'function'

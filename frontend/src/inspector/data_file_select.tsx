@@ -1,7 +1,7 @@
 import { Select } from '@mantine/core'
 import { useEffect, useState } from 'react'
 import type { DataFile } from '../protocol'
-import { SCROLLED } from '../scrolled'
+import { SCROLLED } from '../dropdown_scrolling'
 import { ask } from '../store'
 
 interface Props {
@@ -14,7 +14,7 @@ interface Props {
   onFile: (file: string) => void
 }
 
-const WORDS = {
+const NO_FILES = {
   table: 'No CSV, NPZ, MAT or Parquet file in the folder of the studio: drop one on the sheet.',
   function: 'No Python file in the folder of the studio.',
 }
@@ -22,8 +22,8 @@ const WORDS = {
 /** Chooses a file of the project folder by typing a part of its path. */
 export function DataFileSelect({ holds, label, description, file, focus, onFile }: Props) {
   const [files, setFiles] = useState<DataFile[] | null>(null)
-  useEffect(() => void ask({ kind: 'data_files', holds }).then((found) => setFiles(found ?? [])), [holds])
-  const known = files?.map(({ path }) => path) ?? []
+  useEffect(() => void ask({ kind: 'data_files', holds }).then((list) => setFiles(list ?? [])), [holds])
+  const paths = files?.map(({ path }) => path) ?? []
   return (
     <Select
       {...SCROLLED}
@@ -32,11 +32,11 @@ export function DataFileSelect({ holds, label, description, file, focus, onFile 
       selectFirstOptionOnChange
       label={label}
       description={description}
-      data={file && !known.includes(file) ? [file, ...known] : known}
+      data={file && !paths.includes(file) ? [file, ...paths] : paths}
       value={file || null}
       placeholder="Choose a file"
       onChange={(next) => next && onFile(next)}
-      nothingFoundMessage={files?.length ? 'no such file' : files ? WORDS[holds] : 'reading the folder …'}
+      nothingFoundMessage={files?.length ? 'no such file' : files ? NO_FILES[holds] : 'reading the folder …'}
       data-autofocus={focus || undefined}
     />
   )

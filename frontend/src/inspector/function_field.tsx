@@ -2,7 +2,7 @@ import { Alert, Badge, Button, Group, NativeSelect, Stack, Text } from '@mantine
 import { useCallback, useEffect, useRef, useState } from 'react'
 import { Refusal } from '../connection'
 import type { FunctionSource, ParameterRule, SheetBlock } from '../protocol'
-import { ask, change, line, useStudio } from '../store'
+import { ask, change, connection, useStudio } from '../store'
 import { DataFileSelect } from './data_file_select'
 
 interface Props {
@@ -11,31 +11,31 @@ interface Props {
   /** `file.py:name`, or `''` for the default function. */
   text: string
   /** The function of the block as it was when the dialog was opened. */
-  start: string
+  initial: string
   focus: boolean
   onText: (text: string) => void
 }
 
 /** A parameter that is a function of a Python file of the project folder: source, trust, reload. */
-export function FunctionField({ rule, block, text, start, focus, onText }: Props) {
-  const colon = text.lastIndexOf(':')
-  const [typedFile, setFile] = useState(text.slice(0, Math.max(colon, 0)))
-  const name = text.slice(colon + 1)
+export function FunctionField({ rule, block, text, initial, focus, onText }: Props) {
+  const lastColon = text.lastIndexOf(':')
+  const [typedFile, setFile] = useState(text.slice(0, Math.max(lastColon, 0)))
+  const name = text.slice(lastColon + 1)
   const { source, refusal, load } = useSource(typedFile)
   const fault = refusal ?? source?.fault ?? null
-  const known = source?.functions ?? []
-  const found = known.find((entry) => entry.name === name)
+  const functions = source?.functions ?? []
+  const selected = functions.find((entry) => entry.name === name)
   useEffect(() => {
     // The first function of another file is selected.
-    if (source && known.length && !found) onText(`${typedFile}:${known[0]!.name}`)
+    if (source && functions.length && !selected) onText(`${typedFile}:${functions[0]!.name}`)
     // eslint-disable-next-line react-hooks/exhaustive-deps
   }, [source])
   const reload = async () => {
-    const now = await load()
-    const inputs = now?.functions.find((entry) => entry.name === name)?.arguments.filter(isInput)
+    const newSource = await load()
+    const inputs = newSource?.functions.find((entry) => entry.name === name)?.arguments.filter(isInput)
     const ports = block.inputs.map((port) => port.name)
     // The ports of the block follow the arguments.
-    if (inputs && text === start && inputs.join() !== ports.join())
+    if (inputs && text === initial && inputs.join() !== ports.join())
       await change({ kind: 'parameters', block: block.name, values: { [rule.name]: text } })
   }
   const trust = async (trusted: boolean) => {
@@ -56,11 +56,11 @@ export function FunctionField({ rule, block, text, start, focus, onText }: Props
             onFile={(file) => (setFile(file), onText(''))}
           />
         </div>
-        {known.length > 0 && (
+        {functions.length > 0 && (
           <NativeSelect
             aria-label="Function"
             size="sm"
-            data={known.map((entry) => ({
+            data={functions.map((entry) => ({
               value: entry.name,
               label: `${entry.name}(${entry.arguments.join(', ')})`,
             }))}
@@ -77,7 +77,7 @@ export function FunctionField({ rule, block, text, start, focus, onText }: Props
           </Text>
         </Alert>
       )}
-      {source && !fault && !known.length && (
+      {source && !fault && !functions.length && (
         <Alert color="red" variant="light" p="xs" role="alert">
           The file defines no function at its top level.
         </Alert>
@@ -85,7 +85,7 @@ export function FunctionField({ rule, block, text, start, focus, onText }: Props
       {source && (
         <Trust source={source} onTrust={(trusted) => void trust(trusted)} onReload={() => void reload()} />
       )}
-      {source && <Source file={typedFile} source={source} block={block} line={found?.line ?? 1} />}
+      {source && <Source file={typedFile} source={source} block={block} line={selected?.line ?? 1} />}
     </Stack>
   )
 }
@@ -94,11 +94,11 @@ const isInput = (argument: string): boolean => !argument.includes('=') && argume
 
 /** The content of a file; read again when the window gets the focus, after an edit in another program. */
 function useSource(file: string) {
-  const [state, setState] = useState<Read>({ file: '', source: null, refusal: null })
+  const [state, setState] = useState<ReadState>({ file: '', source: null, refusal: null })
   const load = useCallback(async (): Promise<FunctionSource | null> => {
     if (!file) return null
     try {
-      const source = await line.ask({ kind: 'read_source', file })
+      const source = await connection.ask({ kind: 'read_source', file })
       setState({ file, source, refusal: null })
       return source
     } catch (error) {
@@ -113,11 +113,11 @@ function useSource(file: string) {
     addEventListener('focus', read)
     return () => removeEventListener('focus', read)
   }, [load])
-  const own = state.file === file
-  return { source: own ? state.source : null, refusal: own ? state.refusal : null, load }
+  const isCurrent = state.file === file
+  return { source: isCurrent ? state.source : null, refusal: isCurrent ? state.refusal : null, load }
 }
 
-interface Read {
+interface ReadState {
   file: string
   source: FunctionSource | null
   refusal: Refusal | null
@@ -180,7 +180,7 @@ interface SourceProps {
 }
 
 /** The code, read-only, with the lines that errors name. */
-function Source({ file, source, block, line: shown }: SourceProps) {
+function Source({ file, source, block, line: selectedLine }: SourceProps) {
   const findings = useStudio((s) => s.document?.findings)
   const inside = useStudio((s) => s.document?.inside)
   const path = [...(inside ?? []), block.name].join('/')
@@ -189,12 +189,12 @@ function Source({ file, source, block, line: shown }: SourceProps) {
     : []
   const messages = blockFindings.map(({ what }) => what)
   const faulty = new Set([...messages, source.fault?.what ?? ''].flatMap(linesIn))
-  const first = [...faulty][0] ?? (source.trusted ? shown : 1)
-  const box = useRef<HTMLPreElement>(null)
+  const shownLine = [...faulty][0] ?? (source.trusted ? selectedLine : 1)
+  const codeElement = useRef<HTMLPreElement>(null)
   useEffect(() => {
-    const row = box.current?.children[first - 1]
-    if (box.current && row instanceof HTMLElement) box.current.scrollTop = row.offsetTop - 8
-  }, [first, source])
+    const row = codeElement.current?.children[shownLine - 1]
+    if (codeElement.current && row instanceof HTMLElement) codeElement.current.scrollTop = row.offsetTop - 8
+  }, [shownLine, source])
   return (
     <>
       {messages.map((what) => (
@@ -202,7 +202,7 @@ function Source({ file, source, block, line: shown }: SourceProps) {
           {what}
         </Text>
       ))}
-      <pre ref={box} className="source-code" tabIndex={0} aria-label={`Source of ${file}`}>
+      <pre ref={codeElement} className="source-code" tabIndex={0} aria-label={`Source of ${file}`}>
         {source.text.split('\n').map((text, number) => (
           <code key={number} className={faulty.has(number + 1) ? 'faulty' : undefined} data-line={number + 1}>
             {text || ' '}
@@ -214,4 +214,4 @@ function Source({ file, source, block, line: shown }: SourceProps) {
 }
 
 const linesIn = (what: string): number[] =>
-  [...what.matchAll(/\bline (\d+)/g)].map((found) => Number(found[1]))
+  [...what.matchAll(/\bline (\d+)/g)].map((match) => Number(match[1]))

@@ -2,13 +2,13 @@ import { ActionIcon, Alert, Button, Group, Modal, NativeSelect, Stack, Text, Tex
 import { IconArrowDown, IconArrowUp, IconPlus, IconTrash } from '@tabler/icons-react'
 import { useEffect, useState } from 'react'
 import { Refusal } from '../connection'
-import { show, useDialogs } from '../dialogs'
+import { showDialog, useDialogs } from '../dialogs'
 import { newKey } from '../keys'
 import type { MaskParameter } from '../protocol'
 import { ask, attempt, freeName, useStudio } from '../store'
 import { valueText } from './value_text'
 
-const KINDS = [
+const TYPES = [
   { value: 'number', label: 'number' },
   { value: 'array', label: 'array' },
   { value: 'integer', label: 'integer' },
@@ -34,7 +34,7 @@ interface Row {
   doc: string
 }
 
-const close = () => show(null)
+const close = () => showDialog(null)
 
 /**
  * The mask of a subsystem or of the model: parameters are declared, renamed and ordered. Formulas of the
@@ -42,7 +42,7 @@ const close = () => show(null)
  */
 export function MaskDialog() {
   const opened = useDialogs((s) => s.open === 'mask')
-  const block = useDialogs((s) => s.of)
+  const block = useDialogs((s) => s.maskOwner)
   return (
     <Modal
       opened={opened}
@@ -57,17 +57,17 @@ export function MaskDialog() {
 }
 
 function Mask({ onClose }: { onClose: () => void }) {
-  const [{ inside, block }] = useState(place)
+  const [{ inside, block }] = useState(maskLocation)
   const [rows, setRows] = useState<Row[] | null>(null)
   const [face, setFace] = useState('')
   const [fault, setFault] = useState<Refusal | null>(null)
   useEffect(() => {
     const { document } = useStudio.getState()
     if (!document) return
-    void ask({ kind: 'ask_mask', document: document.state.document, inside, block }).then((found) => {
-      if (!found) return onClose()
-      setRows(found.parameters.map(rowOf))
-      setFace(found.name ?? '')
+    void ask({ kind: 'ask_mask', document: document.state.document, inside, block }).then((mask) => {
+      if (!mask) return onClose()
+      setRows(mask.parameters.map(rowOf))
+      setFace(mask.name ?? '')
     })
   }, [inside, block, onClose])
   if (!rows) return null
@@ -112,7 +112,7 @@ function Mask({ onClose }: { onClose: () => void }) {
           </Text>
         )}
         <AddRow rows={rows} setRows={setRows} />
-        {fault && <Why fault={fault} />}
+        {fault && <FaultAlert fault={fault} />}
         <Group justify="flex-end" gap="xs">
           <Button variant="default" onClick={onClose}>
             Cancel
@@ -129,7 +129,7 @@ function Mask({ onClose }: { onClose: () => void }) {
   )
 }
 
-function Why({ fault }: { fault: Refusal }) {
+function FaultAlert({ fault }: { fault: Refusal }) {
   return (
     <Alert color="red" title={fault.what} role="alert">
       {[
@@ -144,11 +144,11 @@ function Why({ fault }: { fault: Refusal }) {
 }
 
 function Rows({ rows, setRows }: { rows: Row[]; setRows: (rows: Row[]) => void }) {
-  const put = (key: string, change: Partial<Row>) =>
+  const updateRow = (key: string, change: Partial<Row>) =>
     setRows(rows.map((row) => (row.key === key ? { ...row, ...change } : row)))
-  const swap = (k: number, by: number) => {
+  const swap = (k: number, step: number) => {
     const next = [...rows]
-    ;[next[k], next[k + by]] = [next[k + by]!, next[k]!]
+    ;[next[k], next[k + step]] = [next[k + step]!, next[k]!]
     setRows(next)
   }
   if (!rows.length) return null
@@ -166,10 +166,10 @@ function Rows({ rows, setRows }: { rows: Row[]; setRows: (rows: Row[]) => void }
         <RowFields
           key={row.key}
           row={row}
-          put={(change) => put(row.key, change)}
+          put={(change) => updateRow(row.key, change)}
           first={k === 0}
           last={k === rows.length - 1}
-          swap={(by) => swap(k, by)}
+          swap={(step) => swap(k, step)}
           remove={() => setRows(rows.filter((one) => one !== row))}
         />
       ))}
@@ -207,7 +207,7 @@ interface RowProps {
   put: (change: Partial<Row>) => void
   first: boolean
   last: boolean
-  swap: (by: -1 | 1) => void
+  swap: (step: -1 | 1) => void
   remove: () => void
 }
 
@@ -234,7 +234,7 @@ function RowFields({ row, put, first, last, swap, remove }: RowProps) {
   )
   const choose = (
     label: string,
-    data: string[] | typeof KINDS,
+    data: string[] | typeof TYPES,
     value: string,
     put: (value: string) => void,
   ) => (
@@ -257,7 +257,9 @@ function RowFields({ row, put, first, last, swap, remove }: RowProps) {
   return (
     <div role="row">
       {field('Name', 'name', true)}
-      {choose('Kind', KINDS, row.kind, (kind) => put({ kind: kind as Row['kind'], ...fresh(kind, robots) }))}
+      {choose('Kind', TYPES, row.kind, (kind) =>
+        put({ kind: kind as Row['kind'], ...initialValues(kind, robots) }),
+      )}
       {row.kind === 'boolean'
         ? choose('Default', ['true', 'false'], row.value, value)
         : row.kind === 'robot'
@@ -320,14 +322,14 @@ function Order({ name, first, last, swap, remove }: OrderProps) {
  * The owner of a mask: a block of the visible sheet, or the visible sheet itself, which is a block of the
  * sheet around it.
  */
-function place(): { inside: string[]; block: string } {
-  const { of, ofSheet } = useDialogs.getState()
+function maskLocation(): { inside: string[]; block: string } {
+  const { maskOwner, ownsVisibleSheet } = useDialogs.getState()
   const inside = useStudio.getState().document?.inside ?? []
-  return { inside: of && ofSheet ? inside.slice(0, -1) : inside, block: of }
+  return { inside: maskOwner && ownsVisibleSheet ? inside.slice(0, -1) : inside, block: maskOwner }
 }
 
 /** The initial values of a row after a change of its type. */
-function fresh(kind: string, robots: string[]): Partial<Row> {
+function initialValues(kind: string, robots: string[]): Partial<Row> {
   if (kind === 'boolean') return { value: 'true', range: '' }
   if (kind === 'robot') return { value: robots[0] ?? '', range: '' }
   if (kind === 'choice') return { value: 'one', range: 'one, another' }
@@ -374,7 +376,7 @@ function rangeText(minimum: number | null, above: number | null, maximum: number
 
 /** The bounds in a range text; an invalid bound is NaN. */
 function bounds(range: string): Pick<MaskParameter, 'minimum' | 'above' | 'maximum'> {
-  const found = { minimum: null, above: null, maximum: null } as {
+  const limits = { minimum: null, above: null, maximum: null } as {
     minimum: number | null
     above: number | null
     maximum: number | null
@@ -383,11 +385,11 @@ function bounds(range: string): Pick<MaskParameter, 'minimum' | 'above' | 'maxim
   for (const part of high === undefined ? [low] : [low, high && `<=${high.replace(/^<=/, '')}`]) {
     const [, sign = '', number = ''] = /^(>=|>|<=|)\s*(.*)$/.exec(part) ?? []
     if (!number) continue
-    if (sign === '<=') found.maximum = Number(number)
-    else if (sign === '>') found.above = Number(number)
-    else found.minimum = Number(number)
+    if (sign === '<=') limits.maximum = Number(number)
+    else if (sign === '>') limits.above = Number(number)
+    else limits.minimum = Number(number)
   }
-  return found
+  return limits
 }
 
 /** Whether parameters of this type have bounds, and whether the bounds of a row are valid. */
@@ -396,7 +398,7 @@ const isReadable = ({ kind, range }: Row): boolean =>
   !isRanged(kind) || !Object.values(bounds(range)).some(Number.isNaN)
 
 function declared({ was, name, kind, value, unit, range, doc }: Row): MaskParameter {
-  const own =
+  const typeFields =
     kind === 'choice'
       ? {
           choices: range
@@ -413,6 +415,6 @@ function declared({ was, name, kind, value, unit, range, doc }: Row): MaskParame
     kind,
     default: kind === 'choice' ? value.trim() : value,
     doc: doc.trim(),
-    ...own,
+    ...typeFields,
   }
 }

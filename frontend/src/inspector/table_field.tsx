@@ -2,8 +2,8 @@ import { Alert, Checkbox, Group, NativeSelect, Stack, Table, Text } from '@manti
 import { useEffect, useState } from 'react'
 import { Refusal } from '../connection'
 import type { ParameterRule, TableColumn, TablePreview } from '../protocol'
-import { line } from '../store'
-import { named, type TableChoice } from '../canvas/table_choice'
+import { connection } from '../store'
+import { withColumnNames, type TableChoice } from '../canvas/table_choice'
 import { DataFileSelect } from './data_file_select'
 import { TablePlot } from './table_plot'
 
@@ -30,17 +30,17 @@ export const tableRows = (value: unknown): string => (value as { table: string }
 /** A parameter that takes its values from the columns of a file of the project folder. */
 export function TableField({ rule, text, rows, focus, onText, onFault }: Props) {
   const choice = text ? (JSON.parse(text) as TableChoice) : null
-  const [start] = useState(text)
+  const [initial] = useState(text)
   const { preview, refusal, stale } = usePreview(text)
   const fault = refusal ?? preview?.fault ?? null
   useEffect(() => {
-    onFault(fault && text !== start ? fault.what : '')
+    onFault(fault && text !== initial ? fault.what : '')
     // The callback is new at every rendering.
     // eslint-disable-next-line react-hooks/exhaustive-deps
-  }, [fault, text, start])
+  }, [fault, text, initial])
   useEffect(() => {
-    const full = choice && preview && !stale ? named(choice, preview) : choice
-    if (full && full !== choice) onText(JSON.stringify(full))
+    const named = choice && preview && !stale ? withColumnNames(choice, preview) : choice
+    if (named && named !== choice) onText(JSON.stringify(named))
     // The callback is new at every rendering.
     // eslint-disable-next-line react-hooks/exhaustive-deps
   }, [preview, stale, text])
@@ -80,7 +80,7 @@ function usePreview(text: string) {
   useEffect(() => {
     if (!text) return
     let current = true
-    line.ask({ kind: 'preview_table', ...(JSON.parse(text) as TableChoice) }).then(
+    connection.ask({ kind: 'preview_table', ...(JSON.parse(text) as TableChoice) }).then(
       (preview) => current && setState({ of: text, preview, refusal: null }),
       (error: unknown) => {
         if (error instanceof Refusal && current) setState({ of: text, preview: null, refusal: error })
@@ -107,10 +107,10 @@ function Columns({ preview, choice, choose }: ColumnsProps) {
   const usable = columns.filter((column) => !column.fault)
   const values = columns.filter((column) => column.name !== time)
   const toggle = (name: string) => {
-    const now = new Set(chosen)
-    if (!now.delete(name)) now.add(name)
+    const names = new Set(chosen)
+    if (!names.delete(name)) names.add(name)
     // In the order of the file.
-    choose({ time, columns: values.filter((column) => now.has(column.name)).map((column) => column.name) })
+    choose({ time, columns: values.filter((column) => names.has(column.name)).map((column) => column.name) })
   }
   return (
     <>
@@ -149,29 +149,32 @@ function Columns({ preview, choice, choose }: ColumnsProps) {
 
 /** The name with the unit, if the name does not contain it, and what the column contains if not numbers. */
 function titleOf({ name, unit, kind }: TableColumn): string {
-  const named = unit && !name.includes(unit) ? `${name} [${unit}]` : name
-  return kind === 'number' ? named : `${named} (${kind})`
+  const title = unit && !name.includes(unit) ? `${name} [${unit}]` : name
+  return kind === 'number' ? title : `${title} (${kind})`
 }
 
 /** First rows, plot, and how the file was interpreted. */
 function Preview({ preview }: { preview: TablePreview }) {
   const { time, chosen, rows, count, spacing, times, notes } = preview
-  const width = rows[0]?.length ?? 0
-  const [least, most] = spacing
+  const columnCount = rows[0]?.length ?? 0
+  const [shortest, longest] = spacing
   const step =
-    most - least < 1e-6 * most ? `every ${short(most)} s` : `every ${short(least)} to ${short(most)} s`
+    longest - shortest < 1e-6 * longest
+      ? `every ${sixDigits(longest)} s`
+      : `every ${sixDigits(shortest)} to ${sixDigits(longest)} s`
   return (
     <>
       <TablePlot preview={preview} />
       <Text size="xs" c="dimmed">
-        {count} rows from {short(times[0]!)} s to {short(times.at(-1)!)} s, {step}
-        {chosen.length > width - 1 && `; the first ${width - 1} of ${chosen.length} columns are shown`}
+        {count} rows from {sixDigits(times[0]!)} s to {sixDigits(times.at(-1)!)} s, {step}
+        {chosen.length > columnCount - 1 &&
+          `; the first ${columnCount - 1} of ${chosen.length} columns are shown`}
       </Text>
       <div className="data-rows" tabIndex={0} role="group" aria-label="First rows">
         <Table withRowBorders={false} verticalSpacing={1} horizontalSpacing={8}>
           <Table.Thead>
             <Table.Tr>
-              {[time, ...chosen].slice(0, width).map((name) => (
+              {[time, ...chosen].slice(0, columnCount).map((name) => (
                 <Table.Th key={name}>{name}</Table.Th>
               ))}
             </Table.Tr>
@@ -198,4 +201,4 @@ function Preview({ preview }: { preview: TablePreview }) {
   )
 }
 
-const short = (value: number): string => String(Number(value.toPrecision(6)))
+const sixDigits = (value: number): string => String(Number(value.toPrecision(6)))

@@ -31,10 +31,10 @@ export function TablePlot({ preview: { times, curves, chosen } }: { preview: Tab
           />
         ))}
       </svg>
-      <span className="numbers top">{range(high)}</span>
-      <span className="numbers bottom">{range(low)}</span>
+      <span className="numbers top">{numberText(high)}</span>
+      <span className="numbers bottom">{numberText(low)}</span>
     </div>
   )
 }
 
-const range = (value: number): string => String(Number(value.toPrecision(4)))
+const numberText = (value: number): string => String(Number(value.toPrecision(4)))

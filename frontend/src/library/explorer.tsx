@@ -3,7 +3,7 @@ import { Tree, useTree, type TreeNodeData } from '@mantine/core'
 import { IconChevronRight, IconSitemap } from '@tabler/icons-react'
 import { useEffect, useMemo, useState } from 'react'
 import type { Outline } from '../protocol'
-import { line, look, useStudio } from '../store'
+import { connection, openSheet, useStudio } from '../store'
 
 const SEPARATOR = '/'
 
@@ -14,13 +14,13 @@ export function Explorer() {
   const title = useStudio((s) => s.document?.state.title ?? '')
   const inside = useStudio((s) => s.document?.inside)
   const [outline, setOutline] = useState<Outline | null>(null)
-  const here = (inside ?? []).join(SEPARATOR)
+  const visiblePath = (inside ?? []).join(SEPARATOR)
   const tree = useTree({ initialExpandedState: { '': true } })
   useEffect(() => {
     if (!document) return
     let current = true
-    line.ask({ kind: 'outline', document }).then(
-      (found) => current && setOutline(found),
+    connection.ask({ kind: 'outline', document }).then(
+      (outline) => current && setOutline(outline),
       () => undefined,
     )
     return () => {
@@ -31,7 +31,7 @@ export function Explorer() {
     for (let depth = 0; depth <= (inside ?? []).length; depth++)
       tree.expand((inside ?? []).slice(0, depth).join(SEPARATOR))
     // eslint-disable-next-line react-hooks/exhaustive-deps
-  }, [here])
+  }, [visiblePath])
   const data = useMemo(() => (outline ? [node(outline, [], title)] : []), [outline, title])
   if (!outline) return <p className="empty">No model is open.</p>
   return (
@@ -51,8 +51,8 @@ export function Explorer() {
         }) => (
           <div
             {...elementProps}
-            className={`${elementProps.className} branch${value === here ? ' here' : ''}`}
-            onClick={() => look(value ? value.split(SEPARATOR) : [])}
+            className={`${elementProps.className} branch${value === visiblePath ? ' here' : ''}`}
+            onClick={() => openSheet(value ? value.split(SEPARATOR) : [])}
           >
             <IconChevronRight
               size={13}

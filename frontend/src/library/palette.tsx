@@ -9,14 +9,15 @@ import { matching } from './search'
 /** All blocks by family, filtered by the search text. Blocks are dragged to the sheet. */
 export function Palette() {
   const library = useStudio((s) => s.welcome?.library)
-  const [sought, setSought] = useState('')
+  const [query, setQuery] = useState('')
   const [open, setOpen] = useState<ReadonlySet<string>>(new Set(['sources', 'sinks']))
   const families = useMemo(() => {
-    const found = sought ? matching(library ?? [], sought) : (library ?? [])
+    const matches = query ? matching(library ?? [], query) : (library ?? [])
     const groups = new Map<string, BlockType[]>()
-    for (const kind of found) groups.set(kind.family, [...(groups.get(kind.family) ?? []), kind])
+    for (const blockType of matches)
+      groups.set(blockType.family, [...(groups.get(blockType.family) ?? []), blockType])
     return [...groups]
-  }, [library, sought])
+  }, [library, query])
   const toggle = (family: string) => {
     const next = new Set(open)
     if (!next.delete(family)) next.add(family)
@@ -30,26 +31,31 @@ export function Palette() {
         placeholder="Search blocks"
         leftSection={<IconSearch size={14} />}
         rightSection={
-          sought && <CloseButton size="xs" aria-label="Clear the search" onClick={() => setSought('')} />
+          query && <CloseButton size="xs" aria-label="Clear the search" onClick={() => setQuery('')} />
         }
-        value={sought}
-        onChange={(event) => setSought(event.currentTarget.value)}
+        value={query}
+        onChange={(event) => setQuery(event.currentTarget.value)}
       />
       <div className="families">
-        {families.length === 0 && sought && <p className="empty">No block matches “{sought}”.</p>}
-        {families.map(([family, kinds]) => {
-          const shown = sought !== '' || open.has(family)
+        {families.length === 0 && query && <p className="empty">No block matches “{query}”.</p>}
+        {families.map(([family, blockTypes]) => {
+          const expanded = query !== '' || open.has(family)
           return (
             <section key={family}>
-              <button type="button" className="family" aria-expanded={shown} onClick={() => toggle(family)}>
-                <IconChevronRight size={13} className={shown ? 'turned' : ''} />
+              <button
+                type="button"
+                className="family"
+                aria-expanded={expanded}
+                onClick={() => toggle(family)}
+              >
+                <IconChevronRight size={13} className={expanded ? 'turned' : ''} />
                 {family}
-                <span className="count">{kinds.length}</span>
+                <span className="count">{blockTypes.length}</span>
               </button>
-              {shown && (
+              {expanded && (
                 <div className="kinds">
-                  {kinds.map((kind) => (
-                    <Kind key={kind.type} kind={kind} />
+                  {blockTypes.map((blockType) => (
+                    <PaletteEntry key={blockType.type} blockType={blockType} />
                   ))}
                 </div>
               )}
@@ -61,31 +67,31 @@ export function Palette() {
   )
 }
 
-const Kind = memo(function Kind({ kind }: { kind: BlockType }) {
+const PaletteEntry = memo(function PaletteEntry({ blockType }: { blockType: BlockType }) {
   return (
     <div
       className="kind"
       draggable
-      title={kind.summary}
-      data-type={kind.type}
+      title={blockType.summary}
+      data-type={blockType.type}
       onDragStart={(event) => {
-        event.dataTransfer.setData(BLOCK_TYPE, kind.type)
+        event.dataTransfer.setData(BLOCK_TYPE, blockType.type)
         event.dataTransfer.effectAllowed = 'copy'
       }}
     >
-      <Face kind={kind} />
-      <span>{kind.title}</span>
+      <Face blockType={blockType} />
+      <span>{blockType.title}</span>
     </div>
   )
 })
 
-export function Face({ kind }: { kind: BlockType }) {
+export function Face({ blockType }: { blockType: BlockType }) {
   return (
     <svg
       className="face"
-      viewBox={`-1 -1 ${kind.width + 2} ${kind.height + 2}`}
+      viewBox={`-1 -1 ${blockType.width + 2} ${blockType.height + 2}`}
       aria-hidden
-      dangerouslySetInnerHTML={{ __html: kind.face }}
+      dangerouslySetInnerHTML={{ __html: blockType.face }}
     />
   )
 }

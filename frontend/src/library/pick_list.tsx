@@ -19,7 +19,7 @@ interface PickListProps {
   typed: string
   onTyped: (typed: string) => void
   items: PickItem[]
-  nothing: string
+  emptyText: string
   onPick: (index: number) => void
 }
 
@@ -33,15 +33,15 @@ export function PickList({
   typed,
   onTyped,
   items,
-  nothing,
+  emptyText,
   onPick,
 }: PickListProps) {
-  const [chosen, setChosen] = useState(0)
-  const found = useRef<HTMLDivElement>(null)
-  useEffect(() => setChosen(0), [typed, opened])
+  const [activeIndex, setActiveIndex] = useState(0)
+  const listElement = useRef<HTMLDivElement>(null)
+  useEffect(() => setActiveIndex(0), [typed, opened])
   useEffect(
-    () => found.current?.querySelector('[aria-selected="true"]')?.scrollIntoView({ block: 'nearest' }),
-    [chosen],
+    () => listElement.current?.querySelector('[aria-selected="true"]')?.scrollIntoView({ block: 'nearest' }),
+    [activeIndex],
   )
   const pick = (index: number) => {
     if (!items[index]) return
@@ -65,25 +65,25 @@ export function PickList({
         value={typed}
         onChange={(event) => onTyped(event.currentTarget.value)}
         onKeyDown={(event) => {
-          if (event.key === 'ArrowDown') setChosen(Math.min(chosen + 1, items.length - 1))
-          else if (event.key === 'ArrowUp') setChosen(Math.max(chosen - 1, 0))
-          else if (event.key === 'Enter') pick(chosen)
+          if (event.key === 'ArrowDown') setActiveIndex(Math.min(activeIndex + 1, items.length - 1))
+          else if (event.key === 'ArrowUp') setActiveIndex(Math.max(activeIndex - 1, 0))
+          else if (event.key === 'Enter') pick(activeIndex)
           else return
           event.preventDefault()
         }}
       />
-      <div role="listbox" aria-label={list} className="found" ref={found}>
+      <div role="listbox" aria-label={list} className="found" ref={listElement}>
         {items.map(({ key, title, note, face, keys }, index) => (
           <button
             key={key}
             type="button"
             role="option"
-            aria-selected={index === chosen}
+            aria-selected={index === activeIndex}
             tabIndex={-1}
             onClick={() => pick(index)}
             onMouseMove={({ movementX, movementY }) => {
               // Browsers also report a move when the list changes under a resting pointer.
-              if (movementX || movementY) setChosen(index)
+              if (movementX || movementY) setActiveIndex(index)
             }}
           >
             {face}
@@ -95,7 +95,7 @@ export function PickList({
           </button>
         ))}
       </div>
-      {items.length === 0 && <p className="empty">{nothing}</p>}
+      {items.length === 0 && <p className="empty">{emptyText}</p>}
     </Modal>
   )
 }

@@ -1,12 +1,12 @@
 import { useMemo } from 'react'
-import { addBlock, insertBlock, placeAt } from '../canvas/insert'
-import { show, useDialogs } from '../dialogs'
+import { addBlock, insertBlock, sheetPointAt } from '../canvas/insert'
+import { showDialog, useDialogs } from '../dialogs'
 import { useStudio } from '../store'
 import { Face } from './palette'
 import { PickList } from './pick_list'
 import { matching } from './search'
 
-const MOST_SHOWN = 8
+const MAX_SHOWN = 8
 
 /** Adds a block by keyboard alone: type a few letters, press Enter. */
 export function QuickInsert() {
@@ -14,33 +14,34 @@ export function QuickInsert() {
   const typed = useDialogs((s) => s.typed)
   const at = useDialogs((s) => s.at)
   const library = useStudio((s) => s.welcome?.library)
-  const end = useDialogs((s) => s.end)
-  const found = useMemo(() => {
-    const fitting = (library ?? []).filter(
-      ({ inputs, outputs }) => !end || (end.isOutput ? inputs : outputs).length > 0,
+  const connectTo = useDialogs((s) => s.connectTo)
+  const matches = useMemo(() => {
+    const connectable = (library ?? []).filter(
+      ({ inputs, outputs }) => !connectTo || (connectTo.isOutput ? inputs : outputs).length > 0,
     )
-    return matching(fitting, typed).slice(0, MOST_SHOWN)
-  }, [library, typed, end])
+    return matching(connectable, typed).slice(0, MAX_SHOWN)
+  }, [library, typed, connectTo])
   return (
     <PickList
       opened={opened}
-      onClose={() => show(null)}
+      onClose={() => showDialog(null)}
       label="Add a block"
       placeholder="Add a block: type its name"
       list="Blocks"
       typed={typed}
       onTyped={(next) => useDialogs.setState({ typed: next })}
-      nothing={`No block matches “${typed}”.`}
-      items={found.map((kind) => ({
-        key: kind.type,
-        face: <Face kind={kind} />,
-        title: kind.title,
-        note: kind.summary,
+      emptyText={`No block matches “${typed}”.`}
+      items={matches.map((blockType) => ({
+        key: blockType.type,
+        face: <Face blockType={blockType} />,
+        title: blockType.title,
+        note: blockType.summary,
       }))}
       onPick={(index) => {
-        const kind = found[index]
-        if (kind && at) void insertBlock(kind.type, placeAt(at), end ? { end } : {})
-        else if (kind) addBlock(kind)
+        const blockType = matches[index]
+        if (blockType && at)
+          void insertBlock(blockType.type, sheetPointAt(at), connectTo ? { connectTo } : {})
+        else if (blockType) addBlock(blockType)
       }}
     />
   )

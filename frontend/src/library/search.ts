@@ -4,36 +4,36 @@ import type { BlockType } from '../protocol'
 export function matching(library: readonly BlockType[], typed: string): BlockType[] {
   const words = typed.toLowerCase().split(/\s+/).filter(Boolean)
   const ranked: [rank: number, kind: BlockType][] = []
-  for (const kind of library) {
+  for (const blockType of library) {
     let rank = 0
     for (const word of words) {
-      const one = rankOf(kind, word)
-      if (one === Infinity) rank = Infinity
-      rank += one
+      const wordRank = rankOf(blockType, word)
+      if (wordRank === Infinity) rank = Infinity
+      rank += wordRank
     }
-    if (rank < Infinity) ranked.push([rank, kind])
+    if (rank < Infinity) ranked.push([rank, blockType])
   }
   return ranked
     .sort(([a, x], [b, y]) => a - b || x.title.length - y.title.length || (x.title < y.title ? -1 : 1))
-    .map(([, kind]) => kind)
+    .map(([, blockType]) => blockType)
 }
 
-function rankOf(kind: BlockType, word: string): number {
-  const title = kind.title.toLowerCase()
+function rankOf(blockType: BlockType, word: string): number {
+  const title = blockType.title.toLowerCase()
   if (title === word) return 0
   if (title.startsWith(word)) return 1
   if (title.split(/[\s-]+/).some((part) => part.startsWith(word))) return 2
-  if (kind.type.toLowerCase().includes(word)) return 3
-  if (kind.family.startsWith(word)) return 4
-  if (kind.summary.toLowerCase().includes(word)) return 5
+  if (blockType.type.toLowerCase().includes(word)) return 3
+  if (blockType.family.startsWith(word)) return 4
+  if (blockType.summary.toLowerCase().includes(word)) return 5
   return subsequence(title, word) ? 6 : Infinity
 }
 
 function subsequence(text: string, letters: string): boolean {
-  let at = 0
+  let position = 0
   for (const letter of letters) {
-    at = text.indexOf(letter, at) + 1
-    if (at === 0) return false
+    position = text.indexOf(letter, position) + 1
+    if (position === 0) return false
   }
   return true
 }

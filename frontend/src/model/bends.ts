@@ -9,28 +9,28 @@ import { corners, isFlat, type Point } from './wire_lines'
 const STUB = 15
 
 /** The complete route to a target: its own path, preceded by the part shared with another path. */
-export function wholeWay(
+export function completeRoute(
   net: WireLines,
   target: string,
-  seen: ReadonlySet<string> = new Set([target]),
+  visited: ReadonlySet<string> = new Set([target]),
 ): Point[] {
-  const own = net.paths[target] ?? []
-  const [start] = own
+  const ownPath = net.paths[target] ?? []
+  const [start] = ownPath
   if (!start) return []
   for (const [other, path] of Object.entries(net.paths)) {
-    if (seen.has(other)) continue
+    if (visited.has(other)) continue
     for (let k = 1; k < path.length; k++)
-      if (lies(start, path[k - 1]!, path[k]!) && !same(start, path[0]!)) {
-        const before = wholeWay(net, other, new Set([...seen, other])).slice(0, -(path.length - k))
-        return corners([...before, start, ...own])
+      if (isOnSegment(start, path[k - 1]!, path[k]!) && !equal(start, path[0]!)) {
+        const before = completeRoute(net, other, new Set([...visited, other])).slice(0, -(path.length - k))
+        return corners([...before, start, ...ownPath])
       }
   }
-  return [...own]
+  return [...ownPath]
 }
 
-const same = (a: Point, b: Point) => a[0] === b[0] && a[1] === b[1]
+const equal = (a: Point, b: Point) => a[0] === b[0] && a[1] === b[1]
 
-function lies(p: Point, a: Point, b: Point): boolean {
+function isOnSegment(p: Point, a: Point, b: Point): boolean {
   return (
     Math.min(a[0], b[0]) <= p[0] &&
     p[0] <= Math.max(a[0], b[0]) &&
@@ -43,38 +43,38 @@ function lies(p: Point, a: Point, b: Point): boolean {
  * The coordinates of the segments between the first, which moves with the source, and the last, which moves
  * with the target.
  */
-function pieces(way: readonly Point[]): number[] {
-  const between: number[] = []
-  for (let k = 1; k < way.length - 2; k++) between.push(isFlat(way, k) ? way[k]![1] : way[k]![0])
-  return between
+function innerCoordinates(route: readonly Point[]): number[] {
+  const inner: number[] = []
+  for (let k = 1; k < route.length - 2; k++) inner.push(isFlat(route, k) ? route[k]![1] : route[k]![0])
+  return inner
 }
 
 /**
- * The bends after segment `piece` of a route was dragged to `level`. A segment at a port keeps a short part
+ * The bends after a `segment` of a route was dragged to `level`. A segment at a port keeps a short part
  * at the port and continues with a step to the level, because the port does not move.
  */
-export function dragged(way: readonly Point[], piece: number, level: number): number[] {
-  const between = pieces(way)
-  const last = way.length - 2
-  if (piece > 0 && piece < last) {
-    between[piece - 1] = level
-    return straightened(between)
+export function dragged(route: readonly Point[], segment: number, level: number): number[] {
+  const inner = innerCoordinates(route)
+  const last = route.length - 2
+  if (segment > 0 && segment < last) {
+    inner[segment - 1] = level
+    return straightened(inner)
   }
-  const axis = isFlat(way, piece) ? 0 : 1
+  const axis = isFlat(route, segment) ? 0 : 1
   const along = (from: Point, to: Point) => from[axis] + STUB * Math.sign(to[axis] - from[axis])
-  const leaving = along(way[0]!, way[1]!)
-  const arriving = along(way[last + 1]!, way[last]!)
+  const leaving = along(route[0]!, route[1]!)
+  const arriving = along(route[last + 1]!, route[last]!)
   if (last === 0) return [leaving, level, arriving]
-  return straightened(piece === 0 ? [leaving, level, ...between] : [...between, level, arriving])
+  return straightened(segment === 0 ? [leaving, level, ...inner] : [...inner, level, arriving])
 }
 
 /** Remove steps of zero length. */
 function straightened(bends: number[]): number[] {
-  const kept = [...bends]
-  for (let k = 0; k + 2 < kept.length; k++)
-    if (Math.abs(kept[k]! - kept[k + 2]!) < 1e-6 && kept.length > 2) {
-      kept.splice(k + 1, 2)
+  const result = [...bends]
+  for (let k = 0; k + 2 < result.length; k++)
+    if (Math.abs(result[k]! - result[k + 2]!) < 1e-6 && result.length > 2) {
+      result.splice(k + 1, 2)
       k--
     }
-  return kept
+  return result
 }

@@ -2,22 +2,24 @@ import type { SheetBlock } from '../protocol'
 import type { Point } from './wire_lines'
 
 /** The point of a path that is nearest to a point. */
-export function nearestOn(path: readonly Point[], [x, y]: Point): Point {
-  let best: Point = path[0] ?? [x, y]
-  let least = Infinity
+export function nearestPointOn(path: readonly Point[], [x, y]: Point): Point {
+  let nearest: Point = path[0] ?? [x, y]
+  let shortest = Infinity
   for (let k = 1; k < path.length; k++) {
     const [[ax, ay], [bx, by]] = [path[k - 1]!, path[k]!]
-    const size = (bx - ax) ** 2 + (by - ay) ** 2
-    const part = size ? Math.min(Math.max(((x - ax) * (bx - ax) + (y - ay) * (by - ay)) / size, 0), 1) : 0
-    const point: Point = [ax + part * (bx - ax), ay + part * (by - ay)]
+    const lengthSquared = (bx - ax) ** 2 + (by - ay) ** 2
+    const fraction = lengthSquared
+      ? Math.min(Math.max(((x - ax) * (bx - ax) + (y - ay) * (by - ay)) / lengthSquared, 0), 1)
+      : 0
+    const point: Point = [ax + fraction * (bx - ax), ay + fraction * (by - ay)]
     const distance = Math.hypot(point[0] - x, point[1] - y)
-    if (distance < least) [least, best] = [distance, point]
+    if (distance < shortest) [shortest, nearest] = [distance, point]
   }
-  return best
+  return nearest
 }
 
 /** An input and its position. */
-export interface InputPlace {
+export interface InputPosition {
   port: string
   at: Point
 }
@@ -26,15 +28,16 @@ export interface InputPlace {
 export function nearestInput(
   blocks: Iterable<Pick<SheetBlock, 'name' | 'place' | 'inputs'>>,
   [x, y]: Point,
-  within: number,
-): InputPlace | undefined {
-  let best: InputPlace | undefined
-  let least = within
+  maxDistance: number,
+): InputPosition | undefined {
+  let nearest: InputPosition | undefined
+  let shortest = maxDistance
   for (const { name, place, inputs } of blocks)
-    for (const spot of inputs) {
-      const at: Point = [place.x + spot.x, place.y + spot.y]
-      const distance = Math.hypot(at[0] - x, at[1] - y)
-      if (distance <= least) [least, best] = [distance, { port: `${name}/${spot.name}`, at }]
+    for (const port of inputs) {
+      const position: Point = [place.x + port.x, place.y + port.y]
+      const distance = Math.hypot(position[0] - x, position[1] - y)
+      if (distance <= shortest)
+        [shortest, nearest] = [distance, { port: `${name}/${port.name}`, at: position }]
     }
-  return best
+  return nearest
 }

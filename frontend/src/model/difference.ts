@@ -10,8 +10,8 @@ export interface Difference {
   at: number
 }
 
-const known = new Map<string, Difference>()
-const MOST_KNOWN = 256
+const cache = new Map<string, Difference>()
+const MAX_CACHED = 256
 
 /**
  * `compared - baseline` at the times of the baseline, where both have values, on both sides of its jumps.
@@ -24,51 +24,52 @@ export function difference(
   element: number,
 ): Difference | undefined {
   const key = `${baseline.version} ${compared.version} ${path} ${element}`
-  const before = known.get(key)
-  if (before) return before
+  const cached = cache.get(key)
+  if (cached) return cached
   const a = baseline.signal(path)
   const b = compared.signal(path)
   if (!a?.columns[element] || !b?.columns[element]) return undefined
-  const found = between(a, b, element)
-  if (known.size >= MOST_KNOWN) known.clear()
-  known.set(key, found)
-  return found
+  const computed = sampledDifference(a, b, element)
+  if (cache.size >= MAX_CACHED) cache.clear()
+  cache.set(key, computed)
+  return computed
 }
 
-function between(a: Signal, b: Signal, element: number): Difference {
+function sampledDifference(a: Signal, b: Signal, element: number): Difference {
   const first = a.columns[element]!
   const second = { time: b.time, values: b.columns[element]! }
   const times: number[] = []
   const values: number[] = []
   let largest = 0
-  let at = NaN
+  let timeOfLargest = NaN
   for (let k = 0; k < first.length; k++) {
     const time = a.time[k]!
-    const left = a.time[k + 1] === time
-    const other = left ? valueBefore(second, time) : valueAt(second, time)
-    if (Number.isNaN(other)) continue
-    const apart = other - first[k]!
+    const isLeftLimit = a.time[k + 1] === time
+    const comparedValue = isLeftLimit ? valueBefore(second, time) : valueAt(second, time)
+    if (Number.isNaN(comparedValue)) continue
+    const deviation = comparedValue - first[k]!
     times.push(time)
-    values.push(apart)
-    if (Math.abs(apart) > largest || Number.isNaN(at)) {
-      largest = Math.abs(apart)
-      at = time
+    values.push(deviation)
+    if (Math.abs(deviation) > largest || Number.isNaN(timeOfLargest)) {
+      largest = Math.abs(deviation)
+      timeOfLargest = time
     }
   }
-  return { time: Float64Array.from(times), values: Float64Array.from(values), largest, at }
+  return { time: Float64Array.from(times), values: Float64Array.from(values), largest, at: timeOfLargest }
 }
 
 /** The element of a signal with the largest difference. */
-export function farthest(
+export function largestDifference(
   baseline: RunSamples,
   compared: RunSamples,
   path: string,
 ): { largest: number; at: number } | undefined {
-  const found = baseline.signal(path)
-  let worst: { largest: number; at: number } | undefined
-  found?.columns.forEach((_, element) => {
-    const one = difference(baseline, compared, path, element)
-    if (one && (!worst || one.largest > worst.largest)) worst = one
+  const signal = baseline.signal(path)
+  let greatest: { largest: number; at: number } | undefined
+  signal?.columns.forEach((_, element) => {
+    const elementDifference = difference(baseline, compared, path, element)
+    if (elementDifference && (!greatest || elementDifference.largest > greatest.largest))
+      greatest = elementDifference
   })
-  return worst
+  return greatest
 }

@@ -8,23 +8,23 @@ export interface Rectangle {
 }
 
 /** Distance of a new block from the other blocks, with room for names and port labels, px. */
-const APART = { x: 30, y: 25 }
+const CLEARANCE = { x: 30, y: 25 }
 const STEP = 20
 
 const overlap = (a: Rectangle, b: Rectangle): boolean =>
-  a.x < b.x + b.width + APART.x &&
-  b.x < a.x + a.width + APART.x &&
-  a.y < b.y + b.height + APART.y &&
-  b.y < a.y + a.height + APART.y
+  a.x < b.x + b.width + CLEARANCE.x &&
+  b.x < a.x + a.width + CLEARANCE.x &&
+  a.y < b.y + b.height + CLEARANCE.y &&
+  b.y < a.y + a.height + CLEARANCE.y
 
 const isFree = (place: Rectangle, blocks: readonly Rectangle[]): boolean =>
   !blocks.some((block) => overlap(place, block))
 
 /** The first free place for a block at or below a position. */
-export function freeBelow(wanted: Rectangle, blocks: readonly Rectangle[]): Rectangle {
-  let at = wanted
-  while (!isFree(at, blocks)) at = { ...at, y: at.y + STEP }
-  return at
+export function freeBelow(preferred: Rectangle, blocks: readonly Rectangle[]): Rectangle {
+  let free = preferred
+  while (!isFree(free, blocks)) free = { ...free, y: free.y + STEP }
+  return free
 }
 
 /**
@@ -37,24 +37,27 @@ export function freeInView(
   blocks: readonly Rectangle[],
 ): Rectangle {
   const [x, y] = [view.x + (view.width - size.width) / 2, view.y + (view.height - size.height) / 2]
-  const [most, up] = [Math.floor(Math.max(x - view.x, 0) / STEP), Math.floor(Math.max(y - view.y, 0) / STEP)]
-  const near = blocks.filter((block) => overlap(view, block))
-  let best: Rectangle | null = null
-  let least = Infinity
-  for (let row = -up; row <= up; row++)
-    for (let column = -most; column <= most; column++) {
+  const [columns, rows] = [
+    Math.floor(Math.max(x - view.x, 0) / STEP),
+    Math.floor(Math.max(y - view.y, 0) / STEP),
+  ]
+  const nearBlocks = blocks.filter((block) => overlap(view, block))
+  let nearest: Rectangle | null = null
+  let shortest = Infinity
+  for (let row = -rows; row <= rows; row++)
+    for (let column = -columns; column <= columns; column++) {
       const distance = row * row + column * column
-      if (distance >= least) continue
+      if (distance >= shortest) continue
       const place = { ...size, x: x + STEP * column, y: y + STEP * row }
-      if (!isFree(place, near)) continue
-      best = place
-      least = distance
+      if (!isFree(place, nearBlocks)) continue
+      nearest = place
+      shortest = distance
     }
   return (
-    best ?? {
+    nearest ?? {
       ...size,
       x: Math.min(...blocks.map((block) => block.x)),
-      y: Math.max(...blocks.map((block) => block.y + block.height)) + 2 * APART.y,
+      y: Math.max(...blocks.map((block) => block.y + block.height)) + 2 * CLEARANCE.y,
     }
   )
 }

@@ -6,7 +6,7 @@ export function freePort(
   input: boolean,
   wires: readonly Wire[],
 ): string | undefined {
-  const taken = new Set(wires.map(({ target }) => target))
-  const ports = (input ? inputs : outputs).map((spot) => `${name}/${spot.name}`)
-  return input ? ports.find((port) => !taken.has(port)) : ports[0]
+  const connected = new Set(wires.map(({ target }) => target))
+  const ports = (input ? inputs : outputs).map((port) => `${name}/${port.name}`)
+  return input ? ports.find((port) => !connected.has(port)) : ports[0]
 }

@@ -23,7 +23,7 @@ export interface Guide {
 }
 
 /** The displacement that aligns a moved shape, and the lines that show the alignment. */
-export interface Guided {
+export interface Alignment {
   dx: number
   dy: number
   guides: Guide[]
@@ -39,24 +39,24 @@ interface Match {
  * Align a moved shape with others within a distance (px). A straight line between an output and an input
  * comes before the alignment of edges and centres; of each kind the nearest alignment is taken.
  */
-export function guided(moving: GuideShape, others: readonly GuideShape[], within: number): Guided {
-  const found: Guided = { dx: 0, dy: 0, guides: [] }
+export function align(moving: GuideShape, others: readonly GuideShape[], within: number): Alignment {
+  const alignment: Alignment = { dx: 0, dy: 0, guides: [] }
   for (const axis of ['x', 'y'] as const) {
     const match =
       nearest(portMatches(moving, others, axis), within) ?? nearest(edgeMatches(moving, others, axis), within)
     if (!match) continue
-    found[axis === 'x' ? 'dx' : 'dy'] = match.shift
+    alignment[axis === 'x' ? 'dx' : 'dy'] = match.shift
     const along = axis === 'x' ? 'y' : 'x'
     const ends = [moving, match.other].flatMap((shape) => [shape[along], shape[along] + size(shape, along)])
-    found.guides.push({ axis, at: match.at, from: Math.min(...ends), to: Math.max(...ends) })
+    alignment.guides.push({ axis, at: match.at, from: Math.min(...ends), to: Math.max(...ends) })
   }
   // Each line was computed before the displacement along it.
-  for (const guide of found.guides) {
-    const by = guide.axis === 'x' ? found.dy : found.dx
-    guide.from += Math.min(by, 0)
-    guide.to += Math.max(by, 0)
+  for (const guide of alignment.guides) {
+    const shift = guide.axis === 'x' ? alignment.dy : alignment.dx
+    guide.from += Math.min(shift, 0)
+    guide.to += Math.max(shift, 0)
   }
-  return found
+  return alignment
 }
 
 const size = (shape: Rectangle, axis: 'x' | 'y') => (axis === 'x' ? shape.width : shape.height)
@@ -66,9 +66,9 @@ function* portMatches(moving: GuideShape, others: readonly GuideShape[], axis: '
   for (const port of moving.ports) {
     if (!port[across]) continue
     for (const other of others)
-      for (const end of other.ports)
-        if (end.output !== port.output && end[across])
-          yield { shift: end[axis] - port[axis], at: end[axis], other }
+      for (const otherPort of other.ports)
+        if (otherPort.output !== port.output && otherPort[across])
+          yield { shift: otherPort[axis] - port[axis], at: otherPort[axis], other }
   }
 }
 

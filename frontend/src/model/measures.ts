@@ -1,10 +1,10 @@
-import { firstAfter } from './instants'
+import { firstAfter } from './time_index'
 import { valueAt } from './trace'
 
 /** The measures of one trace in a time window. `NaN`: undefined. */
 export interface Measures {
-  least: number
-  greatest: number
+  minimum: number
+  maximum: number
   mean: number
   rms: number
   peakToPeak: number
@@ -26,39 +26,39 @@ export function measures(
   from: number,
   to: number,
 ): Measures {
-  const { time, values } = cut(trace, from, to)
+  const { time, values } = samplesInWindow(trace, from, to)
   const count = time.length
-  const nothing = {
-    least: NaN,
-    greatest: NaN,
+  const undefinedMeasures = {
+    minimum: NaN,
+    maximum: NaN,
     mean: NaN,
     rms: NaN,
     peakToPeak: NaN,
     riseTime: NaN,
     overshoot: NaN,
   }
-  if (!count) return nothing
-  let least = values[0]!
-  let greatest = values[0]!
+  if (!count) return undefinedMeasures
+  let minimum = values[0]!
+  let maximum = values[0]!
   let area = 0
   let square = 0
   for (let k = 1; k < count; k++) {
     const a = values[k - 1]!
     const b = values[k]!
     const dt = time[k]! - time[k - 1]!
-    if (b < least) least = b
-    if (b > greatest) greatest = b
+    if (b < minimum) minimum = b
+    if (b > maximum) maximum = b
     area += (dt * (a + b)) / 2
     square += (dt * (a * a + a * b + b * b)) / 3
   }
   const span = time[count - 1]! - time[0]!
   return {
-    least,
-    greatest,
+    minimum,
+    maximum,
     mean: span > 0 ? area / span : values[0]!,
     rms: span > 0 ? Math.sqrt(square / span) : Math.abs(values[0]!),
-    peakToPeak: greatest - least,
-    ...step(time, values, least, greatest),
+    peakToPeak: maximum - minimum,
+    ...step(time, values, minimum, maximum),
   }
 }
 
@@ -66,51 +66,56 @@ export function measures(
 function step(
   time: Float64Array,
   values: Float64Array,
-  least: number,
-  greatest: number,
+  minimum: number,
+  maximum: number,
 ): { riseTime: number; overshoot: number } {
   const count = values.length
   const first = values[0]!
   const last = values[count - 1]!
-  const way = last - first
-  const band = SETTLED_BAND * Math.abs(way)
-  const late = time[count - 1]! - SETTLED_PART * (time[count - 1]! - time[0]!)
-  for (let k = count - 1; k >= 0 && time[k]! >= late; k--)
+  const change = last - first
+  const band = SETTLED_BAND * Math.abs(change)
+  const finalPart = time[count - 1]! - SETTLED_PART * (time[count - 1]! - time[0]!)
+  for (let k = count - 1; k >= 0 && time[k]! >= finalPart; k--)
     if (!(Math.abs(values[k]! - last) <= band)) return { riseTime: NaN, overshoot: NaN }
-  if (!(Math.abs(way) > 1e-9 * Math.max(Math.abs(first), Math.abs(last))) || way === 0)
+  if (!(Math.abs(change) > 1e-9 * Math.max(Math.abs(first), Math.abs(last))) || change === 0)
     return { riseTime: NaN, overshoot: NaN }
-  const peak = way > 0 ? greatest - last : last - least
+  const peak = change > 0 ? maximum - last : last - minimum
   return {
-    riseTime: crossing(time, values, first + 0.9 * way, way) - crossing(time, values, first + 0.1 * way, way),
-    overshoot: peak / Math.abs(way),
+    riseTime:
+      crossing(time, values, first + 0.9 * change, change) -
+      crossing(time, values, first + 0.1 * change, change),
+    overshoot: peak / Math.abs(change),
   }
 }
 
 /** The first time at which the trace reaches a level, in the direction of the step. */
-function crossing(time: Float64Array, values: Float64Array, level: number, way: number): number {
+function crossing(time: Float64Array, values: Float64Array, level: number, change: number): number {
   for (let k = 1; k < values.length; k++) {
     const a = values[k - 1]!
     const b = values[k]!
-    if (way > 0 ? a < level && b >= level : a > level && b <= level)
+    if (change > 0 ? a < level && b >= level : a > level && b <= level)
       return time[k - 1]! + ((level - a) / (b - a)) * (time[k]! - time[k - 1]!)
   }
   return NaN
 }
 
 /** The part of a trace between two times; its ends are interpolated. */
-function cut(trace: { time: Float64Array; values: Float64Array }, from: number, to: number) {
+function samplesInWindow(trace: { time: Float64Array; values: Float64Array }, from: number, to: number) {
   const { time, values } = trace
   const begin = Math.max(from, time[0] ?? Infinity)
   const end = Math.min(to, time[time.length - 1] ?? -Infinity)
   if (!(end >= begin)) return { time: new Float64Array(0), values: new Float64Array(0) }
   const first = firstAfter(time, begin)
   const last = firstAfter(time, end)
-  const ended = (column: Float64Array, before: number, after: number) => {
-    const made = new Float64Array(last - first + 2)
-    made[0] = before
-    made.set(column.subarray(first, last), 1)
-    made[made.length - 1] = after
-    return made
+  const withEnds = (column: Float64Array, before: number, after: number) => {
+    const values = new Float64Array(last - first + 2)
+    values[0] = before
+    values.set(column.subarray(first, last), 1)
+    values[values.length - 1] = after
+    return values
   }
-  return { time: ended(time, begin, end), values: ended(values, valueAt(trace, begin), valueAt(trace, end)) }
+  return {
+    time: withEnds(time, begin, end),
+    values: withEnds(values, valueAt(trace, begin), valueAt(trace, end)),
+  }
 }

@@ -5,17 +5,17 @@ import type { Point } from './wire_lines'
 /** Disconnecting blocks from wires and inserting them into wires: the resulting changes of the wires. */
 
 /** Distance from a wire within which a dropped block is inserted into it, px. */
-const INTO_WIRE = 12
+const INSERT_DISTANCE = 12
 /** Length of wire on both sides of an inserted block; on shorter segments the block is centred, px. */
-const ROOM = 60
+const WIRE_MARGIN = 60
 
 /** Whether a block can be inserted into a wire. */
-const passes = (block: SheetBlock): boolean => block.inputs.length > 0 && block.outputs.length > 0
+const hasInputAndOutput = (block: SheetBlock): boolean => block.inputs.length > 0 && block.outputs.length > 0
 
 /** Whether a block has no wires, so that dropping it on a wire inserts it. */
-export function isLoose(block: SheetBlock, wires: Wire[]): boolean {
+export function isInsertable(block: SheetBlock, wires: Wire[]): boolean {
   return (
-    passes(block) &&
+    hasInputAndOutput(block) &&
     !wires.some(({ source, target }) => blockOf(source) === block.name || blockOf(target) === block.name)
   )
 }
@@ -24,21 +24,21 @@ export function isLoose(block: SheetBlock, wires: Wire[]): boolean {
  * The wires without those between some blocks and all others. For a single block with one input and one
  * output, its two neighbours are connected.
  */
-export function takenOut(blocks: SheetBlock[], wires: Wire[]): Wire[] {
+export function disconnectBlocks(blocks: SheetBlock[], wires: Wire[]): Wire[] {
   const names = new Set(blocks.map(({ name }) => name))
-  const within = ({ source, target }: Wire) => names.has(blockOf(source)) === names.has(blockOf(target))
-  const left = wires.filter(within)
+  const isUncut = ({ source, target }: Wire) => names.has(blockOf(source)) === names.has(blockOf(target))
+  const remaining = wires.filter(isUncut)
   const [block] = blocks
-  if (blocks.length !== 1 || block?.inputs.length !== 1 || block.outputs.length !== 1) return left
-  const cut = wires.filter((wire) => !within(wire))
-  const driver = cut.find(({ target }) => names.has(blockOf(target)))
-  if (!driver) return left
-  const driven = cut.filter(({ source }) => names.has(blockOf(source)))
-  return [...left, ...driven.map(({ target }) => ({ source: driver.source, target }))]
+  if (blocks.length !== 1 || block?.inputs.length !== 1 || block.outputs.length !== 1) return remaining
+  const cutWires = wires.filter((wire) => !isUncut(wire))
+  const driver = cutWires.find(({ target }) => names.has(blockOf(target)))
+  if (!driver) return remaining
+  const driven = cutWires.filter(({ source }) => names.has(blockOf(source)))
+  return [...remaining, ...driven.map(({ target }) => ({ source: driver.source, target }))]
 }
 
 /** The wires after inserting a block into one of them with its first input and first output. */
-export function putInto(block: SheetBlock, wire: Wire, wires: Wire[]): Wire[] {
+export function insertIntoWire(block: SheetBlock, wire: Wire, wires: Wire[]): Wire[] {
   const [input, output] = [block.inputs[0], block.outputs[0]]
   if (!input || !output) return wires
   const others = wires.filter((other) => wireKey(other) !== wireKey(wire))
@@ -50,7 +50,7 @@ export function putInto(block: SheetBlock, wire: Wire, wires: Wire[]): Wire[] {
 }
 
 /** The edit that changes one list of wires into another. */
-export function rewired(before: Wire[], after: Wire[]): { wires: Wire[]; instead: Wire[] } {
+export function wireDifference(before: Wire[], after: Wire[]): { wires: Wire[]; instead: Wire[] } {
   const [old, next] = [new Set(before.map(wireKey)), new Set(after.map(wireKey))]
   return {
     wires: after.filter((wire) => !old.has(wireKey(wire))),
@@ -59,7 +59,7 @@ export function rewired(before: Wire[], after: Wire[]): { wires: Wire[]; instead
 }
 
 /** A horizontal segment of a wire: its height, its ends, and whether it runs to the left. */
-interface Piece {
+interface WireSegment {
   wire: Wire
   y: number
   left: number
@@ -82,7 +82,7 @@ export function wireAt(
   at: { x: number; y: number },
   edges: readonly DrawnWire[],
   wires: Wire[],
-): Piece | undefined {
+): WireSegment | undefined {
   const present = new Set(wires.map(wireKey))
   for (const { id, source, sourceHandle, target, targetHandle, data } of edges) {
     // A wire that was closed when the block was disconnected does not take the block again.
@@ -91,7 +91,7 @@ export function wireAt(
     for (let k = 1; k < path.length; k++) {
       const [[ax, ay], [bx, by]] = [path[k - 1]!, path[k]!]
       const [left, right] = [Math.min(ax, bx), Math.max(ax, bx)]
-      if (ay === by && Math.abs(at.y - ay) < INTO_WIRE && at.x > left && at.x < right)
+      if (ay === by && Math.abs(at.y - ay) < INSERT_DISTANCE && at.x > left && at.x < right)
         return {
           wire: { source: `${source}/${sourceHandle}`, target: `${target}/${targetHandle}` },
           y: ay,
@@ -108,13 +108,13 @@ export function wireAt(
  * The position of a block at which a wire runs straight into its first input, in the direction of the wire;
  * on a short segment the block is centred.
  */
-export function levelled(
+export function alignedPosition(
   block: SheetBlock,
   at: { x: number; y: number },
-  { y, left, right, flipped }: Piece,
+  { y, left, right, flipped }: WireSegment,
 ): Places[string] {
   const input = block.inputs[0]
   if (input?.dy !== 0) return at
-  const narrow = right - left < block.width + ROOM
+  const narrow = right - left < block.width + WIRE_MARGIN
   return { x: narrow ? (left + right - block.width) / 2 : at.x, y: y - input.y, flipped }
 }

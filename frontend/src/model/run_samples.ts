@@ -1,5 +1,5 @@
 import type { Channel } from '../protocol'
-import { firstAfter } from './instants'
+import { firstAfter } from './time_index'
 
 /** The columns of one signal in a frame. */
 interface Columns {
@@ -15,19 +15,19 @@ export interface Signal {
   columns: Float64Array[]
 }
 
-const FIRST_ROOM = 1024
-let versions = 0
+const INITIAL_CAPACITY = 1024
+let lastVersion = 0
 
 /**
  * The samples of one run, stored outside React because frames arrive faster than the page may render. In the
  * animation frame after a change, each view compares `version` with the version that it has drawn.
  */
 export class RunSamples {
-  version = ++versions
+  version = ++lastVersion
   count = 0
   /** Number of times that the run has stepped back. */
-  returns = 0
-  time = new Float64Array(FIRST_ROOM)
+  stepBacks = 0
+  time = new Float64Array(INITIAL_CAPACITY)
   private data: Float64Array[]
   private readonly columns = new Map<string, Columns>()
 
@@ -42,7 +42,7 @@ export class RunSamples {
       this.columns.set(channel.name, { first, count, channel })
       first += count
     }
-    this.data = Array.from({ length: first }, () => new Float64Array(FIRST_ROOM))
+    this.data = Array.from({ length: first }, () => new Float64Array(INITIAL_CAPACITY))
   }
 
   get bytes(): number {
@@ -59,21 +59,21 @@ export class RunSamples {
     if (header.run !== this.run) return
     const { first, count } = header
     this.reserve(first + count)
-    let at = 4 + length
-    this.time.set(new Float64Array(frame, at, count), first)
+    let offset = 4 + length
+    this.time.set(new Float64Array(frame, offset, count), first)
     for (const column of this.data) {
-      at += 8 * count
-      column.set(new Float64Array(frame, at, count), first)
+      offset += 8 * count
+      column.set(new Float64Array(frame, offset, count), first)
     }
     this.count = first + count
-    this.version = ++versions
+    this.version = ++lastVersion
   }
 
   /** Drop the samples after the first `count`, because the run has stepped back. */
   truncate(count: number): void {
     this.count = Math.min(this.count, count)
-    this.returns++
-    this.version = ++versions
+    this.stepBacks++
+    this.version = ++lastVersion
   }
 
   /** Release unused memory when the run has ended. */
@@ -84,8 +84,8 @@ export class RunSamples {
 
   /** The display name of a signal: the name given by the user, or its block if that has no other output. */
   title(name: string): string {
-    const given = this.columns.get(name)?.channel.title
-    if (given) return given
+    const userTitle = this.columns.get(name)?.channel.title
+    if (userTitle) return userTitle
     const block = name.slice(0, name.lastIndexOf('/'))
     return this.aliases[block] === name ? block : name
   }
@@ -97,11 +97,11 @@ export class RunSamples {
 
   /** The signal with this name or alias. */
   signal(name: string): Signal | undefined {
-    const found = this.columns.get(name) ?? this.columns.get(this.aliases[name] ?? '')
-    if (!found) return undefined
-    const columns = this.data.slice(found.first, found.first + found.count)
+    const columnsOfSignal = this.columns.get(name) ?? this.columns.get(this.aliases[name] ?? '')
+    if (!columnsOfSignal) return undefined
+    const columns = this.data.slice(columnsOfSignal.first, columnsOfSignal.first + columnsOfSignal.count)
     return {
-      channel: found.channel,
+      channel: columnsOfSignal.channel,
       time: this.time.subarray(0, this.count),
       columns: columns.map((column) => column.subarray(0, this.count)),
     }
@@ -114,14 +114,14 @@ export class RunSamples {
 
   private reserve(count: number): void {
     if (count <= this.time.length) return
-    let size = Math.max(this.time.length, FIRST_ROOM)
-    while (size < count) size *= 2
-    const grown = (old: Float64Array) => {
-      const column = new Float64Array(size)
+    let capacity = Math.max(this.time.length, INITIAL_CAPACITY)
+    while (capacity < count) capacity *= 2
+    const enlarged = (old: Float64Array) => {
+      const column = new Float64Array(capacity)
       column.set(old)
       return column
     }
-    this.time = grown(this.time)
-    this.data = this.data.map(grown)
+    this.time = enlarged(this.time)
+    this.data = this.data.map(enlarged)
   }
 }

@@ -6,34 +6,34 @@ export interface ScopeGrid {
 }
 
 /** Ratio of width to height at which a chart is read best. */
-const SHAPE = 1.7
+const ASPECT_RATIO = 1.7
 /** Smallest size of a chart, px. */
-const LEAST_WIDTH = 220
-const LEAST_HEIGHT = 150
+const MIN_WIDTH = 220
+const MIN_HEIGHT = 150
 /** Height of the visible part of a row that is reached by scrolling: its titles, px. */
-const NEXT_ROW = 26
+const NEXT_ROW_HEIGHT = 26
 
 /** The grid with the largest charts that fills a panel; `leastWidth` is larger with tables of measures. */
 export function scopeGrid(
   count: number,
   width: number,
   height: number,
-  leastWidth: number = LEAST_WIDTH,
+  minWidth: number = MIN_WIDTH,
 ): ScopeGrid {
-  const most = Math.max(1, Math.min(count, Math.floor(width / leastWidth)))
+  const maxColumns = Math.max(1, Math.min(count, Math.floor(width / minWidth)))
   let best: ScopeGrid | null = null
-  let size = 0
-  for (let columns = 1; columns <= most; columns++) {
+  let bestSize = 0
+  for (let columns = 1; columns <= maxColumns; columns++) {
     const rowHeight = height / Math.ceil(count / columns)
-    if (rowHeight < LEAST_HEIGHT) continue
-    const reached = Math.min(width / columns / SHAPE, rowHeight)
-    if (reached > size + 1e-9) {
+    if (rowHeight < MIN_HEIGHT) continue
+    const chartSize = Math.min(width / columns / ASPECT_RATIO, rowHeight)
+    if (chartSize > bestSize + 1e-9) {
       best = { columns, rowHeight }
-      size = reached
+      bestSize = chartSize
     }
   }
   if (best) return best
-  const [rows, room] = [Math.ceil(count / most), Math.max(height - NEXT_ROW, 0)]
-  const visible = Math.max(1, Math.floor(room / LEAST_HEIGHT))
-  return { columns: most, rowHeight: visible < rows ? room / visible : height / rows }
+  const [rows, available] = [Math.ceil(count / maxColumns), Math.max(height - NEXT_ROW_HEIGHT, 0)]
+  const visibleRows = Math.max(1, Math.floor(available / MIN_HEIGHT))
+  return { columns: maxColumns, rowHeight: visibleRows < rows ? available / visibleRows : height / rows }
 }

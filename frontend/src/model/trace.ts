@@ -1,4 +1,4 @@
-import { firstAfter, firstNotBefore } from './instants'
+import { firstAfter, firstNotBefore } from './time_index'
 import type { RunSamples } from './run_samples'
 
 /** One line of a plot. The arrays are read at each frame, because they grow during a run. */
@@ -17,7 +17,7 @@ export interface Trace {
 }
 
 export const DASHES = [[], [7, 3], [2, 3], [9, 3, 2, 3]]
-export const MOST_TRACES = 32
+export const MAX_TRACES = 32
 
 /**
  * The traces of some signals of a run. An element of a vector has the colour of its index in every view, so
@@ -25,27 +25,27 @@ export const MOST_TRACES = 32
  * different dashes.
  */
 export function tracesOf(samples: RunSamples, paths: { path: string; label: string }[]): Trace[] {
-  const taken = new Map<string, number>()
+  const usedTones = new Map<string, number>()
   let scalars = 0
   return paths
     .flatMap(({ path, label }) => {
-      const found = samples.signal(path)
-      if (!found) return []
-      const name = label || samples.title(found.channel.name)
-      return found.columns.map((_, element): Trace => {
-        const single = found.columns.length === 1
+      const recorded = samples.signal(path)
+      if (!recorded) return []
+      const name = label || samples.title(recorded.channel.name)
+      return recorded.columns.map((_, element): Trace => {
+        const single = recorded.columns.length === 1
         const tone = `trace-${(single ? scalars++ : element) % 8}`
-        const alike = taken.get(tone) ?? 0
-        taken.set(tone, alike + 1)
-        const entry = single ? '' : (found.channel.entries[element] ?? String(element + 1))
+        const sameTone = usedTones.get(tone) ?? 0
+        usedTones.set(tone, sameTone + 1)
+        const entry = single ? '' : (recorded.channel.entries[element] ?? String(element + 1))
         return {
           key: `${path} ${element}`,
           label: single ? name : `${name} ${entry}`,
           stem: name,
           entry,
-          unit: found.channel.unit,
+          unit: recorded.channel.unit,
           tone,
-          dash: DASHES[alike % DASHES.length]!,
+          dash: DASHES[sameTone % DASHES.length]!,
           read: () => {
             const signal = samples.signal(path)
             const values = signal?.columns[element]
@@ -54,24 +54,24 @@ export function tracesOf(samples: RunSamples, paths: { path: string; label: stri
         }
       })
     })
-    .slice(0, MOST_TRACES)
+    .slice(0, MAX_TRACES)
 }
 
 /** The columns of a plot: common times, and the values of each trace. */
-export type Drawn = [Float64Array, ...(Float64Array | (number | null | undefined)[])[]]
+export type PlotColumns = [Float64Array, ...(Float64Array | (number | null | undefined)[])[]]
 
 /** The extremes of traces in the intervals of a window, as far as they are computed. */
 export interface Extremes {
   from: number
   to: number
   width: number
-  drawn: Drawn
+  columns: PlotColumns
   /**
    * For each trace, the first sample of its last interval and the row of that interval: all rows before it
    * are final.
    */
-  rows: number[]
-  ends: number[]
+  intervalStarts: number[]
+  finalRows: number[]
 }
 
 /**
@@ -83,54 +83,54 @@ export function extremes(
   from: number,
   to: number,
   width: number,
-  before?: Extremes,
+  previous?: Extremes,
 ): Extremes {
   const span = (to - from) / width
-  const known =
-    before?.from === from &&
-    before.to === to &&
-    before.width === width &&
-    before.rows.length === traces.length
-      ? before
+  const reusable =
+    previous?.from === from &&
+    previous.to === to &&
+    previous.width === width &&
+    previous.intervalStarts.length === traces.length
+      ? previous
       : undefined
-  const time = known
-    ? known.drawn[0]
+  const time = reusable
+    ? reusable.columns[0]
     : new Float64Array(2 * width).map((_, k) => from + (Math.floor(k / 2) + (k % 2 ? 0.75 : 0.25)) * span)
-  const rows: number[] = []
-  const ends: number[] = []
-  const columns = traces.map(({ time: at, values }, trace) => {
-    const column = known
-      ? (known.drawn[trace + 1] as (number | undefined)[])
+  const intervalStarts: number[] = []
+  const finalRows: number[] = []
+  const columns = traces.map(({ time: times, values }, trace) => {
+    const column = reusable
+      ? (reusable.columns[trace + 1] as (number | undefined)[])
       : Array.from({ length: 2 * width }, (): number | undefined => undefined)
     // One more sample on each side, so that lines leave the window at the correct height.
-    let row = known ? known.rows[trace]! : Math.max(firstAfter(at, from) - 1, 0)
+    let row = reusable ? reusable.intervalStarts[trace]! : Math.max(firstAfter(times, from) - 1, 0)
     let begin = row
-    let last = known ? known.ends[trace]! : 0
-    const end = Math.min(firstAfter(at, to) + 1, at.length)
+    let last = reusable ? reusable.finalRows[trace]! : 0
+    const end = Math.min(firstAfter(times, to) + 1, times.length)
     while (row < end) {
       begin = row
-      const k = Math.min(Math.max(Math.floor((at[row]! - from) / span), 0), width - 1)
+      const k = Math.min(Math.max(Math.floor((times[row]! - from) / span), 0), width - 1)
       last = 2 * k
-      const until = k === width - 1 ? Infinity : from + (k + 1) * span
+      const intervalEnd = k === width - 1 ? Infinity : from + (k + 1) * span
       let low = row
       let high = row
       do {
         if (values[row]! < values[low]!) low = row
         if (values[row]! > values[high]!) high = row
         row++
-      } while (row < end && at[row]! < until)
+      } while (row < end && times[row]! < intervalEnd)
       column[2 * k] = values[Math.min(low, high)]
       column[2 * k + 1] = values[Math.max(low, high)]
     }
-    rows.push(begin)
-    ends.push(last)
+    intervalStarts.push(begin)
+    finalRows.push(last)
     return column
   })
-  return { from, to, width, drawn: [time, ...columns], rows, ends }
+  return { from, to, width, columns: [time, ...columns], intervalStarts, finalRows }
 }
 
 /** The recorded samples of a trace in a time window, with one more on each side. */
-export function within(
+export function samplesBetween(
   { time, values }: { time: Float64Array; values: Float64Array },
   from: number,
   to: number,
@@ -141,45 +141,48 @@ export function within(
 }
 
 /** The left limit at a time, linearly interpolated; NaN outside the samples. */
-export function valueBefore(trace: { time: Float64Array; values: Float64Array }, at: number): number {
-  const first = firstNotBefore(trace.time, at)
-  return trace.time[first] === at ? trace.values[first]! : valueAt(trace, at)
+export function valueBefore(trace: { time: Float64Array; values: Float64Array }, queryTime: number): number {
+  const first = firstNotBefore(trace.time, queryTime)
+  return trace.time[first] === queryTime ? trace.values[first]! : valueAt(trace, queryTime)
 }
 
 /**
  * Traces with a common column of times. A time occurs as often as in the trace with most rows there: at a
  * jump twice. A trace with one row there has its value in both, a trace without one has none.
  */
-export function joined(traces: { time: Float64Array; values: Float64Array }[]): Drawn {
-  const next = traces.map(() => 0)
+export function withCommonTimes(traces: { time: Float64Array; values: Float64Array }[]): PlotColumns {
+  const position = traces.map(() => 0)
   const times: number[] = []
   const columns = traces.map((): (number | undefined)[] => [])
   for (;;) {
-    const at = Math.min(...traces.map(({ time }, k) => time[next[k]!] ?? Infinity))
-    if (at === Infinity) break
+    const nextTime = Math.min(...traces.map(({ time }, k) => time[position[k]!] ?? Infinity))
+    if (nextTime === Infinity) break
     const rows = traces.map(({ time }, k) => {
       let count = 0
-      while (time[next[k]! + count] === at) count++
+      while (time[position[k]! + count] === nextTime) count++
       return count
     })
-    const most = Math.max(...rows)
-    for (let row = 0; row < most; row++) {
-      times.push(at)
+    const rowCount = Math.max(...rows)
+    for (let row = 0; row < rowCount; row++) {
+      times.push(nextTime)
       traces.forEach(({ values }, k) =>
-        columns[k]!.push(rows[k] ? values[next[k]! + Math.min(row, rows[k] - 1)] : undefined),
+        columns[k]!.push(rows[k] ? values[position[k]! + Math.min(row, rows[k] - 1)] : undefined),
       )
     }
-    rows.forEach((count, k) => (next[k]! += count))
+    rows.forEach((count, k) => (position[k]! += count))
   }
   return [Float64Array.from(times), ...columns]
 }
 
 /** The linearly interpolated value at a time, after a jump there; NaN outside the samples. */
-export function valueAt({ time, values }: { time: Float64Array; values: Float64Array }, at: number): number {
-  const after = firstAfter(time, at)
-  if (after === 0 || (after === time.length && time[after - 1] !== at)) return NaN
-  const t0 = time[after - 1]!
-  const y0 = values[after - 1]!
-  if (t0 === at || after === time.length) return y0
-  return y0 + ((values[after]! - y0) * (at - t0)) / (time[after]! - t0)
+export function valueAt(
+  { time, values }: { time: Float64Array; values: Float64Array },
+  queryTime: number,
+): number {
+  const firstLater = firstAfter(time, queryTime)
+  if (firstLater === 0 || (firstLater === time.length && time[firstLater - 1] !== queryTime)) return NaN
+  const t0 = time[firstLater - 1]!
+  const y0 = values[firstLater - 1]!
+  if (t0 === queryTime || firstLater === time.length) return y0
+  return y0 + ((values[firstLater]! - y0) * (queryTime - t0)) / (time[firstLater]! - t0)
 }

@@ -9,7 +9,7 @@ export type Point = readonly [x: number, y: number]
 export type Lines = Readonly<Record<string, WireLines>>
 
 /** A port on the sheet; `dx`, `dy` is the direction away from its block. */
-export interface PortPlace {
+export interface PortPosition {
   x: number
   y: number
   dx: number
@@ -17,49 +17,60 @@ export interface PortPlace {
 }
 
 /** Allowed offset of a line from the centre of a port, if the offset makes the line straight, px. */
-const AT_PORT = 1.6
+const PORT_TOLERANCE = 1.6
 
 /** The positions of both ports of a wire; undefined if one of them does not exist. */
 export function endsOf(
   wire: Wire,
   blocks: Record<string, SheetBlock>,
   places: Places,
-): [PortPlace, PortPlace] | undefined {
+): [PortPosition, PortPosition] | undefined {
   const from = blocks[blockOf(wire.source)]
   const to = blocks[blockOf(wire.target)]
   const source = from?.outputs.find(({ name }) => name === portOf(wire.source))
   const target = to?.inputs.find(({ name }) => name === portOf(wire.target))
   if (!from || !to || !source || !target) return undefined
-  return [placed(source, places[from.name] ?? from.place, 1), placed(target, places[to.name] ?? to.place, -1)]
+  return [
+    portPosition(source, places[from.name] ?? from.place, 1),
+    portPosition(target, places[to.name] ?? to.place, -1),
+  ]
 }
 
-const placed = (spot: SheetPort, at: { x: number; y: number }, way: number): PortPlace => ({
-  x: at.x + spot.x,
-  y: at.y + spot.y,
-  dx: way * spot.dx,
-  dy: way * spot.dy,
+const portPosition = (port: SheetPort, at: { x: number; y: number }, sign: number): PortPosition => ({
+  x: at.x + port.x,
+  y: at.y + port.y,
+  dx: sign * port.dx,
+  dy: sign * port.dy,
 })
 
 /** Whether a path ends at its ports; a path that branches from another one may begin anywhere. */
-export function fits(path: readonly Point[], branches: boolean, ends: [PortPlace, PortPlace]): boolean {
+export function endsAtPorts(
+  path: readonly Point[],
+  isBranch: boolean,
+  ends: [PortPosition, PortPosition],
+): boolean {
   const [first, last] = [path[0], path.at(-1)]
-  return Boolean(first && last) && (branches || near(first!, ends[0])) && near(last!, ends[1])
+  return Boolean(first && last) && (isBranch || isNear(first!, ends[0])) && isNear(last!, ends[1])
 }
 
-const near = ([x, y]: Point, port: PortPlace) =>
-  Math.abs(x - port.x) <= AT_PORT && Math.abs(y - port.y) <= AT_PORT
+const isNear = ([x, y]: Point, port: PortPosition) =>
+  Math.abs(x - port.x) <= PORT_TOLERANCE && Math.abs(y - port.y) <= PORT_TOLERANCE
 
 /**
  * A path whose ends follow ports that have moved since it was routed: the outer segments are stretched.
  * Without a path, a straight line between the ports. Used as a preview until the server has routed the wire
  * again.
  */
-export function attached(path: readonly Point[], branches: boolean, ends: [PortPlace, PortPlace]): Point[] {
-  if (path.length < 2) return [at(ends[0]), at(ends[1])]
+export function stretchedToPorts(
+  path: readonly Point[],
+  isBranch: boolean,
+  ends: [PortPosition, PortPosition],
+): Point[] {
+  if (path.length < 2) return [pointOf(ends[0]), pointOf(ends[1])]
   const points = [...path]
   const flat = isFlat(points, 0)
   if (points.length < 4) {
-    const [[ax, ay], [bx, by]] = [branches ? points[0]! : at(ends[0]), at(ends[1])]
+    const [[ax, ay], [bx, by]] = [isBranch ? points[0]! : pointOf(ends[0]), pointOf(ends[1])]
     const [mx, my] = [(ax + bx) / 2, (ay + by) / 2]
     return corners(
       flat
@@ -77,38 +88,38 @@ export function attached(path: readonly Point[], branches: boolean, ends: [PortP
           ],
     )
   }
-  const moved = stretched(points, at(ends[1]))
-  return corners(branches ? moved : stretched(moved.reverse(), at(ends[0])).reverse())
+  const stretched = withLastPoint(points, pointOf(ends[1]))
+  return corners(isBranch ? stretched : withLastPoint(stretched.reverse(), pointOf(ends[0])).reverse())
 }
 
 /** A path with another last point; the last segment keeps its direction. */
-function stretched(path: Point[], end: Point): Point[] {
+function withLastPoint(path: Point[], end: Point): Point[] {
   const flat = isFlat(path, path.length - 2)
   const [x, y] = path.at(-2)!
   return [...path.slice(0, -2), flat ? [x, end[1]] : [end[0], y], end]
 }
 
-const at = ({ x, y }: PortPlace): Point => [x, y]
+const pointOf = ({ x, y }: PortPosition): Point => [x, y]
 
-export const isFlat = (path: readonly Point[], piece: number): boolean =>
-  path[piece]![1] === path[piece + 1]![1]
+export const isFlat = (path: readonly Point[], segment: number): boolean =>
+  path[segment]![1] === path[segment + 1]![1]
 
 /** The points without repetitions and without points on a straight line between their neighbours. */
 export function corners(points: Point[]): Point[] {
-  const kept: Point[] = []
+  const result: Point[] = []
   for (const point of points) {
-    const last = kept.at(-1)
+    const last = result.at(-1)
     if (last && last[0] === point[0] && last[1] === point[1]) continue
-    const before = kept.at(-2)
+    const before = result.at(-2)
     if (
       last &&
       before &&
       ((before[0] === last[0] && last[0] === point[0]) || (before[1] === last[1] && last[1] === point[1]))
     )
-      kept[kept.length - 1] = point
-    else kept.push(point)
+      result[result.length - 1] = point
+    else result.push(point)
   }
-  return kept
+  return result
 }
 
 const ROUNDING = 5
@@ -125,8 +136,8 @@ export function svgPath(points: readonly Point[], dots: readonly Point[] = []): 
       continue
     }
     const radius = Math.min(ROUNDING, length(before, corner) / 2, length(corner, after) / 2)
-    const [ax, ay] = towards(corner, before, radius)
-    const [bx, by] = towards(corner, after, radius)
+    const [ax, ay] = pointTowards(corner, before, radius)
+    const [bx, by] = pointTowards(corner, after, radius)
     text += `L${ax} ${ay}Q${corner[0]} ${corner[1]} ${bx} ${by}`
   }
   const last = points.at(-1)!
@@ -135,7 +146,7 @@ export function svgPath(points: readonly Point[], dots: readonly Point[] = []): 
 
 const length = (a: Point, b: Point) => Math.abs(a[0] - b[0]) + Math.abs(a[1] - b[1])
 
-function towards(a: Point, b: Point, by: number): Point {
-  const share = by / (length(a, b) || 1)
-  return [a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share]
+function pointTowards(a: Point, b: Point, distance: number): Point {
+  const fraction = distance / (length(a, b) || 1)
+  return [a[0] + (b[0] - a[0]) * fraction, a[1] + (b[1] - a[1]) * fraction]
 }

@@ -9,7 +9,7 @@ import { createRoot } from 'react-dom/client'
 import { ContextMenu } from '../context_menu'
 import type { Channel, ViewOf } from '../protocol'
 import { RunArm } from '../robot/run_arm'
-import { listed, type RobotScene } from '../robot/scene'
+import { posesFromRows, type RobotScene } from '../robot/scene'
 import { Timeline } from '../run/timeline'
 import { RunSamples } from '../model/run_samples'
 import { showSamples } from '../samples'
@@ -19,7 +19,7 @@ import { theme } from '../theme'
 import { shareCursor } from './shared_cursor'
 
 /** The messages from the notebook to this page; see `studio/notebook.py`. */
-interface Shown {
+interface ShowMessage {
   kind: 'show'
   dark: boolean
   /** The key of a result; views of the same result share one time cursor. */
@@ -30,15 +30,15 @@ interface Shown {
   arm: { path: string; scene: RobotScene; rest: number[][][]; drawing: string } | null
 }
 
-let shown: Shown | undefined
+let lastMessage: ShowMessage | undefined
 
-function show(told: Shown): void {
-  const { key, run, frame } = told
+function show(message: ShowMessage): void {
+  const { key, run, frame } = message
   if (run) {
-    const made = new RunSamples(key, run.channels, run.aliases)
-    made.receive(frame)
-    made.close()
-    showSamples(made)
+    const runSamples = new RunSamples(key, run.channels, run.aliases)
+    runSamples.receive(frame)
+    runSamples.close()
+    showSamples(runSamples)
     useStudio.setState({
       run: {
         ...run,
@@ -54,13 +54,13 @@ function show(told: Shown): void {
       },
     })
   }
-  shown = told
+  lastMessage = message
   draw()
 }
 
 function draw(): void {
-  if (!shown) return
-  const { dark, run, scopes, arm } = shown
+  if (!lastMessage) return
+  const { dark, run, scopes, arm } = lastMessage
   const scheme = dark ? 'dark' : 'light'
   // The provider sets the attribute after the effects of its children, in which the plots read their colours.
   document.documentElement.dataset['mantineColorScheme'] = scheme
@@ -74,7 +74,7 @@ function draw(): void {
               <RunArm
                 path={arm.path}
                 scene={arm.scene}
-                rest={listed(arm.rest)}
+                rest={posesFromRows(arm.rest)}
                 drawing={() => Promise.resolve(arm.drawing)}
               />
             )}
@@ -94,11 +94,11 @@ addEventListener(
   ({
     source,
     data,
-  }: MessageEvent<Shown | { kind: 'time'; time: number } | { kind: 'theme'; dark: boolean }>) => {
+  }: MessageEvent<ShowMessage | { kind: 'time'; time: number } | { kind: 'theme'; dark: boolean }>) => {
     if (source !== parent) return
     if (data.kind === 'time') cursor.show(data.time)
     else if (data.kind === 'theme') {
-      shown = shown && { ...shown, dark: data.dark }
+      lastMessage = lastMessage && { ...lastMessage, dark: data.dark }
       draw()
     } else {
       cursor.join(data.key)

@@ -1,6 +1,6 @@
 import { useCursor } from '../run/cursor'
 
-const REST_MS = 150
+const REST_DELAY_MS = 150
 
 /**
  * One time cursor for all views of a result in the notebook. The views exchange the time without a kernel.
@@ -8,16 +8,16 @@ const REST_MS = 150
  */
 export function shareCursor(onRest: (time: number) => void) {
   let channel: BroadcastChannel | null = null
-  let heard: number | null = null
+  let receivedTime: number | null = null
   let timer: ReturnType<typeof setTimeout> | undefined
   useCursor.subscribe(({ time }, before) => {
-    if (time === null || time === before.time || time === heard) return
+    if (time === null || time === before.time || time === receivedTime) return
     channel?.postMessage(time)
     clearTimeout(timer)
-    timer = setTimeout(() => onRest(time), REST_MS)
+    timer = setTimeout(() => onRest(time), REST_DELAY_MS)
   })
   const show = (time: number) => {
-    heard = time
+    receivedTime = time
     useCursor.setState({ time, playing: false })
   }
   return {

@@ -1,11 +1,11 @@
-import { later } from '../later'
-import { inFront, type Panel } from '../panel'
+import { deferred } from '../deferred'
+import { whenVisible, type Panel } from '../panel'
 
-const Explorer = later(async () => (await import('../library/explorer')).Explorer, 'Loading the tree …')
+const Explorer = deferred(async () => (await import('../library/explorer')).Explorer, 'Loading the tree …')
 
 export const panel: Panel = {
   title: 'Model',
-  component: inFront(Explorer),
+  component: whenVisible(Explorer),
   order: 3,
   place: { behind: 'library' },
 }

@@ -1,8 +1,8 @@
-import { later } from '../later'
+import { deferred } from '../deferred'
 import type { Panel } from '../panel'
 import { useStudio } from '../store'
 
-const Scopes = later(async () => (await import('../scopes/scopes')).Scopes, 'Loading the scopes …')
+const Scopes = deferred(async () => (await import('../scopes/scopes')).Scopes, 'Loading the scopes …')
 
 function ScopesPanel() {
   const ran = useStudio((s) => s.run !== null)

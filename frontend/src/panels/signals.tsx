@@ -1,14 +1,14 @@
-import { later } from '../later'
-import { inFront, type Panel } from '../panel'
+import { deferred } from '../deferred'
+import { whenVisible, type Panel } from '../panel'
 
-const SignalInspector = later(
+const SignalInspector = deferred(
   async () => (await import('../scopes/inspector')).SignalInspector,
   'Loading the signals …',
 )
 
 export const panel: Panel = {
   title: 'Signals',
-  component: inFront(SignalInspector),
+  component: whenVisible(SignalInspector),
   order: 7,
   place: { behind: 'scopes' },
 }

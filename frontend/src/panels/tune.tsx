@@ -1,11 +1,14 @@
-import { later } from '../later'
-import { inFront, type Panel } from '../panel'
+import { deferred } from '../deferred'
+import { whenVisible, type Panel } from '../panel'
 
-const TunePanel = later(async () => (await import('../run/tune_panel')).TunePanel, 'Loading the parameters …')
+const TunePanel = deferred(
+  async () => (await import('../run/tune_panel')).TunePanel,
+  'Loading the parameters …',
+)
 
 export const panel: Panel = {
   title: 'Tune',
-  component: inFront(TunePanel),
+  component: whenVisible(TunePanel),
   order: 5,
   place: { behind: 'robot' },
 }

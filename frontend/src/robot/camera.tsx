@@ -28,14 +28,14 @@ const MARGIN = 1.14
 /** The corners of the bounding boxes of the bodies, in the axes of their links. */
 function cornersOf(arm: Object3D): Vector3[] {
   const corners: Vector3[] = []
-  arm.traverse((one) => {
-    if (!(one instanceof Mesh) || !(one.geometry instanceof BufferGeometry)) return
-    one.geometry.computeBoundingBox()
-    const { min, max } = one.geometry.boundingBox!
+  arm.traverse((object) => {
+    if (!(object instanceof Mesh) || !(object.geometry instanceof BufferGeometry)) return
+    object.geometry.computeBoundingBox()
+    const { min, max } = object.geometry.boundingBox!
     for (let k = 0; k < 8; k++)
       corners.push(
         new Vector3(k & 1 ? max.x : min.x, k & 2 ? max.y : min.y, k & 4 ? max.z : min.z).applyMatrix4(
-          one.matrixWorld,
+          object.matrixWorld,
         ),
       )
   })
@@ -43,10 +43,15 @@ function cornersOf(arm: Object3D): Vector3[] {
 }
 
 /** Corners of everything to be shown: the arm, the positions reached in a run, the floor below the base. */
-function seenCorners(arm: Object3D, floor: number, extent: CameraProps['extent'], thick: number): Vector3[] {
+function visibleCorners(
+  arm: Object3D,
+  floor: number,
+  extent: CameraProps['extent'],
+  padding: number,
+): Vector3[] {
   const corners = cornersOf(arm)
   for (const [x, y, z] of extent?.() ?? [])
-    corners.push(new Vector3(x, y, z + thick), new Vector3(x, y, z - thick))
+    corners.push(new Vector3(x, y, z + padding), new Vector3(x, y, z - padding))
   corners.push(new Vector3(0, 0, floor))
   return corners
 }
@@ -59,21 +64,21 @@ function eyeOf(
   centre: Vector3,
   direction: Vector3,
   camera: PerspectiveCamera,
-  nearest: number,
+  minDistance: number,
 ): Vector3 {
   const d = direction.clone().normalize()
   const right = new Vector3(0, 0, 1).cross(d)
   if (right.lengthSq() < 1e-6) right.set(0, 1, 0)
   right.normalize()
   const up = d.clone().cross(right)
-  const tall = Math.tan(((camera.fov / 2) * Math.PI) / 180) / MARGIN
-  const wide = tall * camera.aspect
-  let distance = nearest
+  const halfHeight = Math.tan(((camera.fov / 2) * Math.PI) / 180) / MARGIN
+  const halfWidth = halfHeight * camera.aspect
+  let distance = minDistance
   for (const corner of corners) {
     const p = corner.sub(centre)
     distance = Math.max(
       distance,
-      p.dot(d) + Math.max(Math.abs(p.dot(right)) / wide, Math.abs(p.dot(up)) / tall),
+      p.dot(d) + Math.max(Math.abs(p.dot(right)) / halfWidth, Math.abs(p.dot(up)) / halfHeight),
     )
   }
   return centre.clone().addScaledVector(d, distance)
@@ -89,14 +94,14 @@ const newScratch = () => ({
 })
 type Scratch = ReturnType<typeof newScratch>
 
-function standBehindTool(now: CameraControls, { matrix, eye, to }: Scratch, reach: number): void {
+function placeBehindTool(now: CameraControls, { matrix, eye, to }: Scratch, reach: number): void {
   // A hand camera: behind the tool and a little above, looking along the axis of the tool.
   eye.set(-0.16 * reach, 0, -0.3 * reach).applyMatrix4(matrix)
   to.set(0, 0, 0.35 * reach).applyMatrix4(matrix)
   void now.setLookAt(eye.x, eye.y, eye.z, to.x, to.y, to.z, false)
 }
 
-function goWithTool(now: CameraControls, { tool, last, eye, to }: Scratch): void {
+function followTool(now: CameraControls, { tool, last, eye, to }: Scratch): void {
   const shift = tool.clone().sub(last)
   last.copy(tool)
   if (shift.lengthSq() === 0) return
@@ -110,49 +115,49 @@ interface CameraProps {
   poses: () => Poses | undefined
   floor: number
   extent: (() => [number, number, number][]) | undefined
-  whole: string | undefined
+  extentKey: string | undefined
   handle: React.RefObject<CameraHandle | null>
 }
 
 interface View {
   controls: React.RefObject<CameraControls | null>
-  mounted: React.RefObject<boolean>
-  touched: React.RefObject<boolean>
+  onTool: React.RefObject<boolean>
+  userMoved: React.RefObject<boolean>
   camera: PerspectiveCamera
   fit: (direction: Vector3, smooth: boolean) => void
   invalidate: () => void
 }
 
 /** The commands of the camera for other components. */
-function handleOf({ controls, mounted, touched, camera, fit, invalidate }: View): CameraHandle {
+function handleOf({ controls, onTool, userMoved, camera, fit, invalidate }: View): CameraHandle {
   return {
     look: (preset) => {
-      touched.current = true
+      userMoved.current = true
       if (preset === 'tool') {
-        mounted.current = true
+        onTool.current = true
         invalidate()
       } else fit(new Vector3(...PRESETS[preset]), true)
     },
     fit: () => fit(camera.position.clone().sub(controls.current!.getTarget(new Vector3())), true),
     turn: (right, up) => {
-      mounted.current = false
-      touched.current = true
+      onTool.current = false
+      userMoved.current = true
       void controls.current?.rotate(right, up, true)
       invalidate()
     },
     zoom: (factor) => {
       const now = controls.current
-      touched.current = true
+      userMoved.current = true
       if (now) void now.dollyTo(now.distance * factor, true)
       invalidate()
     },
   }
 }
 
-export function ViewCamera({ scene, poses, floor, extent, whole, handle }: CameraProps) {
+export function ViewCamera({ scene, poses, floor, extent, extentKey, handle }: CameraProps) {
   const controls = useRef<CameraControls>(null)
-  const mounted = useRef(false)
-  const touched = useRef(false)
+  const onTool = useRef(false)
+  const userMoved = useRef(false)
   const invalidate = useThree((s) => s.invalidate)
   const world = useThree((s) => s.scene)
   const camera = useThree((s) => s.camera) as PerspectiveCamera
@@ -170,26 +175,26 @@ export function ViewCamera({ scene, poses, floor, extent, whole, handle }: Camer
     const arm = world.getObjectByName('arm')
     if (!arm || !controls.current) return
     world.updateMatrixWorld(true)
-    const corners = seenCorners(arm, floor, extent, 0.05 * scene.reach)
+    const corners = visibleCorners(arm, floor, extent, 0.05 * scene.reach)
     const centre = new Box3().setFromPoints(corners).getCenter(new Vector3())
     const eye = eyeOf(corners, centre, direction, camera, 0.1 * scene.reach)
-    mounted.current = false
+    onTool.current = false
     void controls.current.setLookAt(eye.x, eye.y, eye.z, centre.x, centre.y, centre.z, smooth)
     invalidate()
   }
 
-  handle.current = handleOf({ controls, mounted, touched, camera, fit, invalidate })
+  handle.current = handleOf({ controls, onTool, userMoved, camera, fit, invalidate })
 
   // Until the user moves the view, it is fitted to every size of its panel.
   const size = useThree((s) => s.size)
   useEffect(() => {
-    if (!touched.current) fit(new Vector3(...PRESETS.iso), false)
+    if (!userMoved.current) fit(new Vector3(...PRESETS.iso), false)
     // eslint-disable-next-line react-hooks/exhaustive-deps
-  }, [size.width, size.height, floor, whole])
+  }, [size.width, size.height, floor, extentKey])
 
   // A new robot is shown completely. Edits of a robot do not move the camera.
   useEffect(() => {
-    touched.current = false
+    userMoved.current = false
     const timer = setTimeout(() => fit(new Vector3(...PRESETS.iso), false), 0)
     return () => clearTimeout(timer)
     // eslint-disable-next-line react-hooks/exhaustive-deps
@@ -203,13 +208,13 @@ export function ViewCamera({ scene, poses, floor, extent, whole, handle }: Camer
   useFrame(() => {
     const now = controls.current
     // Until the user moves the view, it is extended to all positions that the run has reached.
-    if (!touched.current && !follow && toolAt(scratch.tool)) {
+    if (!userMoved.current && !follow && toolAt(scratch.tool)) {
       const { x, y } = scratch.tool.project(camera)
       if (Math.max(Math.abs(x), Math.abs(y)) > 1) fit(new Vector3(...PRESETS.iso), false)
     }
-    if (!now || (!follow && !mounted.current) || !toolAt(scratch.tool)) return
-    if (mounted.current) standBehindTool(now, scratch, scene.reach)
-    else goWithTool(now, scratch)
+    if (!now || (!follow && !onTool.current) || !toolAt(scratch.tool)) return
+    if (onTool.current) placeBehindTool(now, scratch, scene.reach)
+    else followTool(now, scratch)
   })
 
   return (
@@ -221,8 +226,8 @@ export function ViewCamera({ scene, poses, floor, extent, whole, handle }: Camer
       smoothTime={0.12}
       draggingSmoothTime={0.04}
       onControlStart={() => {
-        mounted.current = false
-        touched.current = true
+        onTool.current = false
+        userMoved.current = true
       }}
     />
   )

@@ -5,27 +5,28 @@ import { dropTable, isTable } from '../canvas/dropped_table'
 import { ask, refuse } from '../store'
 import './robot.css'
 
-const MOST_BYTES = 5 * 2 ** 20
+const MAX_BYTES = 5 * 2 ** 20
 
 /** Files dropped anywhere on the page: robot scripts, robots, diagrams. */
 export function DropZone() {
-  const [over, setOver] = useState(false)
+  const [dragging, setDragging] = useState(false)
   useEffect(() => {
-    const brings = (event: DragEvent) => event.dataTransfer?.types.includes('Files') ?? false
+    const hasFiles = (event: DragEvent) => event.dataTransfer?.types.includes('Files') ?? false
     const enter = (event: DragEvent) => {
-      if (!brings(event)) return
+      if (!hasFiles(event)) return
       event.preventDefault()
-      setOver(true)
+      setDragging(true)
     }
     const leave = (event: DragEvent) => {
-      if (!event.relatedTarget) setOver(false)
+      if (!event.relatedTarget) setDragging(false)
     }
     const drop = (event: DragEvent) => {
-      if (!brings(event)) return
+      if (!hasFiles(event)) return
       event.preventDefault()
-      setOver(false)
+      setDragging(false)
       const at = { x: event.clientX, y: event.clientY }
-      for (const file of event.dataTransfer?.files ?? []) void (isTable(file) ? bring(file, at) : open(file))
+      for (const file of event.dataTransfer?.files ?? [])
+        void (isTable(file) ? addTable(file, at) : open(file))
     }
     addEventListener('dragenter', enter)
     addEventListener('dragover', enter)
@@ -38,7 +39,7 @@ export function DropZone() {
       removeEventListener('drop', drop)
     }
   }, [])
-  if (!over) return null
+  if (!dragging) return null
   return (
     <div className="drop-zone">
       <IconFileImport size={34} />
@@ -56,14 +57,14 @@ export async function open(file: File): Promise<void> {
 }
 
 /** Store a file with measurements in the project folder, and add a block that plays it back. */
-async function bring(file: File, at: { x: number; y: number }): Promise<void> {
+async function addTable(file: File, at: { x: number; y: number }): Promise<void> {
   const content = await base64Of(file)
   if (content !== null) await dropTable(file.name, content, at)
 }
 
 /** The content of a file; null if it is too large. */
 async function base64Of(file: File): Promise<string | null> {
-  if (file.size > MOST_BYTES) {
+  if (file.size > MAX_BYTES) {
     refuse({
       what: `the file has ${(file.size / 2 ** 20).toFixed(1)} MiB, and 5 MiB can be dropped`,
       where: file.name,

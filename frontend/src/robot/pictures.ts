@@ -23,16 +23,16 @@ function download(data: Blob, name: string): void {
 }
 
 /** Save the view as a PNG with at least two pixels per CSS px. */
-export function savePicture(shot: React.RefObject<Rendering | null>, name: string): void {
-  const now = shot.current
-  if (!now) return
-  const before = now.gl.getPixelRatio()
-  now.gl.setPixelRatio(Math.max(2, before))
-  now.draw()
-  now.gl.domElement.toBlob((data) => {
+export function savePicture(rendering: React.RefObject<Rendering | null>, name: string): void {
+  const current = rendering.current
+  if (!current) return
+  const pixelRatio = current.gl.getPixelRatio()
+  current.gl.setPixelRatio(Math.max(2, pixelRatio))
+  current.draw()
+  current.gl.domElement.toBlob((data) => {
     if (data) download(data, `${name}.png`)
-    now.gl.setPixelRatio(before)
-    now.draw()
+    current.gl.setPixelRatio(pixelRatio)
+    current.draw()
   }, 'image/png')
 }
 
@@ -40,34 +40,34 @@ export function savePicture(shot: React.RefObject<Rendering | null>, name: strin
 export function videoFormat(): string | undefined {
   return typeof MediaRecorder === 'undefined'
     ? undefined
-    : VIDEO_FORMATS.find((kind) => MediaRecorder.isTypeSupported(kind))
+    : VIDEO_FORMATS.find((format) => MediaRecorder.isTypeSupported(format))
 }
 
 /** Record a video of the view during a playback; the returned function ends it early. */
 export function recordVideo(
-  shot: React.RefObject<Rendering | null>,
+  rendering: React.RefObject<Rendering | null>,
   name: string,
   play: () => Promise<void>,
-  ended: () => void,
+  onEnd: () => void,
 ): () => void {
-  const kind = videoFormat()
-  const canvas = shot.current?.gl.domElement
-  if (!kind || !canvas) {
-    ended()
+  const format = videoFormat()
+  const canvas = rendering.current?.gl.domElement
+  if (!format || !canvas) {
+    onEnd()
     return () => {}
   }
   const recorder = new MediaRecorder(canvas.captureStream(FRAMES_PER_SECOND), {
-    mimeType: kind,
+    mimeType: format,
     videoBitsPerSecond: 8_000_000,
   })
   const parts: Blob[] = []
   recorder.ondataavailable = ({ data }) => void parts.push(data)
   recorder.onstop = () => {
     download(
-      new Blob(parts, { type: kind.split(';')[0]! }),
-      `${name}.${kind.includes('mp4') ? 'mp4' : 'webm'}`,
+      new Blob(parts, { type: format.split(';')[0]! }),
+      `${name}.${format.includes('mp4') ? 'mp4' : 'webm'}`,
     )
-    ended()
+    onEnd()
   }
   const stop = () => recorder.state !== 'inactive' && recorder.stop()
   recorder.start()

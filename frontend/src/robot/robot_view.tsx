@@ -3,8 +3,8 @@ import { ask, useStudio } from '../store'
 import type { RobotScene } from './scene'
 
 /** The 3-D code is loaded with the first robot; a model without a robot does not need it. */
-const stage = () => import('./run_stage')
-const RunStage = lazy(stage)
+const loadRunStage = () => import('./run_stage')
+const RunStage = lazy(loadRunStage)
 
 /** The arm of the first robot block, as moved by the run, or at rest before the first run. */
 export default function RobotView() {
@@ -16,7 +16,7 @@ export default function RobotView() {
     const robots = Object.values(blocks ?? {}).filter(({ parameters }) => parameters['robot'])
     return (robots.find(({ type }) => type === 'RobotPlot') ?? robots[0])?.name
   }, [blocks])
-  const said = block ? blocks?.[block]?.parameters : undefined
+  const blockParameters = block ? blocks?.[block]?.parameters : undefined
   const [shown, setShown] = useState<{ scene: RobotScene; rest: number[][][]; q: number[] } | null>(null)
   useEffect(() => {
     if (!document || !block) {
@@ -24,7 +24,7 @@ export default function RobotView() {
       return
     }
     let current = true
-    void stage()
+    void loadRunStage()
     void ask({ kind: 'scene', document, inside, block }).then(async (scene) => {
       if (!scene || !current) return
       const q = scene.joints.map(({ limits }) => (limits ? Math.min(Math.max(0, limits[0]), limits[1]) : 0))
@@ -35,7 +35,7 @@ export default function RobotView() {
       current = false
     }
     // The data of the block are requested again when its robot changes, even if its name does not.
-  }, [document, inside, block, said])
+  }, [document, inside, block, blockParameters])
   if (!block) return <p className="empty">This sheet has no robot: add a Robot Plot to see its arm here.</p>
   if (!shown || !document) return <p className="empty">Loading the robot …</p>
   return (

@@ -5,7 +5,7 @@ import { samples } from '../samples'
 import { useStudio } from '../store'
 import type { Poses, RobotScene } from './scene'
 import { Stage, type Ghosts } from './stage'
-import type { Way } from './tool_path'
+import type { ToolPathPoints } from './tool_path'
 
 interface RunArmProps {
   /** The block whose recorded poses move the arm. */
@@ -23,30 +23,30 @@ interface RunArmProps {
 
 /** The arm in the pose of the run at the time cursor. */
 export function RunArm({ path, scene, rest, drawing, children, entries }: RunArmProps) {
-  const whole = useStudio((s) => (s.run?.state === 'done' ? s.run.run : ''))
-  const has = useStudio((s) =>
+  const extentKey = useStudio((s) => (s.run?.state === 'done' ? s.run.run : ''))
+  const hasPoses = useStudio((s) =>
     Boolean(s.run?.views.some((view) => view.kind === 'robot' && view.block === path)),
   )
   const poses = useCallback(
     () => posesAt(path, scene.rows, samples.indexAt(shownTime())) ?? rest,
     [path, scene.rows, rest],
   )
-  const drawn = useRef('')
+  const lastState = useRef('')
   const state = useCallback(() => {
     // A run that has started but sent no samples does not move the arm: the samples arrive before the next
     // picture is drawn.
-    if (samples.count || !samples.run) drawn.current = `${samples.run} ${samples.version} ${shownTime()}`
-    return drawn.current
+    if (samples.count || !samples.run) lastState.current = `${samples.run} ${samples.version} ${shownTime()}`
+    return lastState.current
   }, [])
-  const way = useCallback((): Way | undefined => {
-    const found = poseSignal(path, scene.rows)
+  const toolPath = useCallback((): ToolPathPoints | undefined => {
+    const columns = poseSignal(path, scene.rows)
     const last = samples.indexAt(shownTime())
-    if (!found || last < 0) return undefined
+    if (!columns || last < 0) return undefined
     const tool = 16 * (scene.rows - 1)
     return {
       key: `${samples.run} ${samples.version} ${last}`,
       last,
-      point: (k) => [found[tool + 3]![k]!, found[tool + 7]![k]!, found[tool + 11]![k]!],
+      point: (k) => [columns[tool + 3]![k]!, columns[tool + 7]![k]!, columns[tool + 11]![k]!],
     }
   }, [path, scene.rows])
   const ghosts = useMemo<Ghosts>(
@@ -66,12 +66,12 @@ export function RunArm({ path, scene, rest, drawing, children, entries }: RunArm
       scene={scene}
       poses={poses}
       state={state}
-      way={way}
+      path={toolPath}
       ghosts={ghosts}
       extent={extent}
-      whole={whole}
+      extentKey={extentKey}
       drawing={drawing}
-      {...(has ? { film: playOnce } : {})}
+      {...(hasPoses ? { playForVideo: playFromStart } : {})}
       {...(entries ? { entries } : {})}
     >
       {children}
@@ -82,34 +82,34 @@ export function RunArm({ path, scene, rest, drawing, children, entries }: RunArm
 /** The columns of the poses that a run has recorded for a block. */
 function poseSignal(path: string, rows: number): Float64Array[] | undefined {
   const { run } = useStudio.getState()
-  const view = run?.views.find((one) => one.kind === 'robot' && one.block === path)
-  const found = view && samples.signal(`${path}/${view.signals[0]}`)
-  return found?.columns.length === 16 * rows ? found.columns : undefined
+  const view = run?.views.find((candidate) => candidate.kind === 'robot' && candidate.block === path)
+  const columns = view && samples.signal(`${path}/${view.signals[0]}`)
+  return columns?.columns.length === 16 * rows ? columns.columns : undefined
 }
 
 function posesAt(path: string, rows: number, index: number): Poses | undefined {
-  const found = index < 0 ? undefined : poseSignal(path, rows)
-  return found && index < (found[0]?.length ?? 0) ? (row, k) => found[16 * row + k]![index]! : undefined
+  const columns = index < 0 ? undefined : poseSignal(path, rows)
+  return columns && index < (columns[0]?.length ?? 0) ? (row, k) => columns[16 * row + k]![index]! : undefined
 }
 
 const EXTENT_SAMPLES = 60
 
 /** Poses of the links at times distributed over the whole run. */
 function extentOf(path: string, rows: number): [number, number, number][] {
-  const found = poseSignal(path, rows)
-  if (!found || !samples.count) return []
+  const columns = poseSignal(path, rows)
+  if (!columns || !samples.count) return []
   const points: [number, number, number][] = []
   const last = samples.count - 1
   for (let k = 0; k <= EXTENT_SAMPLES; k++) {
     const index = Math.round((last * k) / EXTENT_SAMPLES)
     for (let row = 0; row < rows; row++)
-      points.push([3, 7, 11].map((place) => found[16 * row + place]![index]!) as [number, number, number])
+      points.push([3, 7, 11].map((entry) => columns[16 * row + entry]![index]!) as [number, number, number])
   }
   return points
 }
 
 /** Play the run from its start; resolves at its end or when it is paused. */
-function playOnce(): Promise<void> {
+function playFromStart(): Promise<void> {
   useCursor.setState({ time: samples.time[0] ?? 0, playing: false, loop: false })
   play()
   return new Promise((resolve) => {

@@ -2,7 +2,7 @@ import { IconEdit } from '@tabler/icons-react'
 import { useCallback, useMemo } from 'react'
 import { ask } from '../store'
 import { RunArm } from './run_arm'
-import { listed, type RobotScene } from './scene'
+import { posesFromRows, type RobotScene } from './scene'
 import { Button } from './view_tools'
 
 export interface RunStageProps {
@@ -17,7 +17,7 @@ export interface RunStageProps {
 
 /** The arm of a block as moved by the run. */
 export default function RunStage({ document, inside, block, scene, rest, q }: RunStageProps) {
-  const poses = useMemo(() => listed(rest), [rest])
+  const poses = useMemo(() => posesFromRows(rest), [rest])
   const drawing = useCallback(
     () =>
       ask({

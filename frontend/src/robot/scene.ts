@@ -9,7 +9,7 @@ export type Material = RobotScene['bodies'][number]['material']
 export type Poses = (row: number, k: number) => number
 
 /** Poses in the format of the server: (rows, 4, 4). */
-export function listed(poses: number[][][]): Poses {
+export function posesFromRows(poses: number[][][]): Poses {
   return (row, k) => poses[row]![k >> 2]![k & 3]!
 }
 
@@ -17,25 +17,25 @@ export function listed(poses: number[][][]): Poses {
  * Poses for the bodies of a scene, or undefined if the numbers of rows differ: after a link is added or
  * removed, bodies and poses arrive one after the other.
  */
-export function fitting(scene: RobotScene | null, poses: number[][][] | undefined): Poses | undefined {
-  return scene && poses?.length === scene.rows ? listed(poses) : undefined
+export function posesForScene(scene: RobotScene | null, poses: number[][][] | undefined): Poses | undefined {
+  return scene && poses?.length === scene.rows ? posesFromRows(poses) : undefined
 }
 
-export function matrixAt(poses: Poses, row: number, into: Matrix4): Matrix4 {
-  const at = (k: number) => poses(row, k)
-  return into.set(
-    at(0),
-    at(1),
-    at(2),
-    at(3),
-    at(4),
-    at(5),
-    at(6),
-    at(7),
-    at(8),
-    at(9),
-    at(10),
-    at(11),
+export function matrixAt(poses: Poses, row: number, target: Matrix4): Matrix4 {
+  const entry = (k: number) => poses(row, k)
+  return target.set(
+    entry(0),
+    entry(1),
+    entry(2),
+    entry(3),
+    entry(4),
+    entry(5),
+    entry(6),
+    entry(7),
+    entry(8),
+    entry(9),
+    entry(10),
+    entry(11),
     0,
     0,
     0,
@@ -55,8 +55,8 @@ function numbers(packed: string): Float32Array {
 }
 
 export function geometry(body: RobotScene['bodies'][number]): BufferGeometry {
-  const made = new BufferGeometry()
-  made.setAttribute('position', new BufferAttribute(numbers(body.corners), 3))
-  made.setAttribute('normal', new BufferAttribute(numbers(body.normals), 3))
-  return made
+  const geometry = new BufferGeometry()
+  geometry.setAttribute('position', new BufferAttribute(numbers(body.corners), 3))
+  geometry.setAttribute('normal', new BufferAttribute(numbers(body.normals), 3))
+  return geometry
 }

@@ -3,14 +3,14 @@ import { Environment, Grid, Lightformer } from '@react-three/drei'
 import { Canvas, useFrame, useThree } from '@react-three/fiber'
 import { memo, useEffect, useRef, useState } from 'react'
 import { useMenuHandlers, openMenu, type Entries } from '../context_menu_state'
-import { watch } from '../frames'
+import { onFrame } from '../frames'
 import { Arm, MATERIALS, useBodies } from './arm'
 import { ViewCamera, type CameraHandle } from './camera'
 import { Frames, JointAxes, Limits } from './overlays'
 import { savePicture, type Rendering } from './pictures'
 import type { Poses, RobotScene } from './scene'
 import { StaticArm } from './static_arm'
-import { ToolPath, type Way } from './tool_path'
+import { ToolPath, type ToolPathPoints } from './tool_path'
 import { toggle, useViewOptions } from './view_options'
 import { armEntries, ViewTools } from './view_tools'
 
@@ -46,15 +46,15 @@ interface StageProps {
   scene: RobotScene
   poses: () => Poses | undefined
   /**
-   * Changes with the poses, with a call of `changed` in `frames.ts`; an unchanged scene is not redrawn.
+   * Changes with the poses, with a call of `scheduleFrame`; an unchanged scene is not redrawn.
    */
   state: () => string
-  way?: () => Way | undefined
+  path?: () => ToolPathPoints | undefined
   ghosts?: Ghosts
   /** Poses over the whole run, for the extent of the view and the height of the floor. */
   extent?: () => [number, number, number][]
   /** Changes when the extent is complete. */
-  whole?: string
+  extentKey?: string
   /** The drawing for browsers without WebGL. */
   drawing: () => Promise<string | undefined>
   /** Changes when the drawing changes; without it, the drawing is requested once. */
@@ -62,7 +62,7 @@ interface StageProps {
   /**
    * Plays the run from its start and resolves at its end, for a video; without it no video can be recorded.
    */
-  film?: () => Promise<void>
+  playForVideo?: () => Promise<void>
   /** Additional entries of the context menu, before the others. */
   entries?: () => Entries
   /** Additional buttons, before the others. */
@@ -70,27 +70,27 @@ interface StageProps {
 }
 
 const TURN = Math.PI / 24
-const once = () => ''
+const noState = () => ''
 
 /** An arm on a floor, with light, shadow, camera and view tools. */
 export function Stage(props: StageProps) {
-  const { scene, poses, state, drawing, drawn, film, children, entries } = props
+  const { scene, poses, state, drawing, drawn, playForVideo, children, entries } = props
   const scheme = useComputedColorScheme('light')
   const camera = useRef<CameraHandle>(null)
   const shot = useRef<Rendering | null>(null)
-  const [works] = useState(hasWebGl)
+  const [hasWebGlSupport] = useState(hasWebGl)
   const tools = {
     onPicture: () => savePicture(shot, scene.name),
-    hasPath: Boolean(props.way),
+    hasPath: Boolean(props.path),
     hasGhosts: Boolean(props.ghosts),
     onToggle: toggle,
   }
   const menus = useMenuHandlers((at) =>
     openMenu(scene.name, at, [...(entries?.() ?? []), ...armEntries(camera.current, tools)]),
   )
-  if (!works)
+  if (!hasWebGlSupport)
     return (
-      <StaticArm name={scene.name} drawing={drawing} state={drawn ?? once}>
+      <StaticArm name={scene.name} drawing={drawing} state={drawn ?? noState}>
         {children}
       </StaticArm>
     )
@@ -136,32 +136,49 @@ export function Stage(props: StageProps) {
           }}
           aria-hidden
         >
-          <Inside {...props} scheme={scheme} camera={camera} shot={shot} />
+          <StageContents {...props} scheme={scheme} camera={camera} shot={shot} />
         </Canvas>
       </div>
-      <ViewTools camera={camera} film={film && (() => film())} shot={shot} name={scene.name} {...tools}>
+      <ViewTools
+        camera={camera}
+        playForVideo={playForVideo && (() => playForVideo())}
+        rendering={shot}
+        name={scene.name}
+        {...tools}
+      >
         {children}
       </ViewTools>
-      <Instant poses={poses} rows={scene.rows} state={state} />
+      <ToolPosition poses={poses} rows={scene.rows} state={state} />
     </div>
   )
 }
 
-interface InsideProps extends StageProps {
+interface StageContentsProps extends StageProps {
   scheme: 'light' | 'dark'
   camera: React.RefObject<CameraHandle | null>
   shot: React.RefObject<Rendering | null>
 }
 
-function Inside({ scene, poses, state, way, ghosts, extent, whole, scheme, camera, shot }: InsideProps) {
+function StageContents({
+  scene,
+  poses,
+  state,
+  path,
+  ghosts,
+  extent,
+  extentKey,
+  scheme,
+  camera,
+  shot,
+}: StageContentsProps) {
   const options = useViewOptions()
   const bodies = useBodies(scene)
   const colours = COLOURS[scheme]
   const dark = scheme === 'dark'
   const { reach } = scene
-  const foot = (poses()?.(0, 11) ?? 0) - scene.foot
-  const floor = useFloor(scene, poses, foot, extent, whole)
-  useDrawnWhenChanged(state)
+  const footHeight = (poses()?.(0, 11) ?? 0) - scene.foot
+  const floor = useFloor(scene, poses, footHeight, extent, extentKey)
+  useRenderOnChange(state)
   const invalidate = useThree((s) => s.invalidate)
   useEffect(() => invalidate(), [options, bodies, scheme, invalidate])
   const gl = useThree((s) => s.gl)
@@ -205,10 +222,17 @@ function Inside({ scene, poses, state, way, ghosts, extent, whole, scheme, camer
       {options.frames && <Frames {...overlay} />}
       {options.axes && <JointAxes {...overlay} />}
       {options.limits && <Limits {...overlay} />}
-      {options.path && way && <ToolPath way={way} dark={dark} background={colours.background} />}
-      <Pedestal from={floor} to={foot} reach={reach} poses={poses} />
+      {options.path && path && <ToolPath path={path} dark={dark} background={colours.background} />}
+      <Pedestal from={floor} to={footHeight} reach={reach} poses={poses} />
       <Ground height={floor} reach={reach} colours={colours} />
-      <ViewCamera scene={scene} poses={poses} floor={floor} extent={extent} whole={whole} handle={camera} />
+      <ViewCamera
+        scene={scene}
+        poses={poses}
+        floor={floor}
+        extent={extent}
+        extentKey={extentKey}
+        handle={camera}
+      />
     </>
   )
 }
@@ -253,29 +277,33 @@ const Surroundings = memo(function Surroundings({ dark }: { dark: boolean }) {
 function useFloor(
   scene: RobotScene,
   poses: () => Poses | undefined,
-  foot: number,
+  footHeight: number,
   extent: StageProps['extent'],
-  whole: string | undefined,
+  extentKey: string | undefined,
 ): number {
-  const [lowest, setLowest] = useState<{ name: string; floor: number }>({ name: scene.name, floor: Infinity })
-  const counted = useRef('')
+  const [lowestFloor, setLowestFloor] = useState<{ name: string; floor: number }>({
+    name: scene.name,
+    floor: Infinity,
+  })
+  const countedExtent = useRef('')
   const step = (scene.reach > 1 ? 0.5 : 0.1) * Math.max(1, Math.round(0.12 * scene.reach))
   useFrame(() => {
     const now = poses()
     if (!now) return
     let low = Infinity
     for (let row = 1; row < scene.rows; row++) low = Math.min(low, now(row, 11))
-    if (whole && whole !== counted.current) {
-      counted.current = whole
+    if (extentKey && extentKey !== countedExtent.current) {
+      countedExtent.current = extentKey
       for (const [, , z] of extent?.() ?? []) low = Math.min(low, z)
     }
     low -= 0.06 * scene.reach
-    const floor = low < foot ? step * Math.floor(low / step) : Infinity
-    const lower = (than: typeof lowest) => than.name !== scene.name || floor < than.floor - 1e-9
+    const floor = low < footHeight ? step * Math.floor(low / step) : Infinity
+    const lower = (previous: typeof lowestFloor) =>
+      previous.name !== scene.name || floor < previous.floor - 1e-9
     // Several frames may come before the state changes; a later one does not raise the floor again.
-    if (lower(lowest)) setLowest((before) => (lower(before) ? { name: scene.name, floor } : before))
+    if (lower(lowestFloor)) setLowestFloor((before) => (lower(before) ? { name: scene.name, floor } : before))
   })
-  return lowest.name === scene.name ? Math.min(foot, lowest.floor) : foot
+  return lowestFloor.name === scene.name ? Math.min(footHeight, lowestFloor.floor) : footHeight
 }
 
 /** A column below the foot of an arm that reaches below its foot. */
@@ -292,16 +320,16 @@ function Pedestal({
 }) {
   const now = poses()
   if (to - from < 0.01 * reach || !now || now(0, 10) < 0.7) return null
-  const r = 0.06 * reach
-  const along = Math.PI / 2
+  const radius = 0.06 * reach
+  const quarterTurn = Math.PI / 2
   return (
     <group position={[now(0, 3), now(0, 7), 0]}>
-      <mesh position={[0, 0, (from + to) / 2]} rotation={[along, 0, 0]} castShadow receiveShadow>
-        <cylinderGeometry args={[1.25 * r, 1.4 * r, to - from, 40]} />
+      <mesh position={[0, 0, (from + to) / 2]} rotation={[quarterTurn, 0, 0]} castShadow receiveShadow>
+        <cylinderGeometry args={[1.25 * radius, 1.4 * radius, to - from, 40]} />
         <meshStandardMaterial {...MATERIALS.base} />
       </mesh>
-      <mesh position={[0, 0, from + 0.08 * r]} rotation={[along, 0, 0]} castShadow receiveShadow>
-        <cylinderGeometry args={[2.1 * r, 2.2 * r, 0.16 * r, 48]} />
+      <mesh position={[0, 0, from + 0.08 * radius]} rotation={[quarterTurn, 0, 0]} castShadow receiveShadow>
+        <cylinderGeometry args={[2.1 * radius, 2.2 * radius, 0.16 * radius, 48]} />
         <meshStandardMaterial {...MATERIALS.base} />
       </mesh>
     </group>
@@ -309,14 +337,14 @@ function Pedestal({
 }
 
 /** Renders a frame only if something has moved. */
-function useDrawnWhenChanged(state: () => string): void {
+function useRenderOnChange(state: () => string): void {
   const invalidate = useThree((s) => s.invalidate)
   useEffect(() => {
-    let seen = ''
-    return watch(() => {
+    let lastState = ''
+    return onFrame(() => {
       const now = state()
-      if (now === seen) return
-      seen = now
+      if (now === lastState) return
+      lastState = now
       invalidate()
     })
   }, [state, invalidate])
@@ -360,7 +388,7 @@ function Ground({
 }
 
 /** The position of the tool, in a corner of the view. */
-function Instant({
+function ToolPosition({
   poses,
   rows,
   state,
@@ -371,11 +399,11 @@ function Instant({
 }) {
   const text = useRef<HTMLOutputElement>(null)
   useEffect(() => {
-    let seen = ''
-    return watch(() => {
+    let lastState = ''
+    return onFrame(() => {
       const key = state()
-      if (key === seen || !text.current) return
-      seen = key
+      if (key === lastState || !text.current) return
+      lastState = key
       const now = poses()
       text.current.textContent = now
         ? [3, 7, 11].map((k, axis) => `${'xyz'[axis]} ${now(rows - 1, k).toFixed(3)}`).join('   ') + ' m'

@@ -19,7 +19,7 @@ export function StaticArm({ name, drawing, state, children }: StaticArmProps) {
       const present = state()
       if (present === drawn) return
       drawn = present
-      void drawing().then((found) => mounted && setSvg(found))
+      void drawing().then((svgText) => mounted && setSvg(svgText))
     }
     redrawIfChanged()
     const timer = setInterval(redrawIfChanged, CHECK_MS)

@@ -4,14 +4,14 @@ import { useMemo, useRef } from 'react'
 import { Color, Vector3 } from 'three'
 import { LineGeometry, type Line2 } from 'three-stdlib'
 
-const MOST_POINTS = 600
+const MAX_POINTS = 600
 /** Fraction of the colour at the oldest point. */
-const OLDEST = 0.22
+const OLDEST_FRACTION = 0.22
 
 /**
  * The path of the tool up to now: number of points, a version that changes with the path, and each point.
  */
-export interface Way {
+export interface ToolPathPoints {
   key: string
   last: number
   point: (k: number) => [number, number, number]
@@ -19,16 +19,16 @@ export interface Way {
 
 /** The path of the tool up to the displayed time; older parts fade. */
 export function ToolPath({
-  way,
+  path,
   dark,
   background,
 }: {
-  way: () => Way | undefined
+  path: () => ToolPathPoints | undefined
   dark: boolean
   background: string
 }) {
   const line = useRef<Line2>(null)
-  const seen = useRef('')
+  const drawnKey = useRef('')
   const start = useMemo(() => [new Vector3(), new Vector3(0, 0, 1e-6)], [])
   const colour = dark ? '#3d9fdc' : '#0072b2'
   const white = useMemo<[number, number, number][]>(
@@ -39,25 +39,25 @@ export function ToolPath({
     [],
   )
   useFrame(() => {
-    const now = way()
-    const key = `${now?.key} ${colour}`
-    if (!line.current || key === seen.current) return
-    seen.current = key
-    line.current.visible = Boolean(now) && now!.last > 0
-    if (!now || now.last < 1) return
-    const stride = Math.max(1, Math.ceil(now.last / MOST_POINTS))
+    const current = path()
+    const key = `${current?.key} ${colour}`
+    if (!line.current || key === drawnKey.current) return
+    drawnKey.current = key
+    line.current.visible = Boolean(current) && current!.last > 0
+    if (!current || current.last < 1) return
+    const stride = Math.max(1, Math.ceil(current.last / MAX_POINTS))
     const points: number[] = []
     const colours: number[] = []
-    const old = new Color(background).lerp(new Color(colour), OLDEST)
-    const fresh = new Color(colour)
+    const old = new Color(background).lerp(new Color(colour), OLDEST_FRACTION)
+    const newest = new Color(colour)
     const shade = new Color()
-    const put = (k: number) => {
-      points.push(...now.point(k))
-      shade.copy(old).lerp(fresh, (k / now.last) ** 1.5)
+    const addPoint = (k: number) => {
+      points.push(...current.point(k))
+      shade.copy(old).lerp(newest, (k / current.last) ** 1.5)
       colours.push(shade.r, shade.g, shade.b)
     }
-    for (let k = 0; k < now.last; k += stride) put(k)
-    put(now.last)
+    for (let k = 0; k < current.last; k += stride) addPoint(k)
+    addPoint(current.last)
     // A geometry keeps its first instance count, so a longer line needs a new geometry.
     line.current.geometry.dispose()
     line.current.geometry = new LineGeometry()

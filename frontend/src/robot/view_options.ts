@@ -10,8 +10,8 @@ export interface ViewOptions {
   follow: boolean
 }
 
-const KEPT = 'armblocks-robot-view'
-const START: ViewOptions = {
+const STORAGE_KEY = 'armblocks-robot-view'
+const DEFAULTS: ViewOptions = {
   frames: false,
   axes: false,
   limits: false,
@@ -20,18 +20,18 @@ const START: ViewOptions = {
   follow: false,
 }
 
-function kept(): Partial<ViewOptions> {
+function storedOptions(): Partial<ViewOptions> {
   try {
-    return JSON.parse(localStorage.getItem(KEPT) ?? '{}') as Partial<ViewOptions>
+    return JSON.parse(localStorage.getItem(STORAGE_KEY) ?? '{}') as Partial<ViewOptions>
   } catch {
     return {}
   }
 }
 
 /** Display options of arms, shared by all views and stored. */
-export const useViewOptions = create<ViewOptions>(() => ({ ...START, ...kept() }))
+export const useViewOptions = create<ViewOptions>(() => ({ ...DEFAULTS, ...storedOptions() }))
 
 export function toggle(option: keyof ViewOptions): void {
   useViewOptions.setState((now) => ({ [option]: !now[option] }))
-  localStorage.setItem(KEPT, JSON.stringify(useViewOptions.getState()))
+  localStorage.setItem(STORAGE_KEY, JSON.stringify(useViewOptions.getState()))
 }

@@ -32,10 +32,10 @@ const OPTION_LABELS: [keyof ViewOptions, string][] = [
 
 interface ViewToolsProps {
   camera: React.RefObject<CameraHandle | null>
-  shot: React.RefObject<Rendering | null>
+  rendering: React.RefObject<Rendering | null>
   name: string
   onPicture: () => void
-  film: (() => Promise<void>) | undefined
+  playForVideo: (() => Promise<void>) | undefined
   hasPath: boolean
   hasGhosts: boolean
   onToggle: (option: keyof ViewOptions) => void
@@ -57,10 +57,10 @@ export function armEntries(
     { title: 'Show all of the arm', keys: 'Space', run: () => camera?.fit() },
     {
       title: 'Camera',
-      within: PRESET_LABELS.map(([preset, title]) => ({ title, run: () => camera?.look(preset) })),
+      submenu: PRESET_LABELS.map(([preset, title]) => ({ title, run: () => camera?.look(preset) })),
     },
     null,
-    ...offered(hasPath, hasGhosts).map(([option, title]) => ({
+    ...availableOptions(hasPath, hasGhosts).map(([option, title]) => ({
       title,
       checked: options[option],
       run: () => onToggle(option),
@@ -70,23 +70,23 @@ export function armEntries(
   ]
 }
 
-const offered = (hasPath: boolean, hasGhosts: boolean) =>
+const availableOptions = (hasPath: boolean, hasGhosts: boolean) =>
   OPTION_LABELS.filter(([option]) => (option !== 'path' || hasPath) && (option !== 'ghosts' || hasGhosts))
 
 /** The buttons over an arm: camera, display options, picture and video. */
 export function ViewTools({
   camera,
-  shot,
+  rendering,
   name,
   onPicture,
-  film,
+  playForVideo,
   hasPath,
   hasGhosts,
   onToggle,
   children,
 }: ViewToolsProps) {
   const options = useViewOptions()
-  const [filming, setFilming] = useState(false)
+  const [recording, setRecording] = useState(false)
   const stop = useRef<() => void>(() => {})
   return (
     <div className="view-tools" role="toolbar" aria-label="Robot view">
@@ -113,7 +113,7 @@ export function ViewTools({
           <Button label="Display options" icon={IconEye} />
         </Menu.Target>
         <Menu.Dropdown>
-          {offered(hasPath, hasGhosts).map(([option, label]) => (
+          {availableOptions(hasPath, hasGhosts).map(([option, label]) => (
             <Menu.CheckboxItem key={option} checked={options[option]} onChange={() => onToggle(option)}>
               {label}
             </Menu.CheckboxItem>
@@ -121,17 +121,17 @@ export function ViewTools({
         </Menu.Dropdown>
       </Menu>
       <Button label="Save a picture (PNG)" icon={IconCamera} onClick={onPicture} />
-      {film && videoFormat() && (
+      {playForVideo && videoFormat() && (
         <Button
-          label={filming ? 'Stop the video' : 'Record a video of the run'}
-          icon={filming ? IconPlayerStopFilled : IconVideo}
+          label={recording ? 'Stop the video' : 'Record a video of the run'}
+          icon={recording ? IconPlayerStopFilled : IconVideo}
           onClick={() => {
-            if (filming) {
+            if (recording) {
               stop.current()
               return
             }
-            setFilming(true)
-            stop.current = recordVideo(shot, name, film, () => setFilming(false))
+            setRecording(true)
+            stop.current = recordVideo(rendering, name, playForVideo, () => setRecording(false))
           }}
         />
       )}

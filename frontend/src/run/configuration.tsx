@@ -1,6 +1,6 @@
 import { Alert, Button, Checkbox, Group, Modal, NativeSelect, Stack, TextInput } from '@mantine/core'
 import { useEffect, useState } from 'react'
-import { show, useDialogs } from '../dialogs'
+import { showDialog, useDialogs } from '../dialogs'
 import { valueText } from '../inspector/value_text'
 import type { SettingRule, SolverChoice } from '../protocol'
 import { ask, change, useStudio } from '../store'
@@ -10,7 +10,7 @@ const CHECK_DELAY_MS = 200
 /** The run settings of the model: solver, steps, tolerances, stop time. */
 export function Configuration() {
   const opened = useDialogs((s) => s.open === 'configuration')
-  const close = () => show(null)
+  const close = () => showDialog(null)
   return (
     <Modal opened={opened} onClose={close} title={<b>Configuration parameters</b>} size="md">
       {opened && <Form onClose={close} />}
@@ -34,23 +34,23 @@ function useFaults(
   values: Record<string, boolean | string | null>,
 ): Record<string, string> {
   const [faults, setFaults] = useState<Record<string, string>>({})
-  const asked = JSON.stringify(values)
+  const valuesJson = JSON.stringify(values)
   useEffect(() => {
     let current = true
     const timer = setTimeout(() => {
       void ask({
         kind: 'typed_settings',
         document,
-        values: JSON.parse(asked) as typeof values,
-      }).then((found) => {
-        if (current && found) setFaults(found)
+        values: JSON.parse(valuesJson) as typeof values,
+      }).then((faults) => {
+        if (current && faults) setFaults(faults)
       })
     }, CHECK_DELAY_MS)
     return () => {
       current = false
       clearTimeout(timer)
     }
-  }, [asked, document])
+  }, [valuesJson, document])
   return faults
 }
 
@@ -59,7 +59,7 @@ function solverChoices(solvers: SolverChoice[]) {
   const group = (label: string, adaptive: boolean, stiff: boolean) => ({
     group: label,
     items: solvers
-      .filter((one) => one.name !== 'auto' && one.adaptive === adaptive && one.stiff === stiff)
+      .filter((solver) => solver.name !== 'auto' && solver.adaptive === adaptive && solver.stiff === stiff)
       .map(({ name, title }) => ({ value: name, label: `${name}: ${title}` })),
   })
   return [
@@ -81,13 +81,13 @@ interface SettingProps {
   /** The text of the setting; of a switch `true` or `false`. */
   value: string | undefined
   fault: string | undefined
-  put: (value: string) => void
+  setValue: (value: string) => void
   solvers: SolverChoice[]
   focused: boolean
 }
 
 /** One setting: a list for the solver, a box for a switch, else a field for a number. */
-function Setting({ rule, value, fault, put, solvers, focused }: SettingProps) {
+function Setting({ rule, value, fault, setValue, solvers, focused }: SettingProps) {
   const label = (
     <>
       {rule.title}
@@ -102,7 +102,7 @@ function Setting({ rule, value, fault, put, solvers, focused }: SettingProps) {
         {...common}
         data={solverChoices(solvers)}
         value={value ?? 'auto'}
-        onChange={(event) => put(event.currentTarget.value)}
+        onChange={(event) => setValue(event.currentTarget.value)}
       />
     )
   if (typeof rule.default === 'boolean')
@@ -111,7 +111,7 @@ function Setting({ rule, value, fault, put, solvers, focused }: SettingProps) {
         className="wide"
         {...common}
         checked={value === 'true'}
-        onChange={(event) => put(String(event.currentTarget.checked))}
+        onChange={(event) => setValue(String(event.currentTarget.checked))}
       />
     )
   return (
@@ -120,7 +120,7 @@ function Setting({ rule, value, fault, put, solvers, focused }: SettingProps) {
       data-autofocus={focused || undefined}
       classNames={{ input: 'typed' }}
       value={value ?? ''}
-      onChange={(event) => put(event.currentTarget.value)}
+      onChange={(event) => setValue(event.currentTarget.value)}
       placeholder="automatic"
     />
   )
@@ -131,11 +131,11 @@ function Form({ onClose }: { onClose: () => void }) {
   const settings = useStudio((s) => s.document?.settings)
   const welcome = useStudio((s) => s.welcome)
   const run = useStudio((s) => s.run)
-  const [start] = useState(() =>
+  const [initialTexts] = useState(() =>
     Object.fromEntries(Object.entries(settings ?? {}).map(([name, value]) => [name, settingText(value)])),
   )
-  const [typed, setTyped] = useState<Record<string, string>>(start)
-  const changed = Object.keys(typed).filter((name) => typed[name] !== start[name])
+  const [typed, setTyped] = useState<Record<string, string>>(initialTexts)
+  const changed = Object.keys(typed).filter((name) => typed[name] !== initialTexts[name])
   const switches = new Set(
     welcome?.settings.filter((rule) => typeof rule.default === 'boolean').map((r) => r.name),
   )
@@ -146,13 +146,13 @@ function Form({ onClose }: { onClose: () => void }) {
     }),
   )
   const faults = useFaults(document, values)
-  const wrong = changed.length > 0 && Object.keys(faults).length > 0
+  const invalid = changed.length > 0 && Object.keys(faults).length > 0
   return (
     <form
       onSubmit={(event) => {
         event.preventDefault()
         if (!changed.length) onClose()
-        else if (!wrong)
+        else if (!invalid)
           void change({ kind: 'settings', values }).then((done) => done !== undefined && onClose())
       }}
     >
@@ -164,7 +164,7 @@ function Form({ onClose }: { onClose: () => void }) {
               rule={rule}
               fault={faults[rule.name]}
               value={typed[rule.name]}
-              put={(value) => setTyped((now) => ({ ...now, [rule.name]: value }))}
+              setValue={(value) => setTyped((now) => ({ ...now, [rule.name]: value }))}
               solvers={welcome.solvers}
               focused={index === 0}
             />
@@ -179,7 +179,7 @@ function Form({ onClose }: { onClose: () => void }) {
           <Button variant="default" onClick={onClose}>
             Cancel
           </Button>
-          <Button type="submit" disabled={wrong}>
+          <Button type="submit" disabled={invalid}>
             OK
           </Button>
         </Group>

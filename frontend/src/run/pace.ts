@@ -4,30 +4,30 @@
  */
 
 /** Duration of two frames above which pauses are inserted, ms. */
-const QUICK_MS = 60
+const FAST_FRAMES_MS = 60
 /** Length of the pause, as a multiple of the duration of the frames. */
-const PAUSE = 1.5
+const PAUSE_FACTOR = 1.5
 
-let freeAt = 0
-let drawn = 0
+let pauseEnd = 0
+let measuredFrame = 0
 
 /** Whether the previous frames have been displayed, at a time of `performance.now()`. */
-export function isFree(now: number): boolean {
-  return now >= freeAt
+export function canDraw(now: number): boolean {
+  return now >= pauseEnd
 }
 
 /**
  * Whether views that follow the run may be drawn in the animation frame `now`; the duration of this frame is
  * then measured.
  */
-export function mayFollow(now: number): boolean {
-  if (!isFree(now)) return false
-  if (drawn !== now) {
-    drawn = now
+export function mayDraw(now: number): boolean {
+  if (!canDraw(now)) return false
+  if (measuredFrame !== now) {
+    measuredFrame = now
     // Two frames, because a browser prepares one frame while it displays another.
     requestAnimationFrame(() =>
-      requestAnimationFrame((then) => {
-        if (then - now > QUICK_MS) freeAt = Math.max(freeAt, then + PAUSE * (then - now))
+      requestAnimationFrame((later) => {
+        if (later - now > FAST_FRAMES_MS) pauseEnd = Math.max(pauseEnd, later + PAUSE_FACTOR * (later - now))
       }),
     )
   }

@@ -1,5 +1,5 @@
 import { create } from 'zustand'
-import { changed } from '../frames'
+import { scheduleFrame } from '../frames'
 import type { EventOf } from '../messages'
 import type { ViewOf } from '../protocol'
 import { RunSamples } from '../model/run_samples'
@@ -13,7 +13,7 @@ export interface Tuning {
 }
 
 /** A stored run: its samples, and the values that differed from the model. */
-export interface KeptRun {
+export interface StoredRun {
   key: string
   document: string
   name: string
@@ -27,19 +27,19 @@ export interface KeptRun {
   samples: RunSamples
   views: ViewOf[]
   /** Trial values at the start. */
-  tried: Record<string, unknown>
+  trialValues: Record<string, unknown>
   tunings: Tuning[]
 }
 
-const MOST_RUNS = 50
-const MOST_BYTES = 384 * 2 ** 20
+const MAX_RUNS = 50
+const MAX_BYTES = 384 * 2 ** 20
 
 interface Runs {
-  runs: KeptRun[]
+  runs: StoredRun[]
   /**
    * Trial values of tunable parameters by `block.parameter`; they are not in the model until they are kept.
    */
-  tried: Record<string, unknown>
+  trialValues: Record<string, unknown>
   /** Simulated seconds per second of clock time; null: as fast as possible. */
   speed: number | null
   rename: (key: string, name: string) => void
@@ -49,78 +49,78 @@ interface Runs {
 /** All runs since the page was opened, latest last; the oldest are dropped if there are too many. */
 export const useRuns = create<Runs>((set) => ({
   runs: [],
-  tried: {},
+  trialValues: {},
   speed: null,
   rename: (key, name) =>
     set((s) => ({ runs: s.runs.map((run) => (run.key === key ? { ...run, name } : run)) })),
   remove: (key) => set((s) => ({ runs: s.runs.filter((run) => run.key !== key || run.samples === samples) })),
 }))
-useRuns.subscribe(changed)
+useRuns.subscribe(scheduleFrame)
 
-let counted = 0
+let runCount = 0
 
-function update(key: string, change: (run: KeptRun) => Partial<KeptRun>): void {
+function update(key: string, change: (run: StoredRun) => Partial<StoredRun>): void {
   useRuns.setState((s) => ({
     runs: s.runs.map((run) => (run.key === key ? { ...run, ...change(run) } : run)),
   }))
 }
 
-export function began(event: EventOf<'run_started'>): void {
-  const known = useRuns.getState().runs.find(({ key }) => key === event.run)
-  if (known) {
+export function onRunStarted(event: EventOf<'run_started'>): void {
+  const stored = useRuns.getState().runs.find(({ key }) => key === event.run)
+  if (stored) {
     // After a reconnection the server sends its run again from the beginning.
-    known.samples.truncate(0)
-    showSamples(known.samples)
+    stored.samples.truncate(0)
+    showSamples(stored.samples)
     update(event.run, () => ({ state: 'running', tunings: [] }))
     return
   }
-  const made = new RunSamples(event.run, event.channels, event.aliases)
-  showSamples(made)
+  const runSamples = new RunSamples(event.run, event.channels, event.aliases)
+  showSamples(runSamples)
   useRuns.setState((s) => {
-    const run: KeptRun = {
+    const run: StoredRun = {
       key: event.run,
       document: event.document,
-      name: `Run ${++counted}`,
+      name: `Run ${++runCount}`,
       began: new Date(),
       stopTime: event.stop_time,
       stride: event.stride,
       state: 'running',
       solver: '',
       reason: '',
-      samples: made,
+      samples: runSamples,
       views: event.views,
-      tried: { ...s.tried },
+      trialValues: { ...s.trialValues },
       tunings: [],
     }
-    const runs = [...s.runs, run].slice(-MOST_RUNS)
+    const runs = [...s.runs, run].slice(-MAX_RUNS)
     const bytes = () => runs.reduce((sum, { samples }) => sum + samples.bytes, 0)
-    while (runs.length > 1 && bytes() > MOST_BYTES) runs.shift()
+    while (runs.length > 1 && bytes() > MAX_BYTES) runs.shift()
     return { runs }
   })
 }
 
-export function tuned({ run, time, parameter, value }: EventOf<'run_tuned'>): void {
+export function onRunTuned({ run, time, parameter, value }: EventOf<'run_tuned'>): void {
   update(run, ({ tunings }) => ({ tunings: [...tunings, { time, parameter, value }] }))
 }
 
-export function rewound({ run, time, count }: EventOf<'run_rewound'>): void {
+export function onRunRewound({ run, time, count }: EventOf<'run_rewound'>): void {
   if (samples.run === run) samples.truncate(count)
-  changed()
+  scheduleFrame()
   // Values tuned later apply from the time to which the run has returned.
   update(run, ({ tunings }) => ({
-    tunings: tunings.map((one) => ({ ...one, time: Math.min(one.time, time) })),
+    tunings: tunings.map((tuning) => ({ ...tuning, time: Math.min(tuning.time, time) })),
   }))
 }
 
-export function progressed({ run, state, solver, reason }: EventOf<'run_progress'>): void {
-  const known = useRuns.getState().runs.find(({ key }) => key === run)
-  if (!known || known.state === state) return
-  if (state === 'done' || state === 'stopped' || state === 'failed') known.samples.close()
+export function onRunProgress({ run, state, solver, reason }: EventOf<'run_progress'>): void {
+  const stored = useRuns.getState().runs.find(({ key }) => key === run)
+  if (!stored || stored.state === state) return
+  if (state === 'done' || state === 'stopped' || state === 'failed') stored.samples.close()
   update(run, () => ({ state, solver, reason }))
 }
 
 /** Another document is shown: trial values and runs of the previous one are dropped. */
-export function forget(): void {
+export function dropTrials(): void {
   showSamples(new RunSamples('', [], {}))
-  useRuns.setState({ tried: {} })
+  useRuns.setState({ trialValues: {} })
 }

@@ -6,25 +6,25 @@ async function run(): Promise<void> {
   const { document } = useStudio.getState()
   if (!document) return
   useCursor.setState({ time: null, playing: false })
-  const { tried, speed } = useRuns.getState()
-  await ask({ kind: 'run', document: document.state.document, speed, tuned: tried })
+  const { trialValues, speed } = useRuns.getState()
+  await ask({ kind: 'run', document: document.state.document, speed, tuned: trialValues })
 }
 
 /** Pause, step or stop the run; without an active run, a step moves the time cursor by one sample. */
 export function control(action: 'pause' | 'step' | 'back' | 'stop'): void {
-  const { run: shown } = useStudio.getState()
-  if (!shown) return
-  const busy = shown.state === 'running' || shown.state === 'paused'
+  const { run: currentRun } = useStudio.getState()
+  if (!currentRun) return
+  const busy = currentRun.state === 'running' || currentRun.state === 'paused'
   if (!busy && action === 'step') stepCursor(1)
   else if (!busy && action === 'back') stepCursor(-1)
   if (!busy) return
   if (action === 'back') useCursor.setState({ time: null, playing: false })
-  void ask({ kind: 'control', run: shown.run, action })
+  void ask({ kind: 'control', run: currentRun.run, action })
 }
 
 /** Start the model, or resume a paused run. */
 export function startOrResume(): void {
-  const { run: shown } = useStudio.getState()
-  if (shown?.state === 'paused') void ask({ kind: 'control', run: shown.run, action: 'resume' })
-  else if (shown?.state !== 'running') void run()
+  const { run: currentRun } = useStudio.getState()
+  if (currentRun?.state === 'paused') void ask({ kind: 'control', run: currentRun.run, action: 'resume' })
+  else if (currentRun?.state !== 'running') void run()
 }

@@ -1,11 +1,11 @@
 import { ActionIcon, Button, NativeSelect, Slider, Text, Tooltip } from '@mantine/core'
 import { IconPlayerPauseFilled, IconPlayerPlayFilled, IconRepeat, IconTag } from '@tabler/icons-react'
 import { ask, useStudio } from '../store'
-import { useValues } from './wire_values'
-import { hold, play, shownTime, stepCursor, useCursor } from './cursor'
+import { useShownValues } from './wire_values'
+import { pausePlayback, play, shownTime, stepCursor, useCursor } from './cursor'
 
 const RATES = ['0.1', '0.25', '0.5', '1', '2', '5', '10'].map((value) => ({ value, label: `${value} ×` }))
-const LONG_STEP = 10
+const SHIFT_STEP = 10
 
 /**
  * The time cursor of all views: drag it, or play the recorded run. `wires`: show the button for wire values.
@@ -14,27 +14,27 @@ export function Timeline({ wires = false }: { wires?: boolean }) {
   const run = useStudio((s) => s.run)
   const { time, playing, loop, rate } = useCursor()
   const stop = run?.stopTime ?? 10
-  const at = time ?? run?.time ?? 0
+  const displayedTime = time ?? run?.time ?? 0
   const label = playing ? 'Pause the playback' : 'Play the run'
-  const keys = (event: React.KeyboardEvent) => {
+  const handleKey = (event: React.KeyboardEvent) => {
     if (event.target instanceof HTMLSelectElement || event.ctrlKey || event.metaKey) return
-    const by = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 }[event.key]
-    if (by) stepCursor(event.shiftKey ? LONG_STEP * by : by)
-    else if (event.key === ' ' && run && playing) hold()
+    const step = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 }[event.key]
+    if (step) stepCursor(event.shiftKey ? SHIFT_STEP * step : step)
+    else if (event.key === ' ' && run && playing) pausePlayback()
     else if (event.key === ' ' && run) play()
     else return
     event.preventDefault()
     event.stopPropagation()
   }
   return (
-    <footer className="timeline" onKeyDownCapture={keys}>
+    <footer className="timeline" onKeyDownCapture={handleKey}>
       <Tooltip label={`${label} (Space)`} openDelay={400}>
         <ActionIcon
           variant="subtle"
           color="gray"
           aria-label={label}
           disabled={!run}
-          onClick={() => (playing ? hold() : play())}
+          onClick={() => (playing ? pausePlayback() : play())}
         >
           {playing ? <IconPlayerPauseFilled size={15} /> : <IconPlayerPlayFilled size={15} />}
         </ActionIcon>
@@ -67,11 +67,11 @@ export function Timeline({ wires = false }: { wires?: boolean }) {
         step={stop / 1000}
         label={null}
         disabled={!run}
-        value={Math.min(at, stop)}
+        value={Math.min(displayedTime, stop)}
         onChange={(value) => useCursor.setState({ time: value, playing: false })}
       />
-      <GoBack />
-      {wires && <AllValues />}
+      <ReturnToTime />
+      {wires && <ValuesToggle />}
       <Text size="sm" className="numbers instant">
         {(run ? shownTime() : 0).toFixed(3)} s
       </Text>
@@ -80,7 +80,7 @@ export function Timeline({ wires = false }: { wires?: boolean }) {
 }
 
 /** Returns a paused run to the displayed time. */
-function GoBack() {
+function ReturnToTime() {
   const run = useStudio((s) => s.run)
   const time = useCursor((s) => s.time)
   if (run?.state !== 'paused' || time === null || time >= run.time) return null
@@ -105,16 +105,16 @@ function GoBack() {
   )
 }
 
-function AllValues() {
-  const all = useValues((s) => s.all)
+function ValuesToggle() {
+  const showsAll = useShownValues((s) => s.all)
   return (
     <Tooltip label="Values on all wires" openDelay={400}>
       <ActionIcon
-        variant={all ? 'light' : 'subtle'}
-        color={all ? 'accent' : 'gray'}
+        variant={showsAll ? 'light' : 'subtle'}
+        color={showsAll ? 'accent' : 'gray'}
         aria-label="Values on all wires"
-        aria-pressed={all}
-        onClick={() => useValues.setState({ all: !all })}
+        aria-pressed={showsAll}
+        onClick={() => useShownValues.setState({ all: !showsAll })}
       >
         <IconTag size={15} />
       </ActionIcon>

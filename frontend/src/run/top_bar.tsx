@@ -14,10 +14,10 @@ import {
 } from '@tabler/icons-react'
 import { useEffect } from 'react'
 import { commandOf } from '../commands'
-import { openConfiguration, save, show } from '../dialogs'
+import { openConfiguration, save, showDialog } from '../dialogs'
 import { FileMenu } from '../documents/file_menu'
 import { DocumentTitle } from '../documents/title'
-import { alter, ask, change, useStudio } from '../store'
+import { alterDocument, ask, change, useStudio } from '../store'
 import { ThemeSwitch } from '../theme_switch'
 import { useRuns } from './runs'
 import { control, startOrResume } from './start'
@@ -28,14 +28,14 @@ const SPEEDS = [
 ]
 
 export function TopBar() {
-  const known = useStudio((s) => s.document !== null)
+  const hasDocument = useStudio((s) => s.document !== null)
 
   useEffect(() => {
     const onKey = (event: KeyboardEvent) => {
       const command = commandOf(event, false)
       if (!command) return
       event.preventDefault()
-      if (command.possible?.() ?? true) command.run()
+      if (command.enabled?.() ?? true) command.run()
     }
     addEventListener('keydown', onKey)
     return () => removeEventListener('keydown', onKey)
@@ -48,25 +48,30 @@ export function TopBar() {
       <Group gap={2} role="group" aria-label="Edit">
         <Undo />
         <Redo />
-        <Tool label="Save (Ctrl+S)" icon={IconDeviceFloppy} disabled={!known} onClick={() => void save()} />
+        <Tool
+          label="Save (Ctrl+S)"
+          icon={IconDeviceFloppy}
+          disabled={!hasDocument}
+          onClick={() => void save()}
+        />
         <Tool
           label="Add a block (type on the canvas)"
           icon={IconPlus}
-          disabled={!known}
-          onClick={() => show('insert')}
+          disabled={!hasDocument}
+          onClick={() => showDialog('insert')}
         />
         <Tool
           label="Arrange the blocks"
           icon={IconLayoutDistributeHorizontal}
-          disabled={!known}
+          disabled={!hasDocument}
           onClick={() => void change({ kind: 'arrange' })}
         />
       </Group>
-      <RunControls known={known} />
+      <RunControls hasDocument={hasDocument} />
       <Tool
         label="Configuration parameters (Ctrl+E)"
         icon={IconSettings}
-        disabled={!known}
+        disabled={!hasDocument}
         onClick={openConfiguration}
       />
       <RunState />
@@ -76,7 +81,7 @@ export function TopBar() {
   )
 }
 
-function RunControls({ known }: { known: boolean }) {
+function RunControls({ hasDocument }: { hasDocument: boolean }) {
   const state = useStudio((s) => s.run?.state)
   const runKey = useStudio((s) => s.run?.run)
   const speed = useRuns((s) => s.speed)
@@ -86,7 +91,7 @@ function RunControls({ known }: { known: boolean }) {
       <Button
         size="compact-sm"
         leftSection={<IconPlayerPlayFilled size={14} />}
-        disabled={!known || state === 'running'}
+        disabled={!hasDocument || state === 'running'}
         onClick={startOrResume}
       >
         {state === 'paused' ? 'Resume' : 'Run'}
@@ -135,7 +140,7 @@ function Undo() {
       label={edit ? `Undo ${edit} (Ctrl+Z)` : 'Nothing to undo'}
       icon={IconArrowBackUp}
       disabled={!edit}
-      onClick={() => alter('undo')}
+      onClick={() => alterDocument('undo')}
     />
   )
 }
@@ -147,29 +152,29 @@ function Redo() {
       label={edit ? `Redo ${edit} (Ctrl+Y)` : 'Nothing to redo'}
       icon={IconArrowForwardUp}
       disabled={!edit}
-      onClick={() => alter('redo')}
+      onClick={() => alterDocument('redo')}
     />
   )
 }
 
 /** The stop time of the model, s; the text is applied when the field loses the focus. */
 function StopTime() {
-  const known = useStudio((s) => s.document !== null)
+  const hasDocument = useStudio((s) => s.document !== null)
   const value = Number(useStudio((s) => s.document?.settings['stop_time']) ?? 10)
-  const written = `${value} s`
+  const text = `${value} s`
   return (
     <TextInput
-      key={written}
+      key={text}
       size="xs"
       w={92}
       aria-label="Stop time, s"
       inputMode="decimal"
-      defaultValue={written}
+      defaultValue={text}
       onBlur={({ currentTarget }) => {
-        const typed = Number.parseFloat(currentTarget.value)
-        currentTarget.value = `${typed > 0 ? typed : value} s`
-        if (known && typed > 0 && typed !== value)
-          void change({ kind: 'settings', values: { stop_time: typed } })
+        const seconds = Number.parseFloat(currentTarget.value)
+        currentTarget.value = `${seconds > 0 ? seconds : value} s`
+        if (hasDocument && seconds > 0 && seconds !== value)
+          void change({ kind: 'settings', values: { stop_time: seconds } })
       }}
     />
   )

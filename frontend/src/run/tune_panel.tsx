@@ -8,12 +8,12 @@ import type { Tunable } from '../protocol'
 import { ask, useStudio } from '../store'
 import { useRuns } from './runs'
 
-interface Tuning {
+interface PinnedParameters {
   pinned: ReadonlySet<string>
   ranges: Record<string, [number, number]>
 }
 
-const useTuning = create<Tuning>(() => ({ pinned: new Set(), ranges: {} }))
+const usePinnedParameters = create<PinnedParameters>(() => ({ pinned: new Set(), ranges: {} }))
 const NUMERIC = ['number', 'array']
 const SLIDER_STEPS = 400
 
@@ -24,52 +24,52 @@ const SLIDER_STEPS = 400
 function useTunables(): Map<string, Tunable> {
   const blocks = useStudio((s) => s.document?.blocks)
   const library = useStudio((s) => s.library)
-  const level = useStudio((s) => s.document?.inside.map((name) => `${name}/`).join('') ?? '')
+  const pathPrefix = useStudio((s) => s.document?.inside.map((name) => `${name}/`).join('') ?? '')
   const ofRun = useStudio((s) => s.run?.tunables)
   return useMemo(() => {
-    const found = new Map((ofRun ?? []).map((one) => [one.path, one]))
+    const tunables = new Map((ofRun ?? []).map((tunable) => [tunable.path, tunable]))
     for (const block of Object.values(blocks ?? {})) {
       if (block.comment) continue
       for (const rule of library.get(block.type)?.parameters ?? []) {
         if (!rule.tunable || !NUMERIC.includes(rule.kind)) continue
-        const path = `${level}${block.name}.${rule.name}`
-        const known = found.get(path)
-        found.set(path, {
+        const path = `${pathPrefix}${block.name}.${rule.name}`
+        const ofLastRun = tunables.get(path)
+        tunables.set(path, {
           path,
           value: block.parameters[rule.name],
           unit: rule.unit,
           doc: rule.doc,
-          low: known?.low ?? null,
-          high: known?.high ?? null,
+          low: ofLastRun?.low ?? null,
+          high: ofLastRun?.high ?? null,
         })
       }
     }
-    return found
-  }, [blocks, library, level, ofRun])
+    return tunables
+  }, [blocks, library, pathPrefix, ofRun])
 }
 
 /** Tunable parameters of the selected and pinned blocks, which can be changed during a run. */
 export function TunePanel() {
   const tunables = useTunables()
   const selection = useStudio((s) => s.selection)
-  const level = useStudio((s) => s.document?.inside.map((name) => `${name}/`).join('') ?? '')
-  const pinned = useTuning((s) => s.pinned)
-  const tried = useRuns((s) => s.tried)
-  const chosen = [...selection].map((name) => level + name)
-  const shown = [...tunables.values()].filter(
+  const pathPrefix = useStudio((s) => s.document?.inside.map((name) => `${name}/`).join('') ?? '')
+  const pinned = usePinnedParameters((s) => s.pinned)
+  const trialValues = useRuns((s) => s.trialValues)
+  const selectedPaths = [...selection].map((name) => pathPrefix + name)
+  const listed = [...tunables.values()].filter(
     ({ path }) =>
       pinned.has(path) ||
-      path in tried ||
-      chosen.some((name) => path.startsWith(`${name}.`) || path.startsWith(`${name}/`)),
+      path in trialValues ||
+      selectedPaths.some((name) => path.startsWith(`${name}.`) || path.startsWith(`${name}/`)),
   )
-  const count = Object.keys(tried).length
+  const count = Object.keys(trialValues).length
   return (
     <div className="tune">
       <div className="tuned-rows">
-        {shown.map((tunable) => (
+        {listed.map((tunable) => (
           <TuneRow key={tunable.path} tunable={tunable} />
         ))}
-        {!shown.length && (
+        {!listed.length && (
           <p className="empty">
             Select a block to see the parameters that can be changed while the model runs. Pin those to keep
             at hand.
@@ -81,10 +81,14 @@ export function TunePanel() {
           <Text size="xs" c="dimmed" flex={1}>
             {count === 1 ? 'One value is' : `${count} values are`} tried, and not in the model.
           </Text>
-          <Button size="compact-xs" variant="default" onClick={() => drop(Object.keys(tried), tunables)}>
+          <Button
+            size="compact-xs"
+            variant="default"
+            onClick={() => dropTrialValues(Object.keys(trialValues), tunables)}
+          >
             Drop
           </Button>
-          <Button size="compact-xs" onClick={() => void keep()}>
+          <Button size="compact-xs" onClick={() => void keepTrialValues()}>
             Keep in the model
           </Button>
         </Group>
@@ -99,65 +103,65 @@ function send(path: string, value: unknown): void {
     void ask({ kind: 'tune', run: run.run, parameter: path, value })
 }
 
-const waiting = new Map<string, unknown>()
+const unsentValues = new Map<string, unknown>()
 
 /** Try a value; at most once a frame while a slider moves. */
-function attempt(path: string, value: unknown): void {
-  useRuns.setState((s) => ({ tried: { ...s.tried, [path]: value } }))
-  if (!waiting.size)
+function tryValue(path: string, value: unknown): void {
+  useRuns.setState((s) => ({ trialValues: { ...s.trialValues, [path]: value } }))
+  if (!unsentValues.size)
     requestAnimationFrame(() => {
-      waiting.forEach((latest, one) => send(one, latest))
-      waiting.clear()
+      unsentValues.forEach((latest, path) => send(path, latest))
+      unsentValues.clear()
     })
-  waiting.set(path, value)
+  unsentValues.set(path, value)
 }
 
-function drop(paths: string[], tunables: Map<string, Tunable>): void {
+function dropTrialValues(paths: string[], tunables: Map<string, Tunable>): void {
   for (const path of paths) {
-    waiting.delete(path)
-    const model = tunables.get(path)?.value
-    if (model !== undefined) send(path, model)
+    unsentValues.delete(path)
+    const modelValue = tunables.get(path)?.value
+    if (modelValue !== undefined) send(path, modelValue)
   }
   useRuns.setState((s) => ({
-    tried: Object.fromEntries(Object.entries(s.tried).filter(([path]) => !paths.includes(path))),
+    trialValues: Object.fromEntries(Object.entries(s.trialValues).filter(([path]) => !paths.includes(path))),
   }))
 }
 
 /** Keep all trial values in the model, as one undo step. */
-async function keep(): Promise<void> {
+async function keepTrialValues(): Promise<void> {
   const { document } = useStudio.getState()
-  const { tried } = useRuns.getState()
+  const { trialValues } = useRuns.getState()
   if (!document) return
-  const edit = { kind: 'keep_tuned' as const, values: tried }
-  const done = await ask({
+  const edit = { kind: 'keep_tuned' as const, values: trialValues }
+  const version = await ask({
     kind: 'change',
     document: document.state.document,
     key: newKey(),
     inside: [],
     edit,
   })
-  if (done !== undefined) useRuns.setState({ tried: {} })
+  if (version !== undefined) useRuns.setState({ trialValues: {} })
 }
 
 function TuneRow({ tunable }: { tunable: Tunable }) {
   const { path, unit, doc } = tunable
-  const tried = useRuns((s) => s.tried)
-  const changed = path in tried
-  const value = changed ? tried[path] : tunable.value
+  const trialValues = useRuns((s) => s.trialValues)
+  const changed = path in trialValues
+  const value = changed ? trialValues[path] : tunable.value
   const text = valueText(value)
   const [typed, setTyped] = useState(text)
   useEffect(() => setTyped(text), [text])
-  const at = path.lastIndexOf('.')
-  const done = () => {
+  const lastDot = path.lastIndexOf('.')
+  const commit = () => {
     const number = Number(typed)
-    if (typed.trim() && typed !== text) attempt(path, Number.isFinite(number) ? number : typed)
+    if (typed.trim() && typed !== text) tryValue(path, Number.isFinite(number) ? number : typed)
   }
   return (
     <div className={changed ? 'tune-row changed' : 'tune-row'}>
       <div className="tune-head" title={doc}>
         <span className="path">
-          {path.slice(0, at)}
-          <b>.{path.slice(at + 1)}</b>
+          {path.slice(0, lastDot)}
+          <b>.{path.slice(lastDot + 1)}</b>
           {unit && <span className="unit"> {unit}</span>}
         </span>
         {changed && (
@@ -167,7 +171,7 @@ function TuneRow({ tunable }: { tunable: Tunable }) {
               variant="subtle"
               color="gray"
               aria-label={`Discard the value of ${path}`}
-              onClick={() => drop([path], new Map([[path, tunable]]))}
+              onClick={() => dropTrialValues([path], new Map([[path, tunable]]))}
             >
               <IconArrowBackUp size={13} />
             </ActionIcon>
@@ -181,17 +185,17 @@ function TuneRow({ tunable }: { tunable: Tunable }) {
           classNames={{ input: 'typed' }}
           value={typed}
           onChange={(event) => setTyped(event.currentTarget.value)}
-          onBlur={done}
-          onKeyDown={(event) => event.key === 'Enter' && done()}
+          onBlur={commit}
+          onKeyDown={(event) => event.key === 'Enter' && commit()}
         />
       </div>
-      {typeof value === 'number' && <Slide tunable={tunable} value={value} />}
+      {typeof value === 'number' && <ValueSlider tunable={tunable} value={value} />}
     </div>
   )
 }
 
 function Pin({ path }: { path: string }) {
-  const pinned = useTuning((s) => s.pinned.has(path))
+  const pinned = usePinnedParameters((s) => s.pinned.has(path))
   return (
     <ActionIcon
       size="xs"
@@ -200,7 +204,7 @@ function Pin({ path }: { path: string }) {
       aria-label={pinned ? `Unpin ${path}` : `Pin ${path}`}
       aria-pressed={pinned}
       onClick={() =>
-        useTuning.setState((s) => {
+        usePinnedParameters.setState((s) => {
           const next = new Set(s.pinned)
           if (!next.delete(path)) next.add(path)
           return { pinned: next }
@@ -213,13 +217,13 @@ function Pin({ path }: { path: string }) {
 }
 
 /** A slider with editable bounds. */
-function Slide({ tunable, value }: { tunable: Tunable; value: number }) {
+function ValueSlider({ tunable, value }: { tunable: Tunable; value: number }) {
   const { path, low, high } = tunable
-  const given = useTuning((s) => s.ranges[path])
-  const model = typeof tunable.value === 'number' ? tunable.value : 0
-  const [from, to] = given ?? [
-    low ?? Math.min(2 * model, model === 0 ? -1 : 0),
-    high ?? Math.max(2 * model, model === 0 ? 1 : 0),
+  const userRange = usePinnedParameters((s) => s.ranges[path])
+  const modelValue = typeof tunable.value === 'number' ? tunable.value : 0
+  const [from, to] = userRange ?? [
+    low ?? Math.min(2 * modelValue, modelValue === 0 ? -1 : 0),
+    high ?? Math.max(2 * modelValue, modelValue === 0 ? 1 : 0),
   ]
   const bound = (index: 0 | 1) => (
     <input
@@ -231,7 +235,7 @@ function Slide({ tunable, value }: { tunable: Tunable; value: number }) {
         const number = Number(event.currentTarget.value)
         const range: [number, number] = index ? [from, number] : [number, to]
         if (Number.isFinite(number) && range[0] < range[1])
-          useTuning.setState((s) => ({ ranges: { ...s.ranges, [path]: range } }))
+          usePinnedParameters.setState((s) => ({ ranges: { ...s.ranges, [path]: range } }))
         else event.currentTarget.value = String(index ? to : from)
       }}
       onKeyDown={(event) => event.key === 'Enter' && event.currentTarget.blur()}
@@ -249,7 +253,7 @@ function Slide({ tunable, value }: { tunable: Tunable; value: number }) {
         max={to}
         step={(to - from) / SLIDER_STEPS}
         value={Math.min(Math.max(value, from), to)}
-        onChange={(moved) => attempt(path, Number(moved.toPrecision(6)))}
+        onChange={(sliderValue) => tryValue(path, Number(sliderValue.toPrecision(6)))}
       />
       {bound(1)}
     </div>

@@ -8,16 +8,16 @@ import type { Point } from '../model/wire_lines'
 import type { WireEdgeType } from '../canvas/wire_edge'
 import { nameSignal } from '../canvas/signal_names'
 import { nameArea } from '../canvas/sheet_layout'
-import { changed, watch } from '../frames'
+import { scheduleFrame, onFrame } from '../frames'
 import type { Rectangle } from '../model/free_place'
-import { labelPlace, OFF_WIRE } from '../model/value_labels'
+import { labelPosition, WIRE_DISTANCE } from '../model/value_labels'
 import type { SheetPort, SheetBlock } from '../protocol'
 import { samples } from '../samples'
-import { digits, reading, useUnits } from '../scopes/quantity'
+import { formatNumber, displayUnit, useUnits } from '../scopes/quantity'
 import { change, useStudio } from '../store'
 import { shownTime } from './cursor'
 
-interface Shown {
+interface ShownValues {
   /** Whether the values of all outputs are displayed. */
   all: boolean
   /** Outputs, `block/port` with the path of their sheet, whose values are pinned. */
@@ -25,41 +25,41 @@ interface Shown {
 }
 
 /** The values shown on wires; a wire under the pointer always shows its value. */
-export const useValues = create<Shown>(() => ({ all: false, pinned: new Set() }))
+export const useShownValues = create<ShownValues>(() => ({ all: false, pinned: new Set() }))
 
-const MOST_ELEMENTS = 4
+const MAX_ELEMENTS = 4
 
 /** The display text of a signal's value at a time. */
 export function valueAtTime(path: string, time: number): string {
-  const found = samples.signal(path)
+  const signal = samples.signal(path)
   const index = samples.indexAt(time)
-  if (!found || index < 0) return ''
-  const { channel, columns } = found
+  if (!signal || index < 0) return ''
+  const { channel, columns } = signal
   if (channel.shape.length > 1) return channel.shape.join(' × ')
-  const values = columns.slice(0, MOST_ELEMENTS).map((column) => column[index] ?? NaN)
-  const { factor, unit } = reading(channel.unit, Math.max(...values.map(Math.abs)))
-  const shown = values.map((value) => digits(value * factor)).join(', ')
-  const more = columns.length > MOST_ELEMENTS ? ', …' : ''
-  return `${columns.length > 1 ? `[${shown}${more}]` : shown}${unit && ` ${unit}`}`
+  const values = columns.slice(0, MAX_ELEMENTS).map((column) => column[index] ?? NaN)
+  const { factor, unit } = displayUnit(channel.unit, Math.max(...values.map(Math.abs)))
+  const shown = values.map((value) => formatNumber(value * factor)).join(', ')
+  const ellipsis = columns.length > MAX_ELEMENTS ? ', …' : ''
+  return `${columns.length > 1 ? `[${shown}${ellipsis}]` : shown}${unit && ` ${unit}`}`
 }
 
-function outputs(blocks: Record<string, SheetBlock>): { ref: string; block: SheetBlock; spot: SheetPort }[] {
+function outputs(blocks: Record<string, SheetBlock>): { ref: string; block: SheetBlock; port: SheetPort }[] {
   return Object.values(blocks).flatMap((block) =>
-    block.outputs.map((spot) => ({ ref: `${block.name}/${spot.name}`, block, spot })),
+    block.outputs.map((port) => ({ ref: `${block.name}/${port.name}`, block, port })),
   )
 }
 
 /**
- * Values on the wires, marks of logged signals, and the tools of the selected wire `chosen`, drawn on the
+ * Values on the wires, marks of logged signals, and the tools of the selected wire, drawn on the
  * sheet itself.
  */
-export function WireValues({ chosen }: { chosen: WireEdgeType | undefined }) {
+export function WireValues({ selectedEdge }: { selectedEdge: WireEdgeType | undefined }) {
   const blocks = useStudio((s) => s.document!.blocks)
   const logged = useStudio((s) => s.document!.logged)
-  const level = useStudio((s) => s.document!.inside.map((name) => `${name}/`).join(''))
+  const pathPrefix = useStudio((s) => s.document!.inside.map((name) => `${name}/`).join(''))
   const views = useStudio((s) => s.run?.views)
-  const ran = useStudio((s) => s.run !== null)
-  const { all, pinned } = useValues()
+  const hasRun = useStudio((s) => s.run !== null)
+  const { all, pinned } = useShownValues()
   const flow = useStore((s) => s.domNode)
   // Searched once, because React Flow's portal searches the whole sheet at every change.
   const portal = useMemo(() => flow?.querySelector('.react-flow__viewport-portal'), [flow])
@@ -67,12 +67,15 @@ export function WireValues({ chosen }: { chosen: WireEdgeType | undefined }) {
   const layer = useRef<HTMLDivElement>(null)
   const hovered = useHovered(flow)
   useValueTexts(layer)
-  const found = outputs(blocks)
-  const shown = ran ? found.filter(({ ref }) => all || ref === hovered || pinned.has(level + ref)) : []
+  const outputPorts = outputs(blocks)
+  const shown = hasRun
+    ? outputPorts.filter(({ ref }) => all || ref === hovered || pinned.has(pathPrefix + ref))
+    : []
   const displays = (views ?? []).filter(
-    ({ kind, block }) => kind === 'value' && block.startsWith(level) && blocks[block.slice(level.length)],
+    ({ kind, block }) =>
+      kind === 'value' && block.startsWith(pathPrefix) && blocks[block.slice(pathPrefix.length)],
   )
-  const obstacles = useMemo(() => (ran ? drawnBoxes(blocks) : []), [ran, blocks])
+  const obstacles = useMemo(() => (hasRun ? drawnBoxes(blocks) : []), [hasRun, blocks])
   const scale = Math.min(Math.max(1 / zoom, 1), 2.5)
   if (!portal) return null
   return createPortal(
@@ -81,71 +84,73 @@ export function WireValues({ chosen }: { chosen: WireEdgeType | undefined }) {
         <span
           key={output.ref}
           className="wire-value numbers"
-          data-path={level + output.ref}
+          data-path={pathPrefix + output.ref}
           style={labelStyle(output, output.ref === hovered ? [] : obstacles, scale)}
         />
       ))}
       {displays.flatMap(({ block: path, signals }) => {
-        const block = blocks[path.slice(level.length)]!
+        const block = blocks[path.slice(pathPrefix.length)]!
         return block.inputs
           .filter(({ name }) => signals.includes(name))
-          .map((spot) => (
+          .map((port) => (
             <span
-              key={`${path}/${spot.name}`}
+              key={`${path}/${port.name}`}
               className="display-value numbers"
-              data-path={`${path}/${spot.name}`}
+              data-path={`${path}/${port.name}`}
               style={{
                 width: block.width - 12,
-                transform: `translate(${block.place.x + 6}px, ${block.place.y + spot.y}px) translateY(-50%)`,
+                transform: `translate(${block.place.x + 6}px, ${block.place.y + port.y}px) translateY(-50%)`,
               }}
             />
           ))
       })}
-      {found
+      {outputPorts
         .filter(({ ref }) => logged.includes(ref))
-        .map(({ ref, block, spot }) => (
+        .map(({ ref, block, port }) => (
           <span
             key={ref}
             className="logged-badge"
             title={`${ref} is logged`}
             style={{
-              transform: legible(
-                block.place.x + spot.x + (spot.dx < 0 ? -16 : 4),
-                block.place.y + spot.y + 3,
+              transform: readable(
+                block.place.x + port.x + (port.dx < 0 ? -16 : 4),
+                block.place.y + port.y + 3,
               ),
             }}
           >
             <IconAntennaBars5 size={12} aria-label={`${ref} is logged`} />
           </span>
         ))}
-      {chosen && <WireTools edge={chosen} level={level} logged={logged} pinned={pinned} />}
+      {selectedEdge && (
+        <WireTools edge={selectedEdge} pathPrefix={pathPrefix} logged={logged} pinned={pinned} />
+      )}
     </div>,
     portal,
   )
 }
 
 /** Height of a label, px. */
-const LABEL = 14
+const LABEL_HEIGHT = 14
 const SMALLEST_LABEL = 24
 
 /** Position and greatest width of the value at an output. */
 function labelStyle(
-  { block, spot }: ReturnType<typeof outputs>[number],
+  { block, port }: ReturnType<typeof outputs>[number],
   obstacles: readonly Rectangle[],
   scale: number,
 ): React.CSSProperties {
-  const direction = spot.dx < 0 ? -1 : 1
-  const [x, y] = [block.place.x + spot.x + 6 * direction, block.place.y + spot.y]
-  const { below, width } = labelPlace(
+  const direction = port.dx < 0 ? -1 : 1
+  const [x, y] = [block.place.x + port.x + 6 * direction, block.place.y + port.y]
+  const { below, width } = labelPosition(
     { x, y },
     direction,
-    { height: LABEL * scale, legible: scale },
+    { height: LABEL_HEIGHT * scale, legible: scale },
     obstacles,
   )
   const shift = `translate(${direction < 0 ? '-100%' : '0'}, ${below ? '0' : '-100%'})`
   return {
     maxWidth: Math.max(width / scale, SMALLEST_LABEL),
-    transform: `${legible(x, below ? y + OFF_WIRE : y - OFF_WIRE)} ${shift}`,
+    transform: `${readable(x, below ? y + WIRE_DISTANCE : y - WIRE_DISTANCE)} ${shift}`,
   }
 }
 
@@ -159,16 +164,16 @@ function drawnBoxes(blocks: Record<string, SheetBlock>): Rectangle[] {
 
 /** Write the displayed values into their elements, in the frame after a change and without React. */
 function useValueTexts(layer: React.RefObject<HTMLDivElement | null>): void {
-  useEffect(changed) // the elements may have changed
+  useEffect(scheduleFrame) // the elements may have changed
   useEffect(
     () =>
-      watch(() => {
+      onFrame(() => {
         const time = shownTime()
-        layer.current?.querySelectorAll<HTMLElement>('[data-path]').forEach((place) => {
-          const now = `${samples.version} ${time} ${place.dataset['path']} ${useUnits.getState().radians}`
-          if (place.dataset['written'] === now) return
-          place.dataset['written'] = now
-          place.textContent = valueAtTime(place.dataset['path'] ?? '', time)
+        layer.current?.querySelectorAll<HTMLElement>('[data-path]').forEach((element) => {
+          const text = `${samples.version} ${time} ${element.dataset['path']} ${useUnits.getState().radians}`
+          if (element.dataset['written'] === text) return
+          element.dataset['written'] = text
+          element.textContent = valueAtTime(element.dataset['path'] ?? '', time)
         })
       }),
     [layer],
@@ -177,12 +182,12 @@ function useValueTexts(layer: React.RefObject<HTMLDivElement | null>): void {
 
 function WireTools({
   edge,
-  level,
+  pathPrefix,
   logged,
   pinned,
 }: {
   edge: WireEdgeType
-  level: string
+  pathPrefix: string
   logged: string[]
   pinned: ReadonlySet<string>
 }) {
@@ -192,14 +197,14 @@ function WireTools({
   const [from, to] = [path[longest], path[longest + 1]]
   if (!from || !to) return null
   const isLogged = logged.includes(ref)
-  const isPinned = pinned.has(level + ref)
+  const isPinned = pinned.has(pathPrefix + ref)
   return (
     <div
       className="wire-tools nodrag nopan"
       role="toolbar"
       aria-label={`Wire from ${ref}`}
       style={{
-        transform: legible((from[0] + to[0]) / 2, (from[1] + to[1]) / 2 - 6) + ' translate(-50%, -100%)',
+        transform: readable((from[0] + to[0]) / 2, (from[1] + to[1]) / 2 - 6) + ' translate(-50%, -100%)',
       }}
     >
       <Tooltip label={isLogged ? 'Do not log this signal' : 'Log this signal in a separate scope'}>
@@ -222,9 +227,9 @@ function WireTools({
           aria-label={isPinned ? 'Unpin the value' : 'Pin the value'}
           aria-pressed={isPinned}
           onClick={() =>
-            useValues.setState((s) => {
+            useShownValues.setState((s) => {
               const next = new Set(s.pinned)
-              if (!next.delete(level + ref)) next.add(level + ref)
+              if (!next.delete(pathPrefix + ref)) next.add(pathPrefix + ref)
               return { pinned: next }
             })
           }
@@ -279,17 +284,17 @@ function useHovered(flow: HTMLElement | null): string {
   const [hovered, setHovered] = useState('')
   useEffect(() => {
     if (!flow) return
-    const over = ({ target }: Event) => {
+    const onPointerOver = ({ target }: Event) => {
       const id = (target as Element).closest('.react-flow__edge')?.getAttribute('data-id')
       setHovered(id ? id.slice(0, id.indexOf(' -> ')) : '')
     }
-    flow.addEventListener('pointerover', over)
-    return () => flow.removeEventListener('pointerover', over)
+    flow.addEventListener('pointerover', onPointerOver)
+    return () => flow.removeEventListener('pointerover', onPointerOver)
   }, [flow])
   return hovered
 }
 
 /** A label at a position of the sheet (px), in readable size at every zoom. */
-function legible(x: number, y: number): string {
+function readable(x: number, y: number): string {
   return `translate(${x}px, ${y}px) scale(var(--legible))`
 }

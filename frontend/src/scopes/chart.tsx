@@ -15,52 +15,52 @@ import { toggleCursors, useWindow } from './window'
 import { XyPlot } from './xy_plot'
 
 /** Number of letters of a name that the legend always shows. */
-const SHORT = 8
+const SHORT_NAME = 8
 
 /** A plot with its title, legend (a click hides a trace), export menu and table of measures. */
 export function Chart({
   title,
   traces,
-  path = false,
+  isXy = false,
   view,
   band,
 }: {
   title: string
   traces: Trace[]
-  path?: boolean
+  isXy?: boolean
   /** The block whose signals are shown. */
   view?: string
   band?: number
 }) {
   const [hidden, setHidden] = useState<ReadonlySet<string>>(new Set())
   const [values, setValues] = useState<Values | null>(null)
-  const measured = useWindow((s) => s.measuring || s.cursors !== null) && !path
+  const hasMeasures = useWindow((s) => s.measuring || s.cursors !== null) && !isXy
   const handle = useRef<PlotHandle>(null)
   const { stem, names } = shortened(traces)
   const toggle = (key: string) =>
-    setHidden((now) => {
-      const next = new Set(now)
+    setHidden((previous) => {
+      const next = new Set(previous)
       if (!next.delete(key)) next.add(key)
       return next
     })
   const menus = useMenuHandlers((at) =>
     openMenu(title, at, [
-      { title: 'Show all values', possible: values !== null, run: () => setValues(null) },
-      ...(path ? [] : [...plotEntries(), ...traceEntries(traces, hidden, toggle)]),
+      { title: 'Show all values', enabled: values !== null, run: () => setValues(null) },
+      ...(isXy ? [] : [...plotEntries(), ...traceEntries(traces, hidden, toggle)]),
       ...(view ? blockEntry(view) : []),
       null,
       ...exportEntries(title, traces, () => handle.current?.figure()),
     ]),
   )
   return (
-    <figure className={measured ? 'chart measured' : 'chart'} data-view={view} {...menus}>
+    <figure className={hasMeasures ? 'chart measured' : 'chart'} data-view={view} {...menus}>
       <figcaption>
         <b>{title}</b>
         <span className="legend">
-          {!path && stem && <span className="stem">{stem}</span>}
-          {!path &&
+          {!isXy && stem && <span className="stem">{stem}</span>}
+          {!isXy &&
             traces.map((trace, k) => (
-              <Key
+              <LegendEntry
                 key={trace.key}
                 trace={trace}
                 name={names[k]!}
@@ -69,11 +69,11 @@ export function Chart({
               />
             ))}
         </span>
-        {values && <AllValues title={title} show={() => setValues(null)} />}
+        {values && <ShowAllValues title={title} show={() => setValues(null)} />}
         <Exports title={title} traces={traces} figure={() => handle.current?.figure()} />
       </figcaption>
       <div className="with-measures">
-        {path ? (
+        {isXy ? (
           <XyPlot traces={traces} title={title} handle={handle} />
         ) : (
           <Plot
@@ -86,14 +86,14 @@ export function Chart({
             {...(band === undefined ? {} : { band })}
           />
         )}
-        {measured && <MeasureTable traces={traces.filter(({ key }) => !hidden.has(key))} />}
+        {hasMeasures && <MeasureTable traces={traces.filter(({ key }) => !hidden.has(key))} />}
       </div>
     </figure>
   )
 }
 
 /** The button that shows all values after a zoom of the value axis. */
-function AllValues({ title, show }: { title: string; show: () => void }) {
+function ShowAllValues({ title, show }: { title: string; show: () => void }) {
   return (
     <ActionIcon
       className="all-values"
@@ -109,7 +109,7 @@ function AllValues({ title, show }: { title: string; show: () => void }) {
   )
 }
 
-interface KeyProps {
+interface LegendEntryProps {
   trace: Trace
   name: string
   hidden: boolean
@@ -117,11 +117,11 @@ interface KeyProps {
 }
 
 /** A trace in the legend. */
-function Key({ trace: { label, tone, dash }, name, hidden, toggle }: KeyProps) {
+function LegendEntry({ trace: { label, tone, dash }, name, hidden, toggle }: LegendEntryProps) {
   return (
     <button
       type="button"
-      className={name.length > SHORT ? 'long' : undefined}
+      className={name.length > SHORT_NAME ? 'long' : undefined}
       aria-label={label}
       aria-pressed={!hidden}
       title={hidden ? `Show ${label}` : `Hide ${label}`}
@@ -158,9 +158,9 @@ function Exports({ title, traces, figure }: ExportsProps) {
         </ActionIcon>
       </Menu.Target>
       <Menu.Dropdown>
-        {exportEntries(title, traces, figure).map(({ title: words, run }) => (
-          <Menu.Item key={words} onClick={run}>
-            {words}
+        {exportEntries(title, traces, figure).map(({ title: entryTitle, run }) => (
+          <Menu.Item key={entryTitle} onClick={run}>
+            {entryTitle}
           </Menu.Item>
         ))}
       </Menu.Dropdown>
@@ -171,7 +171,7 @@ function Exports({ title, traces, figure }: ExportsProps) {
 /** The ways to save a chart. */
 function exportEntries(title: string, traces: Trace[], figure: ExportsProps['figure']) {
   const stride = useRuns.getState().runs.at(-1)?.stride ?? 1
-  const drawn = (save: (figure: Figure) => void) => () => {
+  const withFigure = (save: (figure: Figure) => void) => () => {
     const now = figure()
     if (now) save(now)
   }
@@ -180,8 +180,8 @@ function exportEntries(title: string, traces: Trace[], figure: ExportsProps['fig
       title: stride > 1 ? `Extremes of every ${stride} samples as CSV` : 'Samples as CSV',
       run: () => saveCsv(title, traces),
     },
-    { title: 'Picture as PNG', run: drawn((now) => void savePng(now)) },
-    { title: 'Picture as SVG', run: drawn(saveSvg) },
+    { title: 'Picture as PNG', run: withFigure((now) => void savePng(now)) },
+    { title: 'Picture as SVG', run: withFigure(saveSvg) },
   ]
 }
 
@@ -192,7 +192,7 @@ function plotEntries(): Entries {
   return [
     {
       title: 'Show the whole run',
-      possible: range !== null,
+      enabled: range !== null,
       run: () => useWindow.setState({ range: null }),
     },
     { title: 'Measuring cursors', checked: cursors !== null, run: toggleCursors },
@@ -212,12 +212,12 @@ function plotEntries(): Entries {
 /** A submenu with the traces of a plot. */
 function traceEntries(traces: Trace[], hidden: ReadonlySet<string>, toggle: (key: string) => void): Entries {
   if (traces.length < 2) return []
-  const within = traces.map(({ key, label }) => ({
+  const submenu = traces.map(({ key, label }) => ({
     title: label,
     checked: !hidden.has(key),
     run: () => toggle(key),
   }))
-  return [{ title: 'Traces', within }]
+  return [{ title: 'Traces', submenu }]
 }
 
 /** The entry that shows the block at a path; a notebook has no sheet. */

@@ -32,14 +32,18 @@ const quoted = (text: string) => (/[",\n]/.test(text) ? `"${text.replaceAll('"',
  */
 export function csvOf(traces: Trace[]): string {
   const columns: { name: string; values: Float64Array }[] = []
-  let last: Float64Array | undefined
+  let previousTime: Float64Array | undefined
   for (const { label, unit, read } of traces) {
-    const found = read()
-    if (!found) continue
-    if (!last || last.length !== found.time.length || last.buffer !== found.time.buffer)
-      columns.push({ name: 'time [s]', values: found.time })
-    last = found.time
-    columns.push({ name: unit ? `${label} [${unit}]` : label, values: found.values })
+    const samples = read()
+    if (!samples) continue
+    if (
+      !previousTime ||
+      previousTime.length !== samples.time.length ||
+      previousTime.buffer !== samples.time.buffer
+    )
+      columns.push({ name: 'time [s]', values: samples.time })
+    previousTime = samples.time
+    columns.push({ name: unit ? `${label} [${unit}]` : label, values: samples.values })
   }
   const rows = Math.max(0, ...columns.map(({ values }) => values.length))
   const lines = [columns.map(({ name }) => quoted(name)).join(',')]

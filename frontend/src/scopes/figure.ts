@@ -1,4 +1,4 @@
-import { digits } from './quantity'
+import { formatNumber } from './quantity'
 
 export interface Axis {
   min: number
@@ -26,7 +26,7 @@ export interface Figure {
   mark?: [x: number, y: number] | undefined
 }
 
-interface Pen {
+interface Painter {
   line: (points: [number, number][], tone: string, width: number, dash: number[]) => void
   text: (
     x: number,
@@ -51,34 +51,34 @@ interface Box {
 const FONT = 11
 
 /** Round numbers in a range, at most a given number. */
-export function ticks(min: number, max: number, most: number): number[] {
-  const raw = (max - min) / Math.max(most, 1)
-  const size = 10 ** Math.floor(Math.log10(raw))
-  const step = [1, 2, 2.5, 5, 10].map((k) => k * size).find((k) => k >= raw * (1 - 1e-9)) ?? raw
+export function ticks(min: number, max: number, maxCount: number): number[] {
+  const minStep = (max - min) / Math.max(maxCount, 1)
+  const magnitude = 10 ** Math.floor(Math.log10(minStep))
+  const step = [1, 2, 2.5, 5, 10].map((k) => k * magnitude).find((k) => k >= minStep * (1 - 1e-9)) ?? minStep
   const first = Math.ceil(min / step - 1e-9)
-  const made: number[] = []
-  for (let k = first; k * step <= max + 1e-9 * step; k++) made.push(k * step)
-  return made
+  const values: number[] = []
+  for (let k = first; k * step <= max + 1e-9 * step; k++) values.push(k * step)
+  return values
 }
 
 function tickText(value: number, step: number): string {
-  if (Math.abs(value) >= 1e6 || step < 1e-5) return digits(value, 3)
+  if (Math.abs(value) >= 1e6 || step < 1e-5) return formatNumber(value, 3)
   const places = (String(Number(step.toPrecision(3))).split('.')[1] ?? '').length
   return value.toFixed(places).replace('-', '−')
 }
 
 /** A range with a margin. */
-export function aired(min: number, max: number): [number, number] {
+export function withMargin(min: number, max: number): [number, number] {
   if (!(max >= min)) return [0, 1]
   if (max - min <= 1e-12 * Math.max(Math.abs(min), Math.abs(max))) {
-    const air = 0.1 * Math.abs(max) || 1
-    return [min - air, max + air]
+    const marginWidth = 0.1 * Math.abs(max) || 1
+    return [min - marginWidth, max + marginWidth]
   }
-  const air = 0.06 * (max - min)
-  return [min - air, max + air]
+  const marginWidth = 0.06 * (max - min)
+  return [min - marginWidth, max + marginWidth]
 }
 
-function draw(figure: Figure, pen: Pen): void {
+function draw(figure: Figure, painter: Painter): void {
   const { width, height, x, y } = figure
   const legend = figure.lines.length > 1 || figure.title
   const box: Box = {
@@ -90,16 +90,16 @@ function draw(figure: Figure, pen: Pen): void {
   let [x0, x1, y0, y1] = [x.min, x.max, y.min, y.max]
   if (figure.equal) {
     const scale = Math.max((x1 - x0) / box.width, (y1 - y0) / box.height)
-    const [moreX, moreY] = [(scale * box.width - (x1 - x0)) / 2, (scale * box.height - (y1 - y0)) / 2]
-    ;[x0, x1, y0, y1] = [x0 - moreX, x1 + moreX, y0 - moreY, y1 + moreY]
+    const [extraX, extraY] = [(scale * box.width - (x1 - x0)) / 2, (scale * box.height - (y1 - y0)) / 2]
+    ;[x0, x1, y0, y1] = [x0 - extraX, x1 + extraX, y0 - extraY, y1 + extraY]
   }
   const atX = (value: number) => box.left + ((value - x0) / (x1 - x0)) * box.width
   const atY = (value: number) => box.top + box.height - ((value - y0) / (y1 - y0)) * box.height
-  const across = ticks(x0, x1, Math.max(2, Math.floor(box.width / 80)))
-  const up = ticks(y0, y1, Math.max(2, Math.floor(box.height / 36)))
+  const xTicks = ticks(x0, x1, Math.max(2, Math.floor(box.width / 80)))
+  const yTicks = ticks(y0, y1, Math.max(2, Math.floor(box.height / 36)))
   const bottom = box.top + box.height
-  for (const value of across) {
-    pen.line(
+  for (const value of xTicks) {
+    painter.line(
       [
         [atX(value), box.top],
         [atX(value), bottom],
@@ -108,10 +108,10 @@ function draw(figure: Figure, pen: Pen): void {
       1,
       [],
     )
-    pen.text(atX(value), bottom + 15, tickText(value, across[1]! - across[0]! || 1), 'muted', 'middle')
+    painter.text(atX(value), bottom + 15, tickText(value, xTicks[1]! - xTicks[0]! || 1), 'muted', 'middle')
   }
-  for (const value of up) {
-    pen.line(
+  for (const value of yTicks) {
+    painter.line(
       [
         [box.left, atY(value)],
         [box.left + box.width, atY(value)],
@@ -120,37 +120,37 @@ function draw(figure: Figure, pen: Pen): void {
       1,
       [],
     )
-    pen.text(box.left - 6, atY(value) + 4, tickText(value, up[1]! - up[0]! || 1), 'muted', 'end')
+    painter.text(box.left - 6, atY(value) + 4, tickText(value, yTicks[1]! - yTicks[0]! || 1), 'muted', 'end')
   }
-  pen.text(box.left + box.width / 2, bottom + 32, x.label, 'muted', 'middle')
-  if (y.label) pen.text(13, box.top + box.height / 2, y.label, 'muted', 'middle', false, true)
-  pen.inside(box, () => {
+  painter.text(box.left + box.width / 2, bottom + 32, x.label, 'muted', 'middle')
+  if (y.label) painter.text(13, box.top + box.height / 2, y.label, 'muted', 'middle', false, true)
+  painter.inside(box, () => {
     for (const line of figure.lines) {
       const points: [number, number][] = []
       for (let k = 0; k < line.x.length; k++) {
         const value = line.y[k]
         if (typeof value === 'number' && Number.isFinite(value)) points.push([atX(line.x[k]!), atY(value)])
       }
-      pen.line(points, line.tone, 1.5, line.dash)
+      painter.line(points, line.tone, 1.5, line.dash)
     }
-    if (figure.mark) pen.disc(atX(figure.mark[0]), atY(figure.mark[1]), 4.5, 'accent')
+    if (figure.mark) painter.disc(atX(figure.mark[0]), atY(figure.mark[1]), 4.5, 'accent')
   })
   if (!legend) return
-  pen.text(box.left, 17, figure.title, 'ink', 'start', true)
-  let at = box.left + 8.0 * figure.title.length + 18
+  painter.text(box.left, 17, figure.title, 'ink', 'start', true)
+  let legendX = box.left + 8.0 * figure.title.length + 18
   for (const { label, tone, dash } of figure.lines) {
-    if (figure.lines.length < 2 || at + 24 + 6.4 * label.length > width) break
-    pen.line(
+    if (figure.lines.length < 2 || legendX + 24 + 6.4 * label.length > width) break
+    painter.line(
       [
-        [at, 13],
-        [at + 16, 13],
+        [legendX, 13],
+        [legendX + 16, 13],
       ],
       tone,
       2.5,
       dash,
     )
-    pen.text(at + 21, 17, label, 'muted', 'start')
-    at += 34 + 6.4 * label.length
+    painter.text(legendX + 21, 17, label, 'muted', 'start')
+    legendX += 34 + 6.4 * label.length
   }
 }
 
@@ -160,44 +160,44 @@ const fontOf = () => colour('font') || 'sans-serif'
 
 /** Paint a figure on a canvas whose size, in device pixels, the caller has set. */
 export function paint(figure: Figure, canvas: HTMLCanvasElement, scale: number): void {
-  const c = canvas.getContext('2d')
-  if (!c) return
-  c.setTransform(scale, 0, 0, scale, 0, 0)
-  c.fillStyle = colour('surface')
-  c.fillRect(0, 0, figure.width, figure.height)
+  const context = canvas.getContext('2d')
+  if (!context) return
+  context.setTransform(scale, 0, 0, scale, 0, 0)
+  context.fillStyle = colour('surface')
+  context.fillRect(0, 0, figure.width, figure.height)
   draw(figure, {
     line: (points, tone, width, dash) => {
-      c.beginPath()
-      points.forEach(([x, y], k) => (k ? c.lineTo(x, y) : c.moveTo(x, y)))
-      c.strokeStyle = colour(tone)
-      c.lineWidth = width
-      c.lineJoin = 'round'
-      c.setLineDash(dash)
-      c.stroke()
+      context.beginPath()
+      points.forEach(([x, y], k) => (k ? context.lineTo(x, y) : context.moveTo(x, y)))
+      context.strokeStyle = colour(tone)
+      context.lineWidth = width
+      context.lineJoin = 'round'
+      context.setLineDash(dash)
+      context.stroke()
     },
     text: (x, y, text, tone, anchor, bold, upright) => {
-      c.save()
-      c.translate(x, y)
-      if (upright) c.rotate(-Math.PI / 2)
-      c.font = `${bold ? '600 ' : ''}${bold ? FONT + 1 : FONT}px ${fontOf()}`
-      c.fillStyle = colour(tone)
-      c.textAlign = anchor === 'middle' ? 'center' : anchor
-      c.fillText(text, 0, 0)
-      c.restore()
+      context.save()
+      context.translate(x, y)
+      if (upright) context.rotate(-Math.PI / 2)
+      context.font = `${bold ? '600 ' : ''}${bold ? FONT + 1 : FONT}px ${fontOf()}`
+      context.fillStyle = colour(tone)
+      context.textAlign = anchor === 'middle' ? 'center' : anchor
+      context.fillText(text, 0, 0)
+      context.restore()
     },
     disc: (x, y, radius, tone) => {
-      c.beginPath()
-      c.arc(x, y, radius, 0, 2 * Math.PI)
-      c.fillStyle = colour(tone)
-      c.fill()
+      context.beginPath()
+      context.arc(x, y, radius, 0, 2 * Math.PI)
+      context.fillStyle = colour(tone)
+      context.fill()
     },
-    inside: (box, within) => {
-      c.save()
-      c.beginPath()
-      c.rect(box.left, box.top, box.width, box.height)
-      c.clip()
-      within()
-      c.restore()
+    inside: (box, content) => {
+      context.save()
+      context.beginPath()
+      context.rect(box.left, box.top, box.width, box.height)
+      context.clip()
+      content()
+      context.restore()
     },
   })
 }
@@ -219,20 +219,20 @@ export function svgOf(figure: Figure): string {
     },
     text: (x, y, text, tone, anchor, bold, upright) => {
       const weight = bold ? ' font-weight="600"' : ''
-      const turn = upright ? ` transform="rotate(-90 ${x.toFixed(1)} ${y.toFixed(1)})"` : ''
+      const rotation = upright ? ` transform="rotate(-90 ${x.toFixed(1)} ${y.toFixed(1)})"` : ''
       parts.push(
         `<text x="${x.toFixed(1)}" y="${y.toFixed(1)}" fill="${colour(tone)}" text-anchor="${anchor}" ` +
-          `font-size="${bold ? FONT + 1 : FONT}"${weight}${turn}>${escaped(text)}</text>`,
+          `font-size="${bold ? FONT + 1 : FONT}"${weight}${rotation}>${escaped(text)}</text>`,
       )
     },
     disc: (x, y, radius, tone) =>
       parts.push(`<circle cx="${x.toFixed(2)}" cy="${y.toFixed(2)}" r="${radius}" fill="${colour(tone)}"/>`),
-    inside: ({ left, top, width, height }, within) => {
+    inside: ({ left, top, width, height }, content) => {
       parts.push(
         `<clipPath id="field"><rect x="${left}" y="${top}" width="${width}" height="${height}"/></clipPath>` +
           '<g clip-path="url(#field)">',
       )
-      within()
+      content()
       parts.push('</g>')
     },
   })

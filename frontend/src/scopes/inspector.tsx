@@ -4,15 +4,15 @@ import { IconSearch, IconTrash } from '@tabler/icons-react'
 import { useEffect, useMemo, useState } from 'react'
 import { create } from 'zustand'
 import { valueText } from '../inspector/value_text'
-import { useRuns, type KeptRun } from '../run/runs'
+import { useRuns, type StoredRun } from '../run/runs'
 import { useStudio } from '../store'
 import { Chart } from './chart'
-import { difference, farthest } from '../model/difference'
-import { spoken } from './quantity'
+import { difference, largestDifference } from '../model/difference'
+import { withUnit } from './quantity'
 import { PlotTools } from './scopes'
-import { DASHES, MOST_TRACES, tracesOf, type Trace } from '../model/trace'
+import { DASHES, MAX_TRACES, tracesOf, type Trace } from '../model/trace'
 
-interface Inspector {
+interface InspectorState {
   signals: ReadonlySet<string>
   /** Hidden runs; new runs are visible. */
   hidden: ReadonlySet<string>
@@ -23,7 +23,7 @@ interface Inspector {
   tolerance: number
 }
 
-export const useInspector = create<Inspector>(() => ({
+export const useInspectorState = create<InspectorState>(() => ({
   signals: new Set(),
   hidden: new Set(),
   search: '',
@@ -61,9 +61,9 @@ export function SignalInspector() {
 }
 
 /** Values of a run that differ from the model: trial values at the start, or tuned values. */
-function changesOf({ tried, tunings }: KeptRun): string[] {
+function changesOf({ trialValues, tunings }: StoredRun): string[] {
   return [
-    ...Object.entries(tried).map(([parameter, value]) => `${parameter} = ${valueText(value)}`),
+    ...Object.entries(trialValues).map(([parameter, value]) => `${parameter} = ${valueText(value)}`),
     ...tunings
       .slice(-3)
       .map(
@@ -72,10 +72,10 @@ function changesOf({ tried, tunings }: KeptRun): string[] {
   ]
 }
 
-function RunList({ runs }: { runs: KeptRun[] }) {
-  const hidden = useInspector((s) => s.hidden)
-  const comparing = useInspector((s) => s.comparing)
-  const shown = useStudio((s) => s.run?.run)
+function RunList({ runs }: { runs: StoredRun[] }) {
+  const hidden = useInspectorState((s) => s.hidden)
+  const comparing = useInspectorState((s) => s.comparing)
+  const displayedRun = useStudio((s) => s.run?.run)
   const { rename, remove } = useRuns.getState()
   return (
     <div className="run-list" role="group" aria-label="Runs">
@@ -86,7 +86,7 @@ function RunList({ runs }: { runs: KeptRun[] }) {
             size="xs"
             label="Difference"
             checked={comparing}
-            onChange={() => useInspector.setState((s) => ({ comparing: !s.comparing }))}
+            onChange={() => useInspectorState.setState((s) => ({ comparing: !s.comparing }))}
           />
         )}
       </header>
@@ -97,7 +97,7 @@ function RunList({ runs }: { runs: KeptRun[] }) {
             size="xs"
             aria-label={`Show ${run.name}`}
             checked={!hidden.has(run.key)}
-            onChange={() => useInspector.setState((s) => ({ hidden: toggled(s.hidden, run.key) }))}
+            onChange={() => useInspectorState.setState((s) => ({ hidden: toggled(s.hidden, run.key) }))}
           />
           <div className="about">
             <RunName run={run} onName={(name) => rename(run.key, name)} />
@@ -110,7 +110,7 @@ function RunList({ runs }: { runs: KeptRun[] }) {
               </small>
             ))}
           </div>
-          {run.key !== shown && (
+          {run.key !== displayedRun && (
             <Tooltip label="Delete this run">
               <ActionIcon
                 size="xs"
@@ -129,7 +129,7 @@ function RunList({ runs }: { runs: KeptRun[] }) {
   )
 }
 
-function RunName({ run, onName }: { run: KeptRun; onName: (name: string) => void }) {
+function RunName({ run, onName }: { run: StoredRun; onName: (name: string) => void }) {
   const [typed, setTyped] = useState(run.name)
   const done = () => (typed.trim() ? onName(typed.trim()) : setTyped(run.name))
   return (
@@ -145,17 +145,17 @@ function RunName({ run, onName }: { run: KeptRun; onName: (name: string) => void
 }
 
 /** The two compared runs: the last two by default. */
-function pair(runs: KeptRun[], baseline: string, compared: string): [KeptRun, KeptRun] {
+function comparedRuns(runs: StoredRun[], baseline: string, compared: string): [StoredRun, StoredRun] {
   const find = (key: string) => runs.find((run) => run.key === key)
   return [find(baseline) ?? runs.at(-2)!, find(compared) ?? runs.at(-1)!]
 }
 
-function Comparison({ runs }: { runs: KeptRun[] }) {
-  const { baseline, compared, tolerance } = useInspector()
-  const [a, b] = pair(runs, baseline, compared)
+function Comparison({ runs }: { runs: StoredRun[] }) {
+  const { baseline, compared, tolerance } = useInspectorState()
+  const [a, b] = comparedRuns(runs, baseline, compared)
   const [typed, setTyped] = useState(String(tolerance))
   const data = runs.map(({ key, name }) => ({ value: key, label: name }))
-  const wrong = !(Number(typed) >= 0) || !typed.trim()
+  const invalid = !(Number(typed) >= 0) || !typed.trim()
   return (
     <div className="comparison">
       <NativeSelect
@@ -163,36 +163,36 @@ function Comparison({ runs }: { runs: KeptRun[] }) {
         label="Baseline"
         data={data}
         value={a.key}
-        onChange={(event) => useInspector.setState({ baseline: event.currentTarget.value })}
+        onChange={(event) => useInspectorState.setState({ baseline: event.currentTarget.value })}
       />
       <NativeSelect
         size="xs"
         label="Compared"
         data={data}
         value={b.key}
-        onChange={(event) => useInspector.setState({ compared: event.currentTarget.value })}
+        onChange={(event) => useInspectorState.setState({ compared: event.currentTarget.value })}
       />
       <TextInput
         size="xs"
         label="Tolerance"
         classNames={{ input: 'typed' }}
         value={typed}
-        error={wrong && 'a number, 0 or more'}
+        error={invalid && 'a number, 0 or more'}
         onChange={(event) => {
           const text = event.currentTarget.value
           setTyped(text)
-          if (text.trim() && Number(text) >= 0) useInspector.setState({ tolerance: Number(text) })
+          if (text.trim() && Number(text) >= 0) useInspectorState.setState({ tolerance: Number(text) })
         }}
       />
     </div>
   )
 }
 
-function SignalList({ runs }: { runs: KeptRun[] }) {
-  const { signals, search, comparing, baseline, compared, tolerance } = useInspector()
+function SignalList({ runs }: { runs: StoredRun[] }) {
+  const { signals, search, comparing, baseline, compared, tolerance } = useInspectorState()
   const names = useMemo(() => [...new Set(runs.flatMap(({ samples }) => samples.names))].sort(), [runs])
-  const found = names.filter((name) => name.toLowerCase().includes(search.toLowerCase()))
-  const [a, b] = comparing && runs.length > 1 ? pair(runs, baseline, compared) : []
+  const matches = names.filter((name) => name.toLowerCase().includes(search.toLowerCase()))
+  const [a, b] = comparing && runs.length > 1 ? comparedRuns(runs, baseline, compared) : []
   return (
     <div className="signal-list">
       <TextInput
@@ -201,55 +201,58 @@ function SignalList({ runs }: { runs: KeptRun[] }) {
         placeholder="Search signals"
         leftSection={<IconSearch size={13} />}
         value={search}
-        onChange={(event) => useInspector.setState({ search: event.currentTarget.value })}
+        onChange={(event) => useInspectorState.setState({ search: event.currentTarget.value })}
       />
       <div className="signals" role="group" aria-label="Signals">
-        {found.map((name) => {
-          const apart = a && b && farthest(a.samples, b.samples, name)
+        {matches.map((name) => {
+          const difference = a && b && largestDifference(a.samples, b.samples, name)
           const unit = a?.samples.signal(name)?.channel.unit ?? ''
           return (
             <label
               key={name}
               title={
-                apart && `greatest difference ${spoken(apart.largest, unit)} at ${spoken(apart.at, 's')}`
+                difference &&
+                `greatest difference ${withUnit(difference.largest, unit)} at ${withUnit(difference.at, 's')}`
               }
             >
               <input
                 type="checkbox"
                 checked={signals.has(name)}
-                onChange={() => useInspector.setState((s) => ({ signals: toggled(s.signals, name) }))}
+                onChange={() => useInspectorState.setState((s) => ({ signals: toggled(s.signals, name) }))}
               />
               <span className="signal-name">{runs.at(-1)!.samples.title(name)}</span>
-              {apart && (
-                <span className={apart.largest <= tolerance ? 'apart numbers' : 'apart beyond numbers'}>
-                  {apart.largest <= tolerance ? '✓' : '✗'} {spoken(apart.largest, unit, 3)} at{' '}
-                  {spoken(apart.at, 's', 3)}
+              {difference && (
+                <span className={difference.largest <= tolerance ? 'apart numbers' : 'apart beyond numbers'}>
+                  {difference.largest <= tolerance ? '✓' : '✗'} {withUnit(difference.largest, unit, 3)}
+                  {' at '}
+                  {withUnit(difference.at, 's', 3)}
                 </span>
               )}
             </label>
           )
         })}
-        {!found.length && <p className="empty">No signal has this name.</p>}
+        {!matches.length && <p className="empty">No signal has this name.</p>}
       </div>
     </div>
   )
 }
 
-function InspectorPlot({ runs }: { runs: KeptRun[] }) {
-  const { signals, hidden, comparing, baseline, compared, tolerance } = useInspector()
+function InspectorPlot({ runs }: { runs: StoredRun[] }) {
+  const { signals, hidden, comparing, baseline, compared, tolerance } = useInspectorState()
   const paths = useMemo(() => [...signals].map((path) => ({ path, label: '' })), [signals])
   // Initially the inspector shows the first signal.
   useEffect(() => {
     const first = runs.at(-1)?.views.find(({ kind }) => kind === 'traces')
     const path = first && runs.at(-1)?.samples.signal(`${first.block}/${first.signals[0]}`)?.channel.name
-    if (!useInspector.getState().signals.size && path) useInspector.setState({ signals: new Set([path]) })
+    if (!useInspectorState.getState().signals.size && path)
+      useInspectorState.setState({ signals: new Set([path]) })
   }, [runs])
   const traces = useMemo((): Trace[] => {
     if (comparing && runs.length > 1) {
-      const [a, b] = pair(runs, baseline, compared)
+      const [a, b] = comparedRuns(runs, baseline, compared)
       return tracesOf(a.samples, paths).map((trace) => {
-        const at = trace.key.lastIndexOf(' ')
-        const [path, element] = [trace.key.slice(0, at), Number(trace.key.slice(at + 1))]
+        const separator = trace.key.lastIndexOf(' ')
+        const [path, element] = [trace.key.slice(0, separator), Number(trace.key.slice(separator + 1))]
         return {
           ...trace,
           key: `${a.key} ${b.key} ${trace.key}`,
@@ -258,19 +261,23 @@ function InspectorPlot({ runs }: { runs: KeptRun[] }) {
         }
       })
     }
-    const shown = runs.filter(({ key }) => !hidden.has(key))
-    const single = shown.length > 1 && shown.every(({ samples }) => tracesOf(samples, paths).length === 1)
-    return shown
+    const visibleRuns = runs.filter(({ key }) => !hidden.has(key))
+    const areSingle =
+      visibleRuns.length > 1 && visibleRuns.every(({ samples }) => tracesOf(samples, paths).length === 1)
+    return visibleRuns
       .flatMap((run, k) =>
         tracesOf(run.samples, paths).map((trace) => ({
           ...trace,
           key: `${run.key} ${trace.key}`,
-          label: shown.length > 1 ? `${trace.label}, ${run.name}` : trace.label,
-          tone: single ? `trace-${k % 8}` : trace.tone,
-          dash: shown.length > 1 && !single ? DASHES[(shown.length - 1 - k) % DASHES.length]! : trace.dash,
+          label: visibleRuns.length > 1 ? `${trace.label}, ${run.name}` : trace.label,
+          tone: areSingle ? `trace-${k % 8}` : trace.tone,
+          dash:
+            visibleRuns.length > 1 && !areSingle
+              ? DASHES[(visibleRuns.length - 1 - k) % DASHES.length]!
+              : trace.dash,
         })),
       )
-      .slice(0, MOST_TRACES)
+      .slice(0, MAX_TRACES)
   }, [runs, hidden, paths, comparing, baseline, compared])
   if (!signals.size) return <p className="empty">Tick the signals to be shown.</p>
   return (

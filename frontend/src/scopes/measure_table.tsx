@@ -2,14 +2,14 @@ import { useEffect, useRef, useState } from 'react'
 import { shownTime, useCursor } from '../run/cursor'
 import { samples } from '../samples'
 import { measures, type Measures } from '../model/measures'
-import { digits, reading, spoken } from './quantity'
+import { formatNumber, displayUnit, withUnit } from './quantity'
 import { valueAt, type Trace } from '../model/trace'
-import { shownWindow, useWindow } from './window'
+import { visibleTimes, useWindow } from './window'
 
 const REFRESH_MS = 200
 const ROWS: [name: keyof Measures, head: string, title: string][] = [
-  ['least', 'min', 'minimum'],
-  ['greatest', 'max', 'maximum'],
+  ['minimum', 'min', 'minimum'],
+  ['maximum', 'max', 'maximum'],
   ['mean', 'mean', 'mean over time'],
   ['rms', 'RMS', 'root mean square over time'],
   ['peakToPeak', 'p–p', 'peak-to-peak value'],
@@ -20,13 +20,13 @@ const ROWS: [name: keyof Measures, head: string, title: string][] = [
 /** Render at most a few times a second during changes; samples do not pass through React's state. */
 function useRefresh(): void {
   const [, setCount] = useState(0)
-  const seen = useRef('')
+  const lastState = useRef('')
   useEffect(() => {
     const timer = setInterval(() => {
       const { cursors, range } = useWindow.getState()
-      const now = `${samples.version} ${String(cursors)} ${String(range)} ${useCursor.getState().time}`
-      if (now === seen.current) return
-      seen.current = now
+      const state = `${samples.version} ${String(cursors)} ${String(range)} ${useCursor.getState().time}`
+      if (state === lastState.current) return
+      lastState.current = state
       setCount((count) => count + 1)
     }, REFRESH_MS)
     return () => clearInterval(timer)
@@ -38,7 +38,7 @@ export function MeasureTable({ traces }: { traces: Trace[] }) {
   useRefresh()
   const cursors = useWindow((s) => s.cursors)
   const measuring = useWindow((s) => s.measuring)
-  const [from, to] = shownWindow()
+  const [from, to] = visibleTimes()
   const now = shownTime()
   const read = traces
     .map((trace) => ({ trace, data: trace.read() }))
@@ -47,11 +47,11 @@ export function MeasureTable({ traces }: { traces: Trace[] }) {
     <div className="measures" tabIndex={0} role="region" aria-label="Measures">
       {cursors && (
         <p className="between">
-          <span>A {spoken(cursors[0], 's', 5)}</span>
-          <span>B {spoken(cursors[1], 's', 5)}</span>
-          <span>Δt {spoken(cursors[1] - cursors[0], 's', 5)}</span>
+          <span>A {withUnit(cursors[0], 's', 5)}</span>
+          <span>B {withUnit(cursors[1], 's', 5)}</span>
+          <span>Δt {withUnit(cursors[1] - cursors[0], 's', 5)}</span>
           {cursors[1] !== cursors[0] && (
-            <span>1/Δt {spoken(1 / Math.abs(cursors[1] - cursors[0]), 'Hz', 5)}</span>
+            <span>1/Δt {withUnit(1 / Math.abs(cursors[1] - cursors[0]), 'Hz', 5)}</span>
           )}
         </p>
       )}
@@ -66,7 +66,7 @@ export function MeasureTable({ traces }: { traces: Trace[] }) {
                 </th>
               ))
             ) : (
-              <th scope="col">at {digits(now, 4)} s</th>
+              <th scope="col">at {formatNumber(now, 4)} s</th>
             )}
             {measuring &&
               ROWS.map(([name, head, title]) => (
@@ -104,17 +104,17 @@ function Row({
   window: [number, number] | null
 }) {
   const cursors = useWindow((s) => s.cursors)
-  const found = window ? measures(data, ...window) : undefined
+  const measured = window ? measures(data, ...window) : undefined
   const [a, b] = cursors
     ? [valueAt(data, cursors[0]), valueAt(data, cursors[1])]
     : [valueAt(data, Math.min(now, data.time.at(-1) ?? 0)), NaN]
   const largest = Math.max(
-    ...[a, b, found?.least, found?.greatest]
+    ...[a, b, measured?.minimum, measured?.maximum]
       .filter((v) => v !== undefined && Number.isFinite(v))
       .map((v) => Math.abs(v!)),
     0,
   )
-  const { factor, unit } = reading(trace.unit, largest)
+  const { factor, unit } = displayUnit(trace.unit, largest)
   return (
     <tr>
       <th scope="row">
@@ -123,17 +123,17 @@ function Row({
         {unit && <span className="unit"> {unit}</span>}
       </th>
       {(cursors ? [a, b, b - a] : [a]).map((value, k) => (
-        <td key={k}>{digits(value * factor)}</td>
+        <td key={k}>{formatNumber(value * factor)}</td>
       ))}
-      {found && ROWS.map(([name]) => <td key={name}>{measureText(found, name, factor)}</td>)}
+      {measured && ROWS.map(([name]) => <td key={name}>{measureText(measured, name, factor)}</td>)}
     </tr>
   )
 }
 
 /** A formatted measure; a dash if it is undefined. */
-function measureText(found: Measures, name: keyof Measures, factor: number): string {
-  const value = found[name]
-  if (name === 'riseTime') return Number.isNaN(value) ? '–' : spoken(value, 's')
-  if (name === 'overshoot') return Number.isNaN(value) ? '–' : `${digits(100 * value, 3)} %`
-  return digits(value * factor)
+function measureText(measured: Measures, name: keyof Measures, factor: number): string {
+  const value = measured[name]
+  if (name === 'riseTime') return Number.isNaN(value) ? '–' : withUnit(value, 's')
+  if (name === 'overshoot') return Number.isNaN(value) ? '–' : `${formatNumber(100 * value, 3)} %`
+  return formatNumber(value * factor)
 }

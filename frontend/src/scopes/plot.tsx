@@ -1,17 +1,17 @@
 import { useComputedColorScheme } from '@mantine/core'
 import { useEffect, useRef } from 'react'
 import 'uplot/dist/uPlot.min.css'
-import { changed } from '../frames'
+import { scheduleFrame } from '../frames'
 import type { Trace } from '../model/trace'
 import type { Figure } from './figure'
-import { LivePlot, type SeenValues } from './live_plot'
+import { LivePlot, type ValueRange } from './live_plot'
 
 /** The present content of a plot, for measures and exports. */
 export interface PlotHandle {
   figure: () => Figure
 }
 
-interface Props extends SeenValues {
+interface Props extends ValueRange {
   traces: Trace[]
   hidden: ReadonlySet<string>
   title: string
@@ -22,27 +22,27 @@ interface Props extends SeenValues {
 
 /** Traces over time. All time plots share zoom, measuring cursors and the displayed time. */
 export function Plot({ traces, hidden, title, handle, band, values, onValues }: Props) {
-  const box = useRef<HTMLDivElement>(null)
-  const held = useRef({ values, onValues })
-  held.current = { values, onValues }
+  const container = useRef<HTMLDivElement>(null)
+  const valueRange = useRef({ values, onValues })
+  valueRange.current = { values, onValues }
   const scheme = useComputedColorScheme('light')
-  const shown = traces.filter(({ key }) => !hidden.has(key))
-  const identity = shown.map(({ key, tone, dash }) => `${key} ${tone} ${dash.join()}`).join('\n')
+  const visibleTraces = traces.filter(({ key }) => !hidden.has(key))
+  const tracesKey = visibleTraces.map(({ key, tone, dash }) => `${key} ${tone} ${dash.join()}`).join('\n')
   useEffect(() => {
-    const element = box.current
+    const element = container.current
     if (!element) return
-    const plot = new LivePlot(element, shown, band, held)
+    const plot = new LivePlot(element, visibleTraces, band, valueRange)
     if (handle) handle.current = { figure: () => plot.figure(title) }
     return () => plot.destroy()
     // eslint-disable-next-line react-hooks/exhaustive-deps
-  }, [identity, scheme, title, band])
-  useEffect(changed, [values])
+  }, [tracesKey, scheme, title, band])
+  useEffect(scheduleFrame, [values])
   return (
     <div
-      ref={box}
+      ref={container}
       className="plot"
       role="img"
-      aria-label={`${title}: ${shown.map(({ label }) => label).join(', ')}`}
+      aria-label={`${title}: ${visibleTraces.map(({ label }) => label).join(', ')}`}
     />
   )
 }

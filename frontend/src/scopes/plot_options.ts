@@ -1,20 +1,20 @@
 import type uPlot from 'uplot'
 import type { Trace } from '../model/trace'
-import { CLICK_PX, gripOf } from './plot_gestures'
+import { CLICK_PX, cursorUnder } from './plot_gestures'
 import { colour, drawBand, drawLines } from './plot_marks'
-import { digits } from './quantity'
+import { formatNumber } from './quantity'
 import { useWindow, zoomTo } from './window'
 
 const FONT = '11px "Inter Variable", system-ui, sans-serif'
 /** Width and height of a plot before its panel has a size, px. */
-export const LEAST_PX = 60
+export const MIN_PX = 60
 
 /**
  * The uPlot options of the traces; `unit` is the label of the vertical axis, `band` a band about zero.
  */
 export function plotOptions(
   element: HTMLElement,
-  shown: Trace[],
+  traces: Trace[],
   unit: () => string,
   band: number | undefined,
 ): uPlot.Options {
@@ -28,8 +28,8 @@ export function plotOptions(
     labelGap: 0,
   }
   return {
-    width: Math.max(element.clientWidth, LEAST_PX),
-    height: Math.max(element.clientHeight, LEAST_PX),
+    width: Math.max(element.clientWidth, MIN_PX),
+    height: Math.max(element.clientHeight, MIN_PX),
     legend: { show: false },
     cursor: {
       points: { show: false },
@@ -37,7 +37,7 @@ export function plotOptions(
       bind: {
         dblclick: () => () => (useWindow.setState({ range: null }), null),
         mousedown: (u, _, handler) => (event) =>
-          gripOf(u, event) !== null || event.button || event.shiftKey ? null : handler(event),
+          cursorUnder(u, event) !== null || event.button || event.shiftKey ? null : handler(event),
       },
     },
     scales: { x: { time: false, auto: false }, y: { auto: false } },
@@ -46,18 +46,18 @@ export function plotOptions(
         ...axis,
         size: 32,
         label: 'Time, s',
-        values: (_, splits) => splits.map((value) => tick(value, splits)),
+        values: (_, splits) => splits.map((value) => tickText(value, splits)),
       },
       {
         ...axis,
         size: 54,
         label: unit,
-        values: (_, splits) => splits.map((value) => tick(value, splits)),
+        values: (_, splits) => splits.map((value) => tickText(value, splits)),
       },
     ],
     series: [
       {},
-      ...shown.map(({ label, tone, dash }) => ({
+      ...traces.map(({ label, tone, dash }) => ({
         label,
         stroke: colour(tone),
         width: 1.5,
@@ -82,8 +82,8 @@ export function plotOptions(
   }
 }
 
-function tick(value: number, splits: number[]): string {
+function tickText(value: number, splits: number[]): string {
   const step = Math.abs((splits[1] ?? 1) - (splits[0] ?? 0))
-  if (Math.abs(value) >= 1e6 || step < 1e-6) return digits(value, 3)
+  if (Math.abs(value) >= 1e6 || step < 1e-6) return formatNumber(value, 3)
   return value.toFixed((String(Number(step.toPrecision(3))).split('.')[1] ?? '').length).replace('-', '−')
 }

@@ -1,8 +1,8 @@
 import { create } from 'zustand'
-import { changed } from '../frames'
+import { scheduleFrame } from '../frames'
 
 /** The display unit of a quantity, and the factor from SI to this unit. */
-export interface Reading {
+export interface DisplayUnit {
   factor: number
   unit: string
 }
@@ -19,7 +19,7 @@ const PREFIXES: [power: number, prefix: string][] = [
   [-12, 'p'],
 ]
 
-const spell = (unit: string) =>
+const unitSymbols = (unit: string) =>
   unit
     .replace(/\bdeg/, '°')
     .replaceAll('*', ' ')
@@ -27,37 +27,43 @@ const spell = (unit: string) =>
 
 /** Angles are shown in degrees by default, in radians on request. */
 export const useUnits = create<{ radians: boolean }>(() => ({ radians: false }))
-useUnits.subscribe(changed)
+useUnits.subscribe(scheduleFrame)
 
 /**
  * Factor and unit for magnitudes up to `largest`: degrees for angles, SI prefixes to avoid long zeros.
  */
-export function reading(unit: string, largest: number, radians = useUnits.getState().radians): Reading {
+export function displayUnit(
+  unit: string,
+  largest: number,
+  radians = useUnits.getState().radians,
+): DisplayUnit {
   if (/^rad\b/.test(unit) && !radians) {
-    return { factor: 180 / Math.PI, unit: spell(unit.replace(/^rad/, 'deg')) }
+    return { factor: 180 / Math.PI, unit: unitSymbols(unit.replace(/^rad/, 'deg')) }
   }
-  const spelled = spell(unit)
+  const symbols = unitSymbols(unit)
   // Only plain units have prefixes, which excludes 1 kkg, 1 m m/s and 1 mrad.
-  if (!spelled || !(largest > 0) || !/^(m|N|s|A|V|W|J|N m|Hz|Pa|H|F)\b/.test(spelled))
-    return { factor: 1, unit: spelled }
+  if (!symbols || !(largest > 0) || !/^(m|N|s|A|V|W|J|N m|Hz|Pa|H|F)\b/.test(symbols))
+    return { factor: 1, unit: symbols }
   const power = Math.floor(Math.log10(largest) / 3 + 1e-9) * 3
-  const [exponent, prefix] = PREFIXES.find(([known]) => known <= power) ?? PREFIXES.at(-1)!
-  return { factor: 10 ** -exponent, unit: prefix + spelled }
+  const [exponent, prefix] = PREFIXES.find(([exponent]) => exponent <= power) ?? PREFIXES.at(-1)!
+  return { factor: 10 ** -exponent, unit: prefix + symbols }
 }
 
 /** A number with so many significant digits, without exponent if possible, and with a true minus sign. */
-export function digits(value: number, significant = 4): string {
+export function formatNumber(value: number, significant = 4): string {
   if (!Number.isFinite(value)) return Number.isNaN(value) ? '–' : value > 0 ? '∞' : '−∞'
   if (value === 0) return '0'
-  const size = Math.abs(value)
+  const magnitude = Math.abs(value)
   const text =
-    size >= 1e6 || size < 1e-4 ? value.toExponential(significant - 1) : value.toPrecision(significant)
-  const plain = text.includes('e') && size < 1e6 && size >= 1e-4 ? String(Number(text)) : text
-  return plain.replaceAll('-', '−')
+    magnitude >= 1e6 || magnitude < 1e-4
+      ? value.toExponential(significant - 1)
+      : value.toPrecision(significant)
+  const fixedText = text.includes('e') && magnitude < 1e6 && magnitude >= 1e-4 ? String(Number(text)) : text
+  return fixedText.replaceAll('-', '−')
 }
 
 /** A value with its display unit: `1.234 mm`. */
-export function spoken(value: number, unit: string, significant = 4): string {
-  const { factor, unit: shown } = reading(unit, Math.abs(value))
-  return `${digits(value * factor, significant)}${shown.startsWith('°') ? shown : shown && ` ${shown}`}`
+export function withUnit(value: number, unit: string, significant = 4): string {
+  const { factor, unit: shown } = displayUnit(unit, Math.abs(value))
+  return `${formatNumber(value * factor, significant)}${shown.startsWith('°') ? shown : shown && ` ${shown}`}`
 }

@@ -77,7 +77,7 @@ function ScopeChart({ run, view }: { run: string; view: ViewOf }) {
     [run, view],
   )
   return (
-    <Chart title={view.title || view.block} traces={traces} path={view.kind === 'path'} view={view.block} />
+    <Chart title={view.title || view.block} traces={traces} isXy={view.kind === 'path'} view={view.block} />
   )
 }
 

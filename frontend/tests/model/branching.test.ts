@@ -1,5 +1,5 @@
 import { expect, test } from 'vitest'
-import { nearestInput, nearestOn } from '../../src/model/branching'
+import { nearestInput, nearestPointOn } from '../../src/model/branching'
 import type { Point } from '../../src/model/wire_lines'
 import { seeded } from './random'
 
@@ -11,9 +11,9 @@ test('the start of a branch is on the line, and no other point of the line is ne
       const [x, y] = path.at(-1)!
       path.push(k % 2 ? [x, 400 * random()] : [400 * random(), y])
     }
-    const wanted: Point = [400 * random(), 400 * random()]
-    const [x, y] = nearestOn(path, wanted)
-    const onPiece = path
+    const point: Point = [400 * random(), 400 * random()]
+    const [x, y] = nearestPointOn(path, point)
+    const onSegment = path
       .slice(1)
       .some(
         ([bx, by], k) =>
@@ -23,13 +23,13 @@ test('the start of a branch is on the line, and no other point of the line is ne
               Math.hypot(bx - path[k]![0], by - path[k]![1]),
           ) < 1e-9,
       )
-    expect(onPiece).toBe(true)
-    const found = Math.hypot(x - wanted[0], y - wanted[1])
+    expect(onSegment).toBe(true)
+    const distance = Math.hypot(x - point[0], y - point[1])
     for (let k = 1; k < path.length; k++)
       for (let part = 0; part <= 1; part += 0.1) {
         const [[ax, ay], [bx, by]] = [path[k - 1]!, path[k]!]
-        const other = Math.hypot(ax + part * (bx - ax) - wanted[0], ay + part * (by - ay) - wanted[1])
-        expect(found).toBeLessThanOrEqual(other + 1e-9)
+        const other = Math.hypot(ax + part * (bx - ax) - point[0], ay + part * (by - ay) - point[1])
+        expect(distance).toBeLessThanOrEqual(other + 1e-9)
       }
   }
 })

@@ -23,7 +23,7 @@ test('blocks that are added by name one after another are apart, and in view whi
 })
 
 test('a place beside the selected block is kept if it is free, otherwise the next one below is taken', () => {
-  const wanted = { ...size, x: 0, y: 1.5 }
-  expect(freeBelow(wanted, [])).toEqual(wanted)
-  expect(freeBelow(wanted, [{ ...size, x: 10, y: 0 }])).toEqual({ ...wanted, y: 81.5 })
+  const preferred = { ...size, x: 0, y: 1.5 }
+  expect(freeBelow(preferred, [])).toEqual(preferred)
+  expect(freeBelow(preferred, [{ ...size, x: 10, y: 0 }])).toEqual({ ...preferred, y: 81.5 })
 })

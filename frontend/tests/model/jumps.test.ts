@@ -2,7 +2,7 @@ import { expect, test } from 'vitest'
 import { difference } from '../../src/model/difference'
 import { measures } from '../../src/model/measures'
 import { RunSamples } from '../../src/model/run_samples'
-import { joined, valueAt, valueBefore } from '../../src/model/trace'
+import { withCommonTimes, valueAt, valueBefore } from '../../src/model/trace'
 
 const trace = (...rows: [number, number][]) => ({
   time: Float64Array.from(rows, ([t]) => t),
@@ -20,7 +20,7 @@ test('a jump has a left limit and a value', () => {
 
 test('traces with jumps at different times share their rows', () => {
   const other = trace([0, 1], [1, 1], [1, 2], [1.5, 2], [3, 2])
-  const [time, first, second] = joined([step, other])
+  const [time, first, second] = withCommonTimes([step, other])
   expect([...time]).toEqual([0, 1, 1, 1.5, 1.5, 2, 3])
   expect([...first!]).toEqual([0, 0, 0, 0, 4, 4, undefined])
   expect([...second!]).toEqual([1, 1, 2, 2, 2, undefined, 2])
@@ -28,14 +28,14 @@ test('traces with jumps at different times share their rows', () => {
 
 test('runs that jump at the same time do not differ there, whatever their other rows are', () => {
   const run = (key: string, { time, values }: ReturnType<typeof trace>) => {
-    const made = new RunSamples(key, [{ name: 'a/y', shape: [], unit: '', entries: [] }], {})
+    const samples = new RunSamples(key, [{ name: 'a/y', shape: [], unit: '', entries: [] }], {})
     const header = JSON.stringify({ run: key, first: 0, count: time.length }).padEnd(60)
     const buffer = new ArrayBuffer(64 + 16 * time.length)
     new DataView(buffer).setUint32(0, 60, true)
     new Uint8Array(buffer, 4, 60).set(new TextEncoder().encode(header))
     new Float64Array(buffer, 64).set([...time, ...values])
-    made.receive(buffer)
-    return made
+    samples.receive(buffer)
+    return samples
   }
   const coarse = run('coarse', step)
   const fine = run('fine', trace([0, 0], [0.5, 0], [1, 0], [1.5, 0], [1.5, 4], [1.7, 4], [2, 4]))

@@ -9,15 +9,15 @@ const even = (count: number, end: number) => Array.from({ length: count + 1 }, (
 
 describe('measures of a trace', () => {
   test('of a sine over whole periods', () => {
-    const found = measures(
+    const result = measures(
       trace(even(4000, 2), (t) => 1 + 3 * Math.sin(2 * Math.PI * t)),
       0,
       2,
     )
-    expect(found.mean).toBeCloseTo(1, 9)
-    expect(found.rms).toBeCloseTo(Math.sqrt(1 + 4.5), 5)
-    expect(found.peakToPeak).toBeCloseTo(6, 9)
-    expect([found.riseTime, found.overshoot], 'no final value').toEqual([NaN, NaN])
+    expect(result.mean).toBeCloseTo(1, 9)
+    expect(result.rms).toBeCloseTo(Math.sqrt(1 + 4.5), 5)
+    expect(result.peakToPeak).toBeCloseTo(6, 9)
+    expect([result.riseTime, result.overshoot], 'no final value').toEqual([NaN, NaN])
   })
 
   test('are weighted by time: uneven samples of a straight line do not change them', () => {
@@ -28,13 +28,13 @@ describe('measures of a trace', () => {
   })
 
   test('of a window that ends between samples', () => {
-    const found = measures(
+    const result = measures(
       trace([0, 1, 2, 3], (t) => t),
       0.5,
       2.25,
     )
-    expect([found.least, found.greatest]).toEqual([0.5, 2.25])
-    expect(found.mean).toBeCloseTo(1.375, 12)
+    expect([result.minimum, result.maximum]).toEqual([0.5, 2.25])
+    expect(result.mean).toBeCloseTo(1.375, 12)
   })
 
   test('rise time and overshoot of a step response', () => {

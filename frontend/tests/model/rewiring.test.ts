@@ -1,5 +1,12 @@
 import { expect, test } from 'vitest'
-import { isLoose, levelled, putInto, rewired, takenOut, wireAt } from '../../src/model/rewiring'
+import {
+  isInsertable,
+  alignedPosition,
+  insertIntoWire,
+  wireDifference,
+  disconnectBlocks,
+  wireAt,
+} from '../../src/model/rewiring'
 import { wireKey } from '../../src/model/wires'
 import type { SheetPort, SheetBlock, Wire } from '../../src/protocol'
 
@@ -46,16 +53,18 @@ const chain = [
 ]
 
 test('disconnecting a block connects its neighbours, and inserting it again restores the wires', () => {
-  const without = takenOut([gain], chain)
+  const without = disconnectBlocks([gain], chain)
   expect(sorted(without)).toEqual(
     sorted([wire('step/y', 'plant/u'), wire('step/y', 'scope/in1'), wire('clock/y', 'log/in1')]),
   )
   const single = [wire('step/y', 'gain/u'), wire('gain/y', 'plant/u')]
-  expect(sorted(putInto(gain, wire('step/y', 'plant/u'), takenOut([gain], single)))).toEqual(sorted(single))
+  expect(sorted(insertIntoWire(gain, wire('step/y', 'plant/u'), disconnectBlocks([gain], single)))).toEqual(
+    sorted(single),
+  )
 })
 
 test('several blocks keep the wires between them and lose all others', () => {
-  expect(takenOut([gain, block('plant')], chain)).toEqual([
+  expect(disconnectBlocks([gain, block('plant')], chain)).toEqual([
     wire('gain/y', 'plant/u'),
     wire('clock/y', 'log/in1'),
   ])
@@ -63,25 +72,27 @@ test('several blocks keep the wires between them and lose all others', () => {
 
 test('disconnecting a block with two inputs connects no neighbours; insertion uses its first ports', () => {
   const sum = block('sum', ['in1', 'in2'])
-  expect(takenOut([sum], [wire('a/y', 'sum/in1'), wire('b/y', 'sum/in2'), wire('sum/y', 'c/u')])).toEqual([])
-  expect(putInto(sum, wire('a/y', 'c/u'), [wire('a/y', 'c/u')])).toEqual([
+  expect(
+    disconnectBlocks([sum], [wire('a/y', 'sum/in1'), wire('b/y', 'sum/in2'), wire('sum/y', 'c/u')]),
+  ).toEqual([])
+  expect(insertIntoWire(sum, wire('a/y', 'c/u'), [wire('a/y', 'c/u')])).toEqual([
     wire('a/y', 'sum/in1'),
     wire('sum/y', 'c/u'),
   ])
 })
 
 test('an edit contains exactly the added and removed wires', () => {
-  const after = takenOut([gain], chain)
-  const { wires, instead } = rewired(chain, after)
-  const gone = new Set(instead.map(wireKey))
-  expect(sorted([...chain.filter((one) => !gone.has(wireKey(one))), ...wires])).toEqual(sorted(after))
+  const after = disconnectBlocks([gain], chain)
+  const { wires, instead } = wireDifference(chain, after)
+  const removed = new Set(instead.map(wireKey))
+  expect(sorted([...chain.filter((one) => !removed.has(wireKey(one))), ...wires])).toEqual(sorted(after))
   expect(wires.concat(instead).map(wireKey)).not.toContain(wireKey(wire('clock/y', 'log/in1')))
 })
 
 test('only an unconnected block with an input and an output can be inserted by dropping', () => {
-  expect(isLoose(gain, chain)).toBe(false)
-  expect(isLoose(block('other'), chain)).toBe(true)
-  expect(isLoose(block('source', []), chain)).toBe(false)
+  expect(isInsertable(gain, chain)).toBe(false)
+  expect(isInsertable(block('other'), chain)).toBe(true)
+  expect(isInsertable(block('source', []), chain)).toBe(false)
 })
 
 test('a dropped block is inserted into the horizontal segment below it and aligned with it', () => {
@@ -101,11 +112,11 @@ test('a dropped block is inserted into the horizontal segment below it and align
     },
   }
   const wires = [wire('step/y', 'plant/u')]
-  const found = wireAt({ x: 200, y: 85 }, [drawn], wires)!
-  expect(found).toMatchObject({ wire: wires[0], y: 90, left: 100, right: 400, flipped: false })
-  expect(levelled(gain, { x: 170, y: 65 }, found)).toEqual({ x: 170, y: 70, flipped: false })
+  const segment = wireAt({ x: 200, y: 85 }, [drawn], wires)!
+  expect(segment).toMatchObject({ wire: wires[0], y: 90, left: 100, right: 400, flipped: false })
+  expect(alignedPosition(gain, { x: 170, y: 65 }, segment)).toEqual({ x: 170, y: 70, flipped: false })
   expect(
-    levelled(gain, { x: 170, y: 65 }, { ...found, right: 200 }),
+    alignedPosition(gain, { x: 170, y: 65 }, { ...segment, right: 200 }),
     'centred on a short segment',
   ).toMatchObject({
     x: 120,

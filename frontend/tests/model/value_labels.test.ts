@@ -1,6 +1,6 @@
 import { expect, test } from 'vitest'
 import type { Rectangle } from '../../src/model/free_place'
-import { labelPlace, OFF_WIRE } from '../../src/model/value_labels'
+import { labelPosition, WIRE_DISTANCE } from '../../src/model/value_labels'
 
 let seed = 7
 const random = (most: number) => ((seed = (seed * 48271) % 2147483647) / 2147483647) * most
@@ -13,19 +13,19 @@ test('a label never covers a block or a name, wherever they are', () => {
       width: 10 + random(90),
       height: 10 + random(60),
     }))
-    const at = { x: random(600), y: random(300) }
+    const point = { x: random(600), y: random(300) }
     const direction = round % 2 ? 1 : -1
     const height = 14 + random(21)
-    const { below, width } = labelPlace(at, direction, { height }, obstacles)
+    const { below, width } = labelPosition(point, direction, { height }, obstacles)
     const label = {
-      x: direction > 0 ? at.x : at.x - width,
-      y: below ? at.y + OFF_WIRE : at.y - OFF_WIRE - height,
+      x: direction > 0 ? point.x : point.x - width,
+      y: below ? point.y + WIRE_DISTANCE : point.y - WIRE_DISTANCE - height,
       width,
       height,
     }
-    for (const one of obstacles) {
-      const across = Math.min(label.x + width, one.x + one.width) - Math.max(label.x, one.x)
-      const down = Math.min(label.y + height, one.y + one.height) - Math.max(label.y, one.y)
+    for (const obstacle of obstacles) {
+      const across = Math.min(label.x + width, obstacle.x + obstacle.width) - Math.max(label.x, obstacle.x)
+      const down = Math.min(label.y + height, obstacle.y + obstacle.height) - Math.max(label.y, obstacle.y)
       expect(across > 1e-9 && down > 1e-9).toBe(false)
     }
   }
@@ -33,8 +33,8 @@ test('a label never covers a block or a name, wherever they are', () => {
 
 test('a label is above its wire unless there is more room below', () => {
   const above: Rectangle = { x: 30, y: -20, width: 50, height: 18 }
-  expect(labelPlace({ x: 0, y: 0 }, 1, { height: 14 }, [])).toMatchObject({ below: false })
-  expect(labelPlace({ x: 0, y: 0 }, 1, { height: 14 }, [above])).toMatchObject({ below: true })
+  expect(labelPosition({ x: 0, y: 0 }, 1, { height: 14 }, [])).toMatchObject({ below: false })
+  expect(labelPosition({ x: 0, y: 0 }, 1, { height: 14 }, [above])).toMatchObject({ below: true })
   const both = [above, { ...above, x: 20, y: 2 }]
-  expect(labelPlace({ x: 0, y: 0 }, 1, { height: 14 }, both)).toEqual({ below: false, width: 30 })
+  expect(labelPosition({ x: 0, y: 0 }, 1, { height: 14 }, both)).toEqual({ below: false, width: 30 })
 })

@@ -24,7 +24,7 @@ def listed() -> list[tuple[list[str], list[str]]]:
     """The source files and the keys of each place in the list."""
     text = (SOURCE / "key_list.ts").read_text(encoding="utf-8")
     places = re.findall(r"sources: \[(.*?)\],\s*keys: \[(.*?)\n    \],", text, re.DOTALL)
-    assert len(places) == text.count("    place: '")
+    assert len(places) == text.count("    title: '")
     ways = re.compile(r"^ *\['(.+?)', '", re.MULTILINE)
     return [
         (re.findall(r"'(.+?)'", sources), [way for found in ways.findall(keys) for way in found.split(", ")])

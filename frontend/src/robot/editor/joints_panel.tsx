@@ -1,13 +1,13 @@
 import { Button, SegmentedControl, Slider } from '@mantine/core'
 import { useState } from 'react'
 import type { LinkRow } from '../../protocol'
-import { atRest, cellText, setJoints, useDesk, type Joints } from './desk'
+import { atRest, cellText, setJoints, useRobotEditor, type Joints } from './state'
 
 const HALF_TURN = Math.PI
 const DEFAULT_RANGE = 1
 
 /** The displayed quantity of the joints: position, speed, acceleration. */
-const KINDS = [
+const QUANTITIES = [
   { value: 'q', label: 'q' },
   { value: 'qd', label: 'qd' },
   { value: 'qdd', label: 'qdd' },
@@ -15,22 +15,22 @@ const KINDS = [
 
 /** A slider for each joint within its range, and fields for speeds and accelerations. */
 export function JointsPanel() {
-  const shown = useDesk((s) => (s.current ? s.robots[s.current] : undefined))
-  const joints = useDesk((s) => (s.current ? s.joints[s.current] : undefined))
-  const [kind, setKind] = useState<keyof Joints>('q')
-  if (!shown || !joints) return null
-  const moving = shown.links.filter(({ moves }) => moves)
+  const robot = useRobotEditor((s) => (s.current ? s.robots[s.current] : undefined))
+  const joints = useRobotEditor((s) => (s.current ? s.joints[s.current] : undefined))
+  const [quantity, setQuantity] = useState<keyof Joints>('q')
+  if (!robot || !joints) return null
+  const moving = robot.links.filter(({ moves }) => moves)
   return (
     <div className="joints-panel">
       <div className="panel-bar">
         <SegmentedControl
           size="xs"
-          data={KINDS}
-          value={kind}
-          onChange={(value) => setKind(value as keyof Joints)}
+          data={QUANTITIES}
+          value={quantity}
+          onChange={(value) => setQuantity(value as keyof Joints)}
           aria-label="Quantity of the sliders"
         />
-        <Button size="compact-xs" variant="default" onClick={() => setJoints(atRest(shown))}>
+        <Button size="compact-xs" variant="default" onClick={() => setJoints(atRest(robot))}>
           Home
         </Button>
       </div>
@@ -38,9 +38,11 @@ export function JointsPanel() {
         <JointSlider
           key={link.name}
           link={link}
-          kind={kind}
-          value={joints[kind][k] ?? 0}
-          onValue={(value) => setJoints({ [kind]: joints[kind].map((old, i) => (i === k ? value : old)) })}
+          quantity={quantity}
+          value={joints[quantity][k] ?? 0}
+          onValue={(value) =>
+            setJoints({ [quantity]: joints[quantity].map((old, i) => (i === k ? value : old)) })
+          }
         />
       ))}
     </div>
@@ -49,16 +51,16 @@ export function JointsPanel() {
 
 interface JointSliderProps {
   link: LinkRow
-  kind: keyof Joints
+  quantity: keyof Joints
   value: number
   onValue: (value: number) => void
 }
 
-function JointSlider({ link, kind, value, onValue }: JointSliderProps) {
-  const angles = useDesk((s) => s.angles)
-  const [low, high] = range(link, kind)
+function JointSlider({ link, quantity, value, onValue }: JointSliderProps) {
+  const angles = useRobotEditor((s) => s.angles)
+  const [low, high] = range(link, quantity)
   const unit = link.turns ? (angles === 'deg' ? '°' : 'rad') : 'm'
-  const per = { q: '', qd: '/s', qdd: '/s²' }[kind]
+  const per = { q: '', qd: '/s', qdd: '/s²' }[quantity]
   const factor = link.turns && angles === 'deg' ? 180 / Math.PI : 1
   return (
     <div className="joint-slider">
@@ -67,7 +69,7 @@ function JointSlider({ link, kind, value, onValue }: JointSliderProps) {
       </span>
       <Slider
         size="sm"
-        thumbLabel={`${kind} of ${link.name}`}
+        thumbLabel={`${quantity} of ${link.name}`}
         min={low}
         max={high}
         step={(high - low) / 720}
@@ -77,7 +79,7 @@ function JointSlider({ link, kind, value, onValue }: JointSliderProps) {
         marks={low < 0 && high > 0 ? [{ value: 0 }] : []}
       />
       <NumberField
-        label={`${kind} of ${link.name} as a number`}
+        label={`${quantity} of ${link.name} as a number`}
         text={cellText(Number((value * factor).toFixed(4)), false, angles)}
         onNumber={(typed) => onValue(typed / factor)}
       />
@@ -117,11 +119,11 @@ function NumberField({
 }
 
 /** The range of a slider: that of the joint, otherwise ±π rad or ±1 m; for speeds the speed limit. */
-function range(link: LinkRow, kind: keyof Joints): [number, number] {
+function range(link: LinkRow, quantity: keyof Joints): [number, number] {
   const { lowest, highest, speed } = link.cells
   const limit = typeof speed === 'number' ? speed : link.turns ? HALF_TURN : DEFAULT_RANGE
-  if (kind === 'qd') return [-limit, limit]
-  if (kind === 'qdd') return [-2 * limit, 2 * limit]
+  if (quantity === 'qd') return [-limit, limit]
+  if (quantity === 'qdd') return [-2 * limit, 2 * limit]
   if (typeof lowest === 'number' && typeof highest === 'number' && lowest < highest) return [lowest, highest]
   return link.turns ? [-HALF_TURN, HALF_TURN] : [-DEFAULT_RANGE, DEFAULT_RANGE]
 }

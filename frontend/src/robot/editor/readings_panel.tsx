@@ -1,5 +1,5 @@
 import { IconAlertTriangle } from '@tabler/icons-react'
-import { shortNumber, useDesk } from './desk'
+import { shortNumber, useRobotEditor } from './state'
 
 const ROWS = ['vx', 'vy', 'vz', 'ωx', 'ωy', 'ωz']
 
@@ -8,18 +8,18 @@ const ROWS = ['vx', 'vy', 'vz', 'ωx', 'ωy', 'ωz']
  * Jacobian, torques.
  */
 export function ReadingsPanel() {
-  const shown = useDesk((s) => (s.current ? s.robots[s.current] : undefined))
-  const readings = useDesk((s) => s.readings)
-  const angles = useDesk((s) => s.angles)
-  if (!shown) return null
-  const names = shown.links.filter(({ moves }) => moves).map(({ name }) => name)
-  const turns = shown.links.filter(({ moves }) => moves).map((link) => link.turns)
+  const robot = useRobotEditor((s) => (s.current ? s.robots[s.current] : undefined))
+  const readings = useRobotEditor((s) => s.readings)
+  const angles = useRobotEditor((s) => s.angles)
+  if (!robot) return null
+  const names = robot.links.filter(({ moves }) => moves).map(({ name }) => name)
+  const turns = robot.links.filter(({ moves }) => moves).map((link) => link.turns)
   if (!names.length) return <p className="empty">The robot has no movable joint.</p>
   if (!readings) return <p className="empty">Compiling the arm …</p>
   const { pose, position, rpy, jacobian, gravload, torque, manipulability, singular, limits } = readings
   const angle = (value: number) =>
     angles === 'deg' ? `${shortNumber((value * 180) / Math.PI, 3)}°` : `${shortNumber(value)} rad`
-  const warnings = [...(singular ? [singular] : []), ...limits.map((words) => `${words}.`)]
+  const warnings = [...(singular ? [singular] : []), ...limits.map((text) => `${text}.`)]
   return (
     <div className="readings" role="group" aria-label="Read-outs" tabIndex={0}>
       <section aria-label="Pose of the tool">
@@ -42,9 +42,9 @@ export function ReadingsPanel() {
       </section>
       {warnings.length > 0 && (
         <ul className="said" aria-label="Notices">
-          {warnings.map((words) => (
-            <li key={words}>
-              <IconAlertTriangle size={14} aria-hidden /> {words}
+          {warnings.map((text) => (
+            <li key={text}>
+              <IconAlertTriangle size={14} aria-hidden /> {text}
             </li>
           ))}
         </ul>
@@ -85,7 +85,7 @@ export function ReadingsPanel() {
 function Matrix({
   label,
   rows,
-  heads,
+  heads: rowHeads,
   columns,
 }: {
   label: string
@@ -111,7 +111,7 @@ function Matrix({
         <tbody>
           {rows.map((row, i) => (
             <tr key={i}>
-              {heads && <th scope="row">{heads[i]}</th>}
+              {rowHeads && <th scope="row">{rowHeads[i]}</th>}
               {row.map((value, j) => (
                 <td key={j}>{shortNumber(value, 3)}</td>
               ))}

@@ -20,9 +20,9 @@ import {
 } from '@tabler/icons-react'
 import { DockviewReact, type DockviewReadyEvent, type IDockviewPanelHeaderProps } from 'dockview-react'
 import { lazy, Suspense, useEffect } from 'react'
-import { show } from '../../dialogs'
-import { alter, ask, bringToFront, useStudio } from '../../store'
-import { edit, leaveEditor, useDesk, type OpenRobot } from './desk'
+import { showDialog } from '../../dialogs'
+import { alterDocument, ask, bringToFront, useStudio } from '../../store'
+import { edit, leaveEditor, useRobotEditor, type OpenRobot } from './state'
 import { JointsPanel } from './joints_panel'
 import { ReadingsPanel } from './readings_panel'
 import { RobotFields } from './robot_fields'
@@ -31,7 +31,7 @@ import { saveRobot, SaveDialog } from './save_dialog'
 
 const ArmPanel = lazy(() => import('./arm_panel'))
 /** Panel height above which both tables are visible at the same time, px. */
-const TALL = 1000
+const TALL_PX = 1000
 const BAR_PX = 44
 
 const panels: Record<string, React.FunctionComponent> = {
@@ -53,7 +53,7 @@ function Tab({ api }: IDockviewPanelHeaderProps) {
 
 /** The default layout: arm, joints and read-outs above, the tables below. */
 function arrange({ api }: DockviewReadyEvent): void {
-  const tall = innerHeight > TALL
+  const isTall = innerHeight > TALL_PX
   api.addPanel({ id: 'arm', component: 'arm', title: 'Arm' })
   api.addPanel({
     id: 'readings',
@@ -72,14 +72,14 @@ function arrange({ api }: DockviewReadyEvent): void {
     component: 'kinematics',
     title: 'Kinematics',
     position: { direction: 'below' },
-    initialHeight: tall ? 0.26 * innerHeight : Math.max(250, 0.37 * innerHeight),
+    initialHeight: isTall ? 0.26 * innerHeight : Math.max(250, 0.37 * innerHeight),
   })
   api.addPanel({
     id: 'dynamics',
     component: 'dynamics',
     title: 'Dynamics',
     inactive: true,
-    ...(tall
+    ...(isTall
       ? { position: { referencePanel: 'kinematics', direction: 'below' }, initialHeight: 0.24 * innerHeight }
       : { position: { referencePanel: 'kinematics' } }),
   })
@@ -88,22 +88,23 @@ function arrange({ api }: DockviewReadyEvent): void {
     component: 'robot',
     title: 'Robot, base, tool',
     inactive: true,
-    position: { referencePanel: tall ? 'dynamics' : 'kinematics' },
+    position: { referencePanel: isTall ? 'dynamics' : 'kinematics' },
   })
   // Sizes are set last, from left and top: a resized group takes space from those after it.
-  const width = (least: number, share: number) => Math.min(Math.max(least, share * innerWidth), 1.5 * least)
+  const width = (minimum: number, share: number) =>
+    Math.min(Math.max(minimum, share * innerWidth), 1.5 * minimum)
   const [joints, readings] = [width(300, 0.2), width(376, 0.26)]
   api.getPanel('arm')?.group.api.setSize({ width: innerWidth - joints - readings })
   api.getPanel('joints')?.group.api.setSize({ width: joints })
-  if (!tall) return
+  if (!isTall) return
   const table = 0.2 * innerHeight
   api.getPanel('arm')?.group.api.setSize({ height: innerHeight - BAR_PX - 2 * table })
   api.getPanel('kinematics')?.group.api.setSize({ height: table })
 }
 
 function Table({ which }: { which: 'kinematics' | 'dynamics' | 'robot' }) {
-  const shown = useDesk((s) => (s.current ? s.robots[s.current] : undefined))
-  const tables = useDesk((s) => s.tables)
+  const shown = useRobotEditor((s) => (s.current ? s.robots[s.current] : undefined))
+  const tables = useRobotEditor((s) => s.tables)
   if (!shown || !tables) return <p className="empty">Loading the tables …</p>
   if (which === 'robot') return <RobotFields shown={shown} columns={tables.robot} />
   return <LinkTable shown={shown} columns={tables[which]} actions={which === 'kinematics'} />
@@ -112,7 +113,7 @@ function Table({ which }: { which: 'kinematics' | 'dynamics' | 'robot' }) {
 /** The editor of a robot: its tables, the arm, and its read-outs. */
 export default function RobotEditor() {
   const scheme = useComputedColorScheme('light')
-  const shown = useDesk((s) => (s.current ? s.robots[s.current] : undefined))
+  const shown = useRobotEditor((s) => (s.current ? s.robots[s.current] : undefined))
   const key = shown?.state.document
   useEffect(() => {
     if (!key) return
@@ -120,7 +121,7 @@ export default function RobotEditor() {
     const onKey = (event: KeyboardEvent) => {
       event.stopPropagation()
       const pressed = event.key.toLowerCase()
-      if (event.key === '?' && !(event.target instanceof HTMLInputElement)) show('keys')
+      if (event.key === '?' && !(event.target instanceof HTMLInputElement)) showDialog('keys')
       if (!(event.ctrlKey || event.metaKey)) return
       if (pressed === 's') saveRobot()
       else if (pressed === 'z' && !event.shiftKey) undo()
@@ -154,17 +155,17 @@ function leaveCell(): void {
   if (document.activeElement instanceof HTMLElement) document.activeElement.blur()
 }
 
-function take(step: 'undo' | 'redo'): void {
+function undoOrRedo(direction: 'undo' | 'redo'): void {
   leaveCell()
-  const { current, robots } = useDesk.getState()
-  if (current) alter(step, robots[current]?.state)
+  const { current, robots } = useRobotEditor.getState()
+  if (current) alterDocument(direction, robots[current]?.state)
 }
 
-const undo = () => take('undo')
-const redo = () => take('redo')
+const undo = () => undoOrRedo('undo')
+const redo = () => undoOrRedo('redo')
 
 function Bar({ shown }: { shown: OpenRobot }) {
-  const angles = useDesk((s) => s.angles)
+  const angles = useRobotEditor((s) => s.angles)
   const robots = useStudio((s) => s.documents).filter(({ kind }) => kind === 'robot')
   const { state } = shown
   const model = useStudio((s) => s.document?.state.title)
@@ -235,7 +236,7 @@ function Bar({ shown }: { shown: OpenRobot }) {
           { value: 'rad', label: 'rad' },
         ]}
         value={angles}
-        onChange={(value) => useDesk.setState({ angles: value })}
+        onChange={(value) => useRobotEditor.setState({ angles: value })}
       />
     </header>
   )
@@ -345,7 +346,7 @@ function Convention({ shown }: { shown: OpenRobot }) {
 
 /** The notes from reading the file. */
 function Notes() {
-  const notes = useDesk((s) => s.notes)
+  const notes = useRobotEditor((s) => s.notes)
   if (!notes.length) return null
   return (
     <Alert
@@ -354,7 +355,7 @@ function Notes() {
       p="xs"
       withCloseButton
       closeButtonLabel="Close the notes"
-      onClose={() => useDesk.setState({ notes: [] })}
+      onClose={() => useRobotEditor.setState({ notes: [] })}
       icon={<IconAlertTriangle size={16} />}
     >
       {notes.map((note) => (

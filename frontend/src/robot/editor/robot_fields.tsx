@@ -1,10 +1,10 @@
 import type { CellColumn } from '../../protocol'
-import { unitOf, useDesk, type OpenRobot } from './desk'
+import { unitOf, useRobotEditor, type OpenRobot } from './state'
 import { Cell } from './table'
 
 /** The properties of the whole robot: name, base, tool, gravity and friction. */
 export function RobotFields({ shown, columns }: { shown: OpenRobot; columns: CellColumn[] }) {
-  const angles = useDesk((s) => s.angles)
+  const angles = useRobotEditor((s) => s.angles)
   const groups = [...new Set(columns.map(({ group }) => group))]
   return (
     <div className="robot-fields">

@@ -1,24 +1,24 @@
 import { Button, Group, Modal, Stack, Text, TextInput } from '@mantine/core'
 import { create } from 'zustand'
 import { Refusal } from '../../connection'
-import { line, useStudio } from '../../store'
-import { useDesk, type OpenRobot } from './desk'
+import { connection, useStudio } from '../../store'
+import { useRobotEditor, type OpenRobot } from './state'
 
-interface Saving {
+interface SaveState {
   robot: string | null
   path: string
-  refused: string
+  refusal: string
 }
 
-const useSaving = create<Saving>(() => ({ robot: null, path: '', refused: '' }))
+const useSaving = create<SaveState>(() => ({ robot: null, path: '', refusal: '' }))
 
 /** Save under the present name; without a file, ask for a name. */
 export function saveRobot(): void {
-  const { current, robots } = useDesk.getState()
-  const shown = current ? robots[current] : undefined
-  if (!shown) return
-  if (shown.state.path) void write(shown.state.document, '', false)
-  else saveRobotAs(shown)
+  const { current, robots } = useRobotEditor.getState()
+  const editedRobot = current ? robots[current] : undefined
+  if (!editedRobot) return
+  if (editedRobot.state.path) void write(editedRobot.state.document, '', false)
+  else saveRobotAs(editedRobot)
 }
 
 /** Ask for a name and save under it. */
@@ -26,23 +26,23 @@ export function saveRobotAs({ name, state }: OpenRobot): void {
   useSaving.setState({
     robot: state.document,
     path: state.path ?? `${name.trim().replace(/[^\w.-]+/g, '_') || 'robot'}.json`,
-    refused: '',
+    refusal: '',
   })
 }
 
 async function write(robot: string, path: string, overwrite: boolean): Promise<void> {
   try {
-    await line.ask({ kind: 'save', document: robot, path, overwrite })
+    await connection.ask({ kind: 'save', document: robot, path, overwrite })
     useSaving.setState({ robot: null })
   } catch (error) {
     if (!(error instanceof Refusal)) throw error
-    const now = path || useDesk.getState().robots[robot]?.state.path || ''
-    useSaving.setState({ robot, path: now, refused: error.what })
+    const savedPath = path || useRobotEditor.getState().robots[robot]?.state.path || ''
+    useSaving.setState({ robot, path: savedPath, refusal: error.what })
   }
 }
 
 export function SaveDialog() {
-  const { robot, path, refused } = useSaving()
+  const { robot, path, refusal } = useSaving()
   const files = useStudio((s) => s.welcome?.files) ?? []
   const close = () => useSaving.setState({ robot: null })
   return (
@@ -59,10 +59,10 @@ export function SaveDialog() {
             description="A robot file, .json; missing folders are created."
             data-autofocus
             value={path}
-            error={refused || undefined}
-            onChange={(event) => useSaving.setState({ path: event.currentTarget.value, refused: '' })}
+            error={refusal || undefined}
+            onChange={(event) => useSaving.setState({ path: event.currentTarget.value, refusal: '' })}
           />
-          {files.includes(path) && !refused && (
+          {files.includes(path) && !refusal && (
             <Text size="xs" c="dimmed">
               A file with this name exists.
             </Text>
@@ -71,7 +71,7 @@ export function SaveDialog() {
             <Button variant="default" onClick={close}>
               Cancel
             </Button>
-            {refused && robot && (
+            {refusal && robot && (
               <Button color="red" variant="light" onClick={() => void write(robot, path, true)}>
                 Overwrite
               </Button>

@@ -3,7 +3,7 @@ import { IconAlertTriangle, IconDotsVertical } from '@tabler/icons-react'
 import { memo, useRef, useState } from 'react'
 import { newKey } from '../../keys'
 import type { CellColumn, LinkRow, RobotFinding } from '../../protocol'
-import { cellText, edit, isAngle, unitOf, useDesk, type Angles, type OpenRobot } from './desk'
+import { cellText, edit, isAngle, unitOf, useRobotEditor, type Angles, type OpenRobot } from './state'
 
 interface Fault {
   what: string
@@ -20,10 +20,10 @@ export function LinkTable({
   columns: CellColumn[]
   actions: boolean
 }) {
-  const angles = useDesk((s) => s.angles)
+  const angles = useRobotEditor((s) => s.angles)
   const groups = grouped(columns)
   return (
-    <div className="robot-table" onKeyDown={walk}>
+    <div className="robot-table" onKeyDown={moveBetweenRows}>
       <table aria-label="Links">
         <thead>
           <tr>
@@ -44,9 +44,10 @@ export function LinkTable({
                 scope="col"
                 title={column.doc}
                 className={startsGroup(columns, k) ? 'first' : undefined}
-                style={{ minWidth: widest(shown.links, column, angles) }}
+                style={{ minWidth: columnWidth(shown.links, column, angles) }}
               >
-                {column.title} <span className="unit">{unitOf(column, angles, oneKind(shown.links))}</span>
+                {column.title}{' '}
+                <span className="unit">{unitOf(column, angles, commonJointType(shown.links))}</span>
               </th>
             ))}
           </tr>
@@ -69,7 +70,7 @@ export function LinkTable({
                     column={column}
                     angles={angles}
                     locked={link.locked[column.name]}
-                    place={column.name === link.variable ? 'q' : ''}
+                    symbol={column.name === link.variable ? 'q' : ''}
                     finding={shown.findings.find(
                       (finding) => finding.link === link.name && finding.columns.includes(column.name),
                     )}
@@ -102,50 +103,50 @@ function grouped(columns: CellColumn[]): { name: string; span: number }[] {
 const startsGroup = (columns: CellColumn[], k: number) => k > 0 && columns[k]!.group !== columns[k - 1]!.group
 
 const LETTER_PX = 7.3
-const AROUND_PX = 4
+const PADDING_PX = 4
 
 /** Width of the longest text in a column, px (the padding of the header is added). */
-function widest(links: LinkRow[], column: CellColumn, angles: Angles): number {
+function columnWidth(links: LinkRow[], column: CellColumn, angles: Angles): number {
   const longest = Math.max(
     ...links.map(({ cells, turns }) => cellText(cells[column.name], isAngle(column, turns), angles).length),
   )
-  return Math.round(longest * LETTER_PX + AROUND_PX)
+  return Math.round(longest * LETTER_PX + PADDING_PX)
 }
 
 /** Whether all joints are revolute or all are prismatic; undefined for mixed types. */
-function oneKind(links: LinkRow[]): boolean | undefined {
-  const kinds = new Set(links.filter(({ moves }) => moves).map(({ turns }) => turns))
-  return kinds.size === 1 ? [...kinds][0] : undefined
+function commonJointType(links: LinkRow[]): boolean | undefined {
+  const jointTypes = new Set(links.filter(({ moves }) => moves).map(({ turns }) => turns))
+  return jointTypes.size === 1 ? [...jointTypes][0] : undefined
 }
 
 /** Up, Down and Enter move between rows; the browser handles Tab. */
-function walk(event: React.KeyboardEvent): void {
+function moveBetweenRows(event: React.KeyboardEvent): void {
   const step = { ArrowUp: -1, ArrowDown: 1, Enter: event.shiftKey ? -1 : 1 }[event.key]
   const field = event.target
   if (!step || !(field instanceof HTMLInputElement)) return
   const row = field.closest('tr')
   const next = (step > 0 ? row?.nextElementSibling : row?.previousElementSibling) as
     HTMLTableRowElement | null | undefined
-  const at = field.closest<HTMLTableCellElement>('td, th')?.cellIndex
-  const target = at === undefined ? undefined : next?.cells[at]?.querySelector('input')
+  const cellIndex = field.closest<HTMLTableCellElement>('td, th')?.cellIndex
+  const target = cellIndex === undefined ? undefined : next?.cells[cellIndex]?.querySelector('input')
   event.preventDefault()
   if (target) target.focus()
   else field.blur()
 }
 
 function NameCell({ link, findings }: { link: LinkRow; findings: RobotFinding[] }) {
-  const words = findings.map(({ what, fix }) => `${what} ${fix}`).join('\n')
+  const messages = findings.map(({ what, fix }) => `${what} ${fix}`).join('\n')
   return (
     <span className="name-cell">
       <TextCell
         label={`name of ${link.name}`}
         text={link.name}
         send={(name) => edit({ kind: 'rename_link', link: link.name, name })}
-        onlyAtTheEnd
+        sendOnBlur
       />
-      {words && (
-        <Tooltip label={words} multiline w={320}>
-          <IconAlertTriangle size={14} className="warn" role="img" aria-label={words} tabIndex={0} />
+      {messages && (
+        <Tooltip label={messages} multiline w={320}>
+          <IconAlertTriangle size={14} className="warn" role="img" aria-label={messages} tabIndex={0} />
         </Tooltip>
       )}
     </span>
@@ -160,7 +161,7 @@ interface CellProps {
   column: CellColumn
   angles: Angles
   locked?: string | undefined
-  place?: string
+  symbol?: string
   finding?: RobotFinding | undefined
 }
 
@@ -172,17 +173,17 @@ export const Cell = memo(function Cell({
   column,
   angles,
   locked,
-  place = '',
+  symbol = '',
   finding,
 }: CellProps) {
   const label = `${column.title} of ${owner || column.group || 'the robot'}`
   if (locked)
     return (
       <span className="cell locked" title={locked} aria-label={`${label}: ${locked}`}>
-        {place && (
+        {symbol && (
           <i>
-            {place[0]}
-            <sub>{place.slice(1)}</sub>
+            {symbol[0]}
+            <sub>{symbol.slice(1)}</sub>
           </i>
         )}
       </span>
@@ -222,27 +223,27 @@ interface TextCellProps {
   marked?: Fault | undefined
   wide?: boolean
   /** Sent once, when the cell loses the focus, because a partial text would have another meaning. */
-  onlyAtTheEnd?: boolean
+  sendOnBlur?: boolean
 }
 
-function TextCell({ label, text, doc, send, marked, wide, onlyAtTheEnd }: TextCellProps) {
+function TextCell({ label, text, doc, send, marked, wide, sendOnBlur }: TextCellProps) {
   const [typed, setTyped] = useState<string | null>(null)
   const [fault, setFault] = useState<Fault | null>(null)
   const [focused, setFocused] = useState(false)
   const gesture = useRef('')
-  const before = useRef(text)
-  const latest = useRef(0)
-  const say = async (value: string) => {
-    const number = ++latest.current
+  const textAtFocus = useRef(text)
+  const lastRequest = useRef(0)
+  const sendText = async (value: string) => {
+    const request = ++lastRequest.current
     const refusal = await send(value, gesture.current)
-    if (number !== latest.current) return false
+    if (request !== lastRequest.current) return false
     setFault(refusal ?? null)
     return !refusal
   }
-  const finish = async () => {
+  const commit = async () => {
     if (typed === null) return
-    const good = (onlyAtTheEnd && typed !== text) || fault ? await say(typed) : true
-    if (good) setTyped(null)
+    const accepted = (sendOnBlur && typed !== text) || fault ? await sendText(typed) : true
+    if (accepted) setTyped(null)
   }
   const tip = fault
     ? `${fault.what}${fault.fix ? `. ${fault.fix}` : ''}`
@@ -270,23 +271,23 @@ function TextCell({ label, text, doc, send, marked, wide, onlyAtTheEnd }: TextCe
         value={typed ?? text}
         onFocus={(event) => {
           gesture.current = newKey()
-          before.current = text
+          textAtFocus.current = text
           setFocused(true)
           event.currentTarget.select()
         }}
         onChange={(event) => {
           setTyped(event.currentTarget.value)
-          if (!onlyAtTheEnd) void say(event.currentTarget.value)
+          if (!sendOnBlur) void sendText(event.currentTarget.value)
         }}
         onBlur={() => {
           setFocused(false)
-          void finish()
+          void commit()
         }}
         onKeyDown={(event) => {
           if (event.key !== 'Escape') return
           event.stopPropagation()
           if (typed === null) event.currentTarget.blur()
-          else if (!onlyAtTheEnd) void say(before.current)
+          else if (!sendOnBlur) void sendText(textAtFocus.current)
           setTyped(null)
           setFault(null)
         }}

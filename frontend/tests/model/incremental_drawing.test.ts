@@ -1,7 +1,7 @@
 import { expect, test } from 'vitest'
-import { Growing, type Surface } from '../../src/model/growing'
+import { IncrementalDrawing, type DrawnPlot } from '../../src/model/incremental_drawing'
 import { RunSamples } from '../../src/model/run_samples'
-import { extremes, tracesOf, type Drawn } from '../../src/model/trace'
+import { extremes, tracesOf, type PlotColumns } from '../../src/model/trace'
 import type { Channel } from '../../src/protocol'
 
 const TIME = Float64Array.from({ length: 5000 }, (_, k) => k / 1000)
@@ -12,13 +12,13 @@ test('extremes extended during a run equal those of the whole run', () => {
   let grown = extremes([until(1)], 0, 5, 300)
   for (const count of [7, 8, 900, 901, 3333, 5000]) {
     grown = extremes([until(count)], 0, 5, 300, grown)
-    expect(grown.drawn).toEqual(extremes([until(count)], 0, 5, 300).drawn)
+    expect(grown.columns).toEqual(extremes([until(count)], 0, 5, 300).columns)
   }
 })
 
 test('no peak is lost, and each interval has at most two points', () => {
-  const { drawn } = extremes([until(5000)], 0, 5, 50)
-  const shown = (drawn[1] as (number | undefined)[]).filter((value) => value !== undefined)
+  const { columns } = extremes([until(5000)], 0, 5, 50)
+  const shown = (columns[1] as (number | undefined)[]).filter((value) => value !== undefined)
   expect(shown.length).toBeLessThanOrEqual(100)
   expect([Math.min(...shown), Math.max(...shown)]).toEqual([Math.min(...VALUES), Math.max(...VALUES)])
 })
@@ -38,7 +38,7 @@ function surface() {
       ['save', 'restore', 'rect', 'clip', 'translate', 'setLineDash'].map((name) => [name, () => {}]),
     ),
   } as unknown as CanvasRenderingContext2D
-  const plot: Surface = {
+  const plot: DrawnPlot = {
     ctx,
     bbox: { left: 0, top: 0, width: 500, height: 100 },
     valToPos: (value, scale) => (scale === 'x' ? 100 * value : 50 - 40 * value),
@@ -46,23 +46,26 @@ function surface() {
   return { plot, drawn: () => strokes.filter(({ points }) => points.length > 0) }
 }
 
-const nothing = (made: { drawn: Drawn }): Drawn => [made.drawn[0], made.drawn[0].map(() => NaN)]
+const withoutValues = (grown: { columns: PlotColumns }): PlotColumns => [
+  grown.columns[0],
+  grown.columns[0].map(() => NaN),
+]
 
 test('a line drawn in parts equals the line drawn at once, dashes included', () => {
   const strokes = [{ colour: 'black', dash: [7, 3] }]
   const whole = surface()
   const all = extremes([until(5000)], 0, 5, 300)
-  const once = new Growing(whole.plot, strokes)
-  once.shows(nothing(all), [0])
-  once.grow(all.drawn, 1, all.ends, 1)
+  const once = new IncrementalDrawing(whole.plot, strokes)
+  once.reset(withoutValues(all), [0])
+  once.append(all.columns, 1, all.finalRows, 1)
 
   const parts = surface()
-  const growing = new Growing(parts.plot, strokes)
-  growing.shows(nothing(all), [0])
-  let made = extremes([until(1)], 0, 5, 300)
+  const growing = new IncrementalDrawing(parts.plot, strokes)
+  growing.reset(withoutValues(all), [0])
+  let grown = extremes([until(1)], 0, 5, 300)
   for (const count of [400, 401, 2600, 5000]) {
-    made = extremes([until(count)], 0, 5, 300, made)
-    growing.grow(made.drawn, 1, made.ends, 1)
+    grown = extremes([until(count)], 0, 5, 300, grown)
+    growing.append(grown.columns, 1, grown.finalRows, 1)
   }
   const pieces = parts.drawn()
   expect(pieces.length).toBeGreaterThan(1)
@@ -80,10 +83,10 @@ test('a line drawn in parts equals the line drawn at once, dashes included', () 
 
 test('points of a line lie between pixels where the values do', () => {
   const { plot, drawn } = surface()
-  const growing = new Growing(plot, [{ colour: 'black', dash: [] }])
-  const slow: Drawn = [Float64Array.of(0, 1.005, 2), [0, 0.0012, 0.0037]]
-  growing.shows(nothing({ drawn: slow }), [0])
-  growing.grow(slow, 1, [3], 1)
+  const growing = new IncrementalDrawing(plot, [{ colour: 'black', dash: [] }])
+  const slow: PlotColumns = [Float64Array.of(0, 1.005, 2), [0, 0.0012, 0.0037]]
+  growing.reset(withoutValues({ columns: slow }), [0])
+  growing.append(slow, 1, [3], 1)
   expect(drawn()[0]!.points).toEqual([
     [0, 50],
     [100 * 1.005, 50 - 40 * 0.0012],
@@ -95,11 +98,11 @@ test('points of a line lie between pixels where the values do', () => {
 function frame(run: string, first: number, time: number[], columns: number[][]): ArrayBuffer {
   const header = JSON.stringify({ run, first, count: time.length })
   const text = new TextEncoder().encode(header.padEnd(Math.ceil((header.length + 4) / 8) * 8 - 4))
-  const made = new ArrayBuffer(4 + text.length + 8 * time.length * (1 + columns.length))
-  new DataView(made).setUint32(0, text.length, true)
-  new Uint8Array(made, 4).set(text)
-  new Float64Array(made, 4 + text.length).set([...time, ...columns.flat()])
-  return made
+  const grown = new ArrayBuffer(4 + text.length + 8 * time.length * (1 + columns.length))
+  new DataView(grown).setUint32(0, text.length, true)
+  new Uint8Array(grown, 4).set(text)
+  new Float64Array(grown, 4 + text.length).set([...time, ...columns.flat()])
+  return grown
 }
 
 test('samples are added by frames, dropped by a step back, and found by name', () => {

@@ -1,5 +1,5 @@
 import { expect, test } from 'vitest'
-import { sharedDashes } from '../../src/model/identical'
+import { sharedDashes } from '../../src/model/shared_lines'
 
 const time = Float64Array.from({ length: 50 }, (_, k) => k)
 const wave = (phase: number) => time.map((t) => Math.sin(0.2 * t + phase))

@@ -1,21 +1,21 @@
 import { useLayoutEffect, useRef, useState } from 'react'
 
-type Handlers = Record<string, (...given: never[]) => unknown>
+type Handlers = Record<string, (...args: never[]) => unknown>
 
 /**
  * Handlers that are the same function objects at every rendering and call the latest versions. React Flow
  * renders every block, port and wire of a sheet again if it receives another function.
  */
-export function useSteady<T extends Handlers>(latest: T): T {
-  const now = useRef(latest)
+export function useStableHandlers<T extends Handlers>(latest: T): T {
+  const current = useRef(latest)
   useLayoutEffect(() => {
-    now.current = latest
+    current.current = latest
   })
-  const [steady] = useState(
+  const [stable] = useState(
     () =>
       Object.fromEntries(
-        Object.keys(latest).map((name) => [name, (...given: never[]) => now.current[name]!(...given)]),
+        Object.keys(latest).map((name) => [name, (...args: never[]) => current.current[name]!(...args)]),
       ) as T,
   )
-  return steady
+  return stable
 }

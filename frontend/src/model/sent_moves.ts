@@ -26,21 +26,23 @@ export const pathOf = (inside: readonly string[]): string => inside.join('/')
 /** The sent moves that a state of the document from the server does not contain yet, in order. */
 export function outstanding(sent: readonly SentMove[], sheet: Sheet): SentMove[] {
   const { document, version } = sheet.state
-  const left = sent.filter(
-    (one) => one.document !== document || one.version === null || one.version > version,
+  const remaining = sent.filter(
+    (sentMove) => sentMove.document !== document || sentMove.version === null || sentMove.version > version,
   )
-  const first = left.findIndex((one) => isOn(one, sheet))
+  const first = remaining.findIndex((sentMove) => isOnSheet(sentMove, sheet))
   // The change is sent before the reply. The server applies moves in order: only the oldest can have arrived.
-  return first >= 0 && arrived(left[first]!, sheet) ? left.filter((_, k) => k !== first) : left
+  return first >= 0 && isContained(remaining[first]!, sheet)
+    ? remaining.filter((_, k) => k !== first)
+    : remaining
 }
 
 /** The sheet with the positions of the sent moves. */
 export function withMoves<S extends Sheet>(sheet: S, sent: readonly SentMove[]): S {
-  const own = sent.filter((one) => isOn(one, sheet))
-  if (!own.length) return sheet
+  const sheetMoves = sent.filter((move) => isOnSheet(move, sheet))
+  if (!sheetMoves.length) return sheet
   const blocks = { ...sheet.blocks }
   const notes = { ...sheet.notes }
-  for (const move of own) {
+  for (const move of sheetMoves) {
     for (const [name, place] of Object.entries(move.places))
       if (blocks[name]) blocks[name] = { ...blocks[name], place }
     for (const [id, note] of Object.entries(move.notes)) if (notes[id]) notes[id] = note
@@ -48,26 +50,26 @@ export function withMoves<S extends Sheet>(sheet: S, sent: readonly SentMove[]):
   return { ...sheet, blocks, notes }
 }
 
-const isOn = (move: SentMove, { state, inside }: Sheet): boolean =>
+const isOnSheet = (move: SentMove, { state, inside }: Sheet): boolean =>
   move.document === state.document && move.inside === pathOf(inside)
 
-function arrived({ places, notes }: SentMove, sheet: Sheet): boolean {
+function isContained({ places, notes }: SentMove, sheet: Sheet): boolean {
   return (
     Object.entries(places).every(([name, place]) => {
-      const now = sheet.blocks[name]?.place
-      return !now || samePlace(now, place)
+      const present = sheet.blocks[name]?.place
+      return !present || equalPlaces(present, place)
     }) &&
     Object.entries(notes).every(([id, { x, y }]) => {
-      const now = sheet.notes[id]
-      return !now || (now.x === x && now.y === y)
+      const present = sheet.notes[id]
+      return !present || (present.x === x && present.y === y)
     })
   )
 }
 
-const samePlace = (one: Place, other: Place): boolean =>
-  one.x === other.x &&
-  one.y === other.y &&
-  (one.width ?? null) === (other.width ?? null) &&
-  (one.height ?? null) === (other.height ?? null) &&
-  (one.flipped ?? false) === (other.flipped ?? false) &&
-  (one.rotation ?? 0) === (other.rotation ?? 0)
+const equalPlaces = (a: Place, b: Place): boolean =>
+  a.x === b.x &&
+  a.y === b.y &&
+  (a.width ?? null) === (b.width ?? null) &&
+  (a.height ?? null) === (b.height ?? null) &&
+  (a.flipped ?? false) === (b.flipped ?? false) &&
+  (a.rotation ?? 0) === (b.rotation ?? 0)

@@ -6,16 +6,16 @@ import { useBranch } from './branching'
 import { useGuides } from './guides'
 
 /** The blocks and notes that a drag duplicates, and their present displacement, px. */
-export const useCopies = create<{ names: readonly string[]; shift: [number, number] }>(() => ({
+export const useDraggedCopies = create<{ names: readonly string[]; shift: [number, number] }>(() => ({
   names: [],
   shift: [0, 0],
 }))
 
-export const noCopies = (): void => useCopies.setState({ names: [] })
+export const clearCopies = (): void => useDraggedCopies.setState({ names: [] })
 
 /** What a drag would create: copies of blocks, or a branch of a line; alignments of dragged blocks. */
 export function DragPreview() {
-  const { names, shift } = useCopies()
+  const { names, shift } = useDraggedCopies()
   const branch = useBranch((s) => s.branch)
   const guides = useGuides((s) => s.guides)
   const blocks = useStudio((s) => s.document!.blocks)
@@ -25,9 +25,9 @@ export function DragPreview() {
     <ViewportPortal>
       {names.map((name) => {
         const block = blocks[name]
-        const at = block?.place ?? notes[name]
-        if (!at) return null
-        const transform = `translate(${at.x + shift[0]}px, ${at.y + shift[1]}px)`
+        const position = block?.place ?? notes[name]
+        if (!position) return null
+        const transform = `translate(${position.x + shift[0]}px, ${position.y + shift[1]}px)`
         return block ? (
           <svg
             key={name}
@@ -46,14 +46,14 @@ export function DragPreview() {
       })}
       {guides.length > 0 && (
         <svg className="guides" width="1" height="1" aria-hidden>
-          {guides.map(({ axis, at, from, to }) => (
-            <path key={axis} d={axis === 'x' ? `M${at} ${from}V${to}` : `M${from} ${at}H${to}`} />
+          {guides.map(({ axis, at: position, from, to }) => (
+            <path key={axis} d={axis === 'x' ? `M${position} ${from}V${to}` : `M${from} ${position}H${to}`} />
           ))}
         </svg>
       )}
       {branch && (
         <svg className="drawn-branch" width="1" height="1" aria-hidden>
-          <path d={svgPath(stepped(branch.from, branch.to))} />
+          <path d={svgPath(rightAnglePath(branch.from, branch.to))} />
           <circle cx={branch.from[0]} cy={branch.from[1]} r="3" />
         </svg>
       )}
@@ -62,7 +62,7 @@ export function DragPreview() {
 }
 
 /** A path at right angles: along the longer distance last. */
-function stepped(
+function rightAnglePath(
   [ax, ay]: readonly [number, number],
   [bx, by]: readonly [number, number],
 ): [number, number][] {

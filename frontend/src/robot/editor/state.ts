@@ -2,7 +2,7 @@ import { create } from 'zustand'
 import { Refusal } from '../../connection'
 import type { ChangeOf, ContentOf, Edit, EventOf } from '../../messages'
 import type { CellColumn, DocumentState, Readings, RobotContent, RobotTables } from '../../protocol'
-import { alteration, ask, line } from '../../store'
+import { alteration, ask, connection } from '../../store'
 
 /** A robot that this page shows or has shown, in the last state sent by the server. */
 export interface OpenRobot extends RobotContent {
@@ -17,7 +17,7 @@ export interface Joints {
   qdd: number[]
 }
 
-interface Desk {
+interface RobotEditorState {
   /** Robots by the keys of their documents. */
   robots: Record<string, OpenRobot>
   /** The key of the robot in the editor; null while a diagram is displayed. */
@@ -33,7 +33,7 @@ interface Desk {
 }
 
 /** The open robots, and the one in the editor. */
-export const useDesk = create<Desk>(() => ({
+export const useRobotEditor = create<RobotEditorState>(() => ({
   robots: {},
   current: null,
   tables: null,
@@ -44,74 +44,76 @@ export const useDesk = create<Desk>(() => ({
   notes: [],
 }))
 
-function put(state: DocumentState, content: RobotContent): void {
-  const { robots, joints } = useDesk.getState()
+function storeRobot(state: DocumentState, content: RobotContent): void {
+  const { robots, joints } = useRobotEditor.getState()
   const robot = { ...content, state }
   const moving = content.links.filter(({ moves }) => moves)
   const before = joints[state.document]
-  const fits = before && before.q.length === moving.length
-  useDesk.setState({
+  const isCompatible = before && before.q.length === moving.length
+  useRobotEditor.setState({
     robots: { ...robots, [state.document]: robot },
-    joints: fits ? joints : { ...joints, [state.document]: atRest(content) },
+    joints: isCompatible ? joints : { ...joints, [state.document]: atRest(content) },
   })
-  if (useDesk.getState().current === state.document) readSoon()
+  if (useRobotEditor.getState().current === state.document) requestReadings()
 }
 
 /** Add a robot that this page shows from now on. */
 export function robotOpened(event: EventOf<'opened'>, content: ContentOf<'robot'>): void {
-  put(event.state, content)
-  if (event.in_front) toFront(event.state.document, event.notes)
+  storeRobot(event.state, content)
+  if (event.in_front) showRobot(event.state.document, event.notes)
 }
 
 /** Update a robot that has changed. */
 export function robotChanged({ state }: EventOf<'changed'>, change: ChangeOf<'robot'>): void {
-  put(state, change.content)
+  storeRobot(state, change.content)
 }
 
 /** Display a robot that this page has loaded. */
-export function toFront(robot: string, notes: string[] = []): void {
-  useDesk.setState({ current: robot, notes, readings: null })
-  if (!useDesk.getState().tables)
-    void ask({ kind: 'robot_tables' }).then((tables) => tables && useDesk.setState({ tables }))
-  readSoon()
+export function showRobot(robot: string, notes: string[] = []): void {
+  useRobotEditor.setState({ current: robot, notes, readings: null })
+  if (!useRobotEditor.getState().tables)
+    void ask({ kind: 'robot_tables' }).then((tables) => tables && useRobotEditor.setState({ tables }))
+  requestReadings()
 }
 
 /** Return to the diagram. */
 export function leaveEditor(): void {
-  useDesk.setState({ current: null, notes: [] })
+  useRobotEditor.setState({ current: null, notes: [] })
 }
 
 /** Close a robot without unsaved edits. */
 export async function closeRobot(robot: string): Promise<void> {
   if ((await ask({ kind: 'close', document: robot })) === undefined) return
-  const { [robot]: _, ...robots } = useDesk.getState().robots
-  useDesk.setState({ robots })
+  const { [robot]: _, ...robots } = useRobotEditor.getState().robots
+  useRobotEditor.setState({ robots })
 }
 
-const PLACE = 'armblocks-robot'
-type Name = Pick<DocumentState, 'document' | 'path' | 'origin'>
+const STORAGE_KEY = 'armblocks-robot'
+type AttachedRobot = Pick<DocumentState, 'document' | 'path' | 'origin'>
 
 /** Store which robot this tab shows, so that a reload shows it again. */
-useDesk.subscribe(({ robots, current }, before) => {
+useRobotEditor.subscribe(({ robots, current }, before) => {
   if (robots === before.robots && current === before.current) return
   const shown = current ? robots[current] : undefined
-  if (!shown) return sessionStorage.removeItem(PLACE)
+  if (!shown) return sessionStorage.removeItem(STORAGE_KEY)
   const { document, path, origin } = shown.state
-  sessionStorage.setItem(PLACE, JSON.stringify({ document, path, origin }))
+  sessionStorage.setItem(STORAGE_KEY, JSON.stringify({ document, path, origin }))
 })
 
 /**
  * After a reconnection or a reload, let the server reopen the robots of this page under the same keys.
  * Returns the key of the robot that the tab showed before a reload.
  */
-export async function attachAgain(): Promise<string | undefined> {
-  const { robots, current } = useDesk.getState()
-  const last = current ? null : (JSON.parse(sessionStorage.getItem(PLACE) ?? 'null') as Name | null)
-  const attach = async ({ document, path, origin }: Name) => {
+export async function reattachRobots(): Promise<string | undefined> {
+  const { robots, current } = useRobotEditor.getState()
+  const last = current
+    ? null
+    : (JSON.parse(sessionStorage.getItem(STORAGE_KEY) ?? 'null') as AttachedRobot | null)
+  const attach = async ({ document, path, origin }: AttachedRobot) => {
     const name = { document, document_kind: 'robot' as const, path, origin }
-    const found = await ask({ kind: 'attach', ...name, in_front: false })
-    if (found === undefined && document === current) leaveEditor()
-    return found
+    const key = await ask({ kind: 'attach', ...name, in_front: false })
+    if (key === undefined && document === current) leaveEditor()
+    return key
   }
   await Promise.all(Object.values(robots).map(({ state }) => attach(state)))
   return last ? attach(last) : undefined
@@ -129,19 +131,19 @@ export function atRest({ links }: RobotContent): Joints {
 }
 
 export function setJoints(change: Partial<Joints>): void {
-  const { current, joints } = useDesk.getState()
+  const { current, joints } = useRobotEditor.getState()
   if (!current || !joints[current]) return
-  useDesk.setState({ joints: { ...joints, [current]: { ...joints[current], ...change } } })
-  readSoon()
+  useRobotEditor.setState({ joints: { ...joints, [current]: { ...joints[current], ...change } } })
+  requestReadings()
 }
 
 /** Apply an edit; returns the refusal if there is one. Refusals are shown at the cell, not as notices. */
 export async function edit(change: Edit, gesture = ''): Promise<Refusal | undefined> {
-  const { current, robots } = useDesk.getState()
+  const { current, robots } = useRobotEditor.getState()
   const robot = current ? robots[current] : undefined
   if (!robot) return undefined
   try {
-    await line.ask({ kind: 'change', ...alteration(robot.state), gesture, edit: change })
+    await connection.ask({ kind: 'change', ...alteration(robot.state), gesture, edit: change })
     return undefined
   } catch (error) {
     if (error instanceof Refusal) return error
@@ -149,35 +151,35 @@ export async function edit(change: Edit, gesture = ''): Promise<Refusal | undefi
   }
 }
 
-let wanted = false
-let under = false
+let outdated = false
+let busy = false
 
 /** Request the read-outs of the present configuration; of several pending requests only the last is sent. */
-function readSoon(): void {
-  wanted = true
-  if (under) return
-  under = true
-  useDesk.setState({ reading: true })
-  void readOn()
+function requestReadings(): void {
+  outdated = true
+  if (busy) return
+  busy = true
+  useRobotEditor.setState({ reading: true })
+  void updateReadings()
 }
 
-async function readOn(): Promise<void> {
-  while (wanted) {
-    wanted = false
-    const { current, joints } = useDesk.getState()
-    const now = current && joints[current]
-    if (!now) break
+async function updateReadings(): Promise<void> {
+  while (outdated) {
+    outdated = false
+    const { current, joints } = useRobotEditor.getState()
+    const configuration = current && joints[current]
+    if (!configuration) break
     try {
-      const readings = await line.ask({ kind: 'readings', document: current, ...now })
-      if (useDesk.getState().current === current) useDesk.setState({ readings })
+      const readings = await connection.ask({ kind: 'readings', document: current, ...configuration })
+      if (useRobotEditor.getState().current === current) useRobotEditor.setState({ readings })
     } catch (error) {
       // The joints have changed meanwhile: another request follows. After an error nothing is shown.
       if (!(error instanceof Refusal)) throw error
-      useDesk.setState({ readings: null })
+      useRobotEditor.setState({ readings: null })
     }
   }
-  under = false
-  useDesk.setState({ reading: false })
+  busy = false
+  useRobotEditor.setState({ reading: false })
 }
 
 // -- display of numbers -------------------------------------------------------------------------------------
@@ -200,37 +202,38 @@ export function unitOf(column: CellColumn, angles: Angles, turns?: boolean): str
   return column.unit
 }
 
-const PARTS = [1, 2, 3, 4, 6, 12]
+const DENOMINATORS = [1, 2, 3, 4, 6, 12]
 
 /** An SI value as the text of its cell. */
 export function cellText(value: number | string | null | undefined, angle: boolean, angles: Angles): string {
   if (value === null || value === undefined) return ''
   if (typeof value === 'string') return value
-  if (!angle) return plain(value)
-  if (angles === 'deg') return plain(Number(((value * 180) / Math.PI).toPrecision(12)))
-  for (const part of PARTS) {
-    const times: number = (value / Math.PI) * part
+  if (!angle) return numberText(value)
+  if (angles === 'deg') return numberText(Number(((value * 180) / Math.PI).toPrecision(12)))
+  for (const denominator of DENOMINATORS) {
+    const numerator: number = (value / Math.PI) * denominator
     if (
-      times !== 0 &&
-      Math.abs(times) <= 24 &&
-      Math.abs(times - Math.round(times)) < 1e-12 &&
-      value === (Math.round(times) * Math.PI) / part
+      numerator !== 0 &&
+      Math.abs(numerator) <= 24 &&
+      Math.abs(numerator - Math.round(numerator)) < 1e-12 &&
+      value === (Math.round(numerator) * Math.PI) / denominator
     ) {
-      const top = Math.abs(Math.round(times)) === 1 ? 'pi' : `${Math.abs(Math.round(times))}*pi`
-      return `${times < 0 ? '-' : ''}${top}${part === 1 ? '' : `/${part}`}`
+      const numeratorText =
+        Math.abs(Math.round(numerator)) === 1 ? 'pi' : `${Math.abs(Math.round(numerator))}*pi`
+      return `${numerator < 0 ? '-' : ''}${numeratorText}${denominator === 1 ? '' : `/${denominator}`}`
     }
   }
-  return plain(value)
+  return numberText(value)
 }
 
-function plain(value: number): string {
+function numberText(value: number): string {
   return String(Object.is(value, -0) ? 0 : value).replace('e+', 'e')
 }
 
 /** A read-out rounded to a readable number of digits. */
 export function shortNumber(value: number, digits = 4): string {
-  const size = Math.abs(value)
-  if (size < 0.5 * 10 ** -digits) return (0).toFixed(Math.min(digits, 3))
-  if (size >= 1e5) return value.toExponential(2)
-  return value.toFixed(Math.max(0, Math.min(digits, digits - Math.floor(Math.log10(Math.max(size, 1))))))
+  const magnitude = Math.abs(value)
+  if (magnitude < 0.5 * 10 ** -digits) return (0).toFixed(Math.min(digits, 3))
+  if (magnitude >= 1e5) return value.toExponential(2)
+  return value.toFixed(Math.max(0, Math.min(digits, digits - Math.floor(Math.log10(Math.max(magnitude, 1))))))
 }

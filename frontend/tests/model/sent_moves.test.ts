@@ -1,5 +1,5 @@
 import { expect, test } from 'vitest'
-import { outstanding, withMoves, type SentMove } from '../../src/model/ahead'
+import { outstanding, withMoves, type SentMove } from '../../src/model/sent_moves'
 import type { SheetBlock } from '../../src/protocol'
 
 const block = (x: number) => ({ name: 'a', place: { x, y: 0 } }) as SheetBlock
@@ -42,8 +42,8 @@ test('moves of other sheets and documents, and of removed blocks, leave the shee
   ]
   expect(withMoves(state, elsewhere)).toBe(state)
   expect(outstanding(elsewhere, state)).toEqual(elsewhere)
-  const gone = { ...move(3, 9), places: { removed: { x: 1, y: 1 } } }
-  expect(withMoves(state, [gone]).blocks).toEqual(state.blocks)
+  const removed = { ...move(3, 9), places: { removed: { x: 1, y: 1 } } }
+  expect(withMoves(state, [removed]).blocks).toEqual(state.blocks)
 })
 
 test('a note moves with the blocks', () => {

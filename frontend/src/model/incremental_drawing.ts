@@ -1,4 +1,4 @@
-import type { Drawn } from './trace'
+import type { PlotColumns } from './trace'
 
 /** Line style of a trace: colour for the canvas, and width and dashes in CSS px. */
 export interface Stroke {
@@ -10,7 +10,7 @@ export interface Stroke {
  * A plot that is already drawn: its canvas, the area of the lines on it, and the mapping from values to
  * device px.
  */
-export interface Surface {
+export interface DrawnPlot {
   ctx: CanvasRenderingContext2D
   bbox: { left: number; top: number; width: number; height: number }
   valToPos: (value: number, scale: string, onCanvas: boolean) => number
@@ -22,31 +22,31 @@ const WIDTH = 1.5
  * Draws the new samples of a run onto an existing plot, so that a frame costs only its new samples. The
  * lines equal those of uPlot, which redraws the whole plot when anything else changes.
  */
-export class Growing {
+export class IncrementalDrawing {
   /** For each trace the last drawn row, and the phase of its dashes (px). */
-  private rows: number[] = []
-  private lengths: number[] = []
+  private lastRows: number[] = []
+  private dashOffsets: number[] = []
 
   constructor(
-    private readonly plot: Surface,
+    private readonly plot: DrawnPlot,
     private strokes: readonly Stroke[],
   ) {}
 
   /** Change the dashes of the traces, before a complete redraw. */
-  dashed(dashes: readonly number[][]): void {
+  setDashes(dashes: readonly number[][]): void {
     this.strokes = this.strokes.map((stroke, k) => ({ ...stroke, dash: dashes[k] ?? stroke.dash }))
   }
 
   /** Set the state after a complete redraw. */
-  shows([, ...columns]: Drawn, ends: number[]): void {
-    this.rows = columns.map((column, k) => lastBefore(column, ends[k]!))
-    this.lengths = columns.map(() => 0)
+  reset([, ...columns]: PlotColumns, ends: number[]): void {
+    this.lastRows = columns.map((column, k) => lastBefore(column, ends[k]!))
+    this.dashOffsets = columns.map(() => 0)
   }
 
   /**
    * Draw the new rows; from the rows `ends` on, values may still change. `ratio` is device px per CSS px.
    */
-  grow([time, ...columns]: Drawn, factor: number, ends: number[], ratio: number): void {
+  append([time, ...columns]: PlotColumns, factor: number, ends: number[], ratio: number): void {
     const { ctx, bbox } = this.plot
     ctx.save()
     ctx.beginPath()
@@ -55,14 +55,14 @@ export class Growing {
     ctx.lineWidth = WIDTH * ratio
     ctx.lineJoin = 'round'
     columns.forEach((column, k) => {
-      const from = this.rows[k]!
+      const from = this.lastRows[k]!
       const to = lastBefore(column, ends[k]!)
       if (to <= from) return
-      this.rows[k] = to
+      this.lastRows[k] = to
       const { colour, dash } = this.strokes[k]!
       ctx.strokeStyle = colour
       ctx.setLineDash(dash)
-      ctx.lineDashOffset = this.lengths[k]!
+      ctx.lineDashOffset = this.dashOffsets[k]!
       ctx.beginPath()
       let [lastX, lastY] = [NaN, NaN]
       for (let row = Math.max(from, 0); row <= to; row++) {
@@ -73,7 +73,7 @@ export class Growing {
         if (Number.isNaN(lastX)) ctx.moveTo(x, y)
         else {
           ctx.lineTo(x, y)
-          if (dash.length) this.lengths[k]! += Math.hypot(x - lastX, y - lastY)
+          if (dash.length) this.dashOffsets[k]! += Math.hypot(x - lastX, y - lastY)
         }
         lastX = x
         lastY = y
@@ -85,7 +85,7 @@ export class Growing {
 }
 
 /** The last row before `end` with a value; -1 if there is none. */
-function lastBefore(column: Drawn[number], end: number): number {
+function lastBefore(column: PlotColumns[number], end: number): number {
   let row = Math.min(end, column.length) - 1
   while (row >= 0 && typeof column[row] !== 'number') row--
   return row
