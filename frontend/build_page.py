@@ -40,34 +40,34 @@ def needed() -> bool:
 
 def digest() -> str:
     """A hash of all sources of the page."""
-    found = hashlib.sha256()
+    hasher = hashlib.sha256()
     for name in SOURCES:
         top = FRONTEND / name
         for path in sorted(top.rglob("*")) if top.is_dir() else [top]:
             if path.is_file():
-                found.update(
+                hasher.update(
                     path.relative_to(FRONTEND).as_posix().encode() + b"\0" + path.read_bytes() + b"\0"
                 )
-    return found.hexdigest()
+    return hasher.hexdigest()
 
 
 def build() -> None:
     """Install the libraries of the lock file if they are missing or outdated, and build the page."""
     npm = npm_command()
-    lock, held = FRONTEND / "package-lock.json", FRONTEND / "node_modules" / ".armblocks-lock"
-    wanted = hashlib.sha256(lock.read_bytes()).hexdigest()
-    if not held.is_file() or held.read_text(encoding="utf-8") != wanted:
+    lock, installed = FRONTEND / "package-lock.json", FRONTEND / "node_modules" / ".armblocks-lock"
+    lock_digest = hashlib.sha256(lock.read_bytes()).hexdigest()
+    if not installed.is_file() or installed.read_text(encoding="utf-8") != lock_digest:
         _call("download the libraries of the page", [*npm, "ci", "--no-audit", "--no-fund"])
-        held.write_text(wanted, encoding="utf-8")
+        installed.write_text(lock_digest, encoding="utf-8")
     _call("build the page", [*npm, "run", "build"])
     write_notices(WEB)
     STAMP.write_text(digest(), encoding="utf-8")
 
 
-def _call(what: str, command: list[str]) -> None:
+def _call(title: str, command: list[str]) -> None:
     """Run a step; its title goes to standard error, its output only if it fails."""
     start = time.monotonic()
-    print(f"   {what} …", end="", flush=True, file=sys.stderr)
+    print(f"   {title} …", end="", flush=True, file=sys.stderr)
     done = subprocess.run(
         command,
         cwd=FRONTEND,

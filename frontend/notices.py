@@ -42,27 +42,29 @@ def write_notices(web: Path) -> None:
 
 def notices(packages: Iterable[Package]) -> str:
     """The file of notices: each package once, after a horizontal rule."""
-    once = {(package.name, package.version): package for package in packages}
+    unique = {(package.name, package.version): package for package in packages}
     rule = "-" * 80
     parts = [
         f"{rule}\n{name} {version} ({package.licence})\n{rule}\n\n{package.text.strip()}\n"
-        for (name, version), package in sorted(once.items())
+        for (name, version), package in sorted(unique.items())
     ]
     return "\n".join([HEAD, *parts])
 
 
 def package(folder: str, root: Path = FRONTEND) -> Package:
     """The package of a folder of ``node_modules``; exits with a message if its licence text is missing."""
-    described = json.loads((root / folder / "package.json").read_text(encoding="utf-8"))
-    name = described["name"]
-    own = LICENCES / f"{name.replace('/', '-')}.txt"
-    found = sorted(path for path in (root / folder).iterdir() if path.name.lower().startswith(LICENCE_FILES))
-    texts = [path.read_text(encoding="utf-8") for path in found if path.is_file()] or [
-        path.read_text(encoding="utf-8") for path in (own,) if path.is_file()
+    manifest = json.loads((root / folder / "package.json").read_text(encoding="utf-8"))
+    name = manifest["name"]
+    stored_text = LICENCES / f"{name.replace('/', '-')}.txt"
+    licence_files = sorted(
+        path for path in (root / folder).iterdir() if path.name.lower().startswith(LICENCE_FILES)
+    )
+    texts = [path.read_text(encoding="utf-8") for path in licence_files if path.is_file()] or [
+        path.read_text(encoding="utf-8") for path in (stored_text,) if path.is_file()
     ]
     if not texts:
         raise SystemExit(
             f"the package {name} is part of the page of the studio and has no licence text:\n"
-            f"copy the text from its repository to {own}"
+            f"copy the text from its repository to {stored_text}"
         )
-    return Package(name, described["version"], described.get("license", "see below"), "\n\n".join(texts))
+    return Package(name, manifest["version"], manifest.get("license", "see below"), "\n\n".join(texts))
