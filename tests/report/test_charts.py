@@ -90,6 +90,21 @@ def test_a_limit_is_drawn_when_near_and_highlighted_when_exceeded() -> None:
     assert any("over limit" in mark.text for mark in text_marks(broken))
 
 
+@pytest.mark.parametrize("limits", [(0.1, 1.0), (-2.0, -0.5), (0.0, 1.0), (-1.0, 0.0), (-3.0, 2.0)])
+def test_the_label_and_the_line_agree_on_a_limit_of_any_sign(limits: tuple[float, float]) -> None:
+    low, high = limits
+    for reached, beyond in (
+        ((low, high), False),
+        ((low - 1e-12, high + 1e-12), False),
+        ((low - 0.01, high), True),
+        ((low, high + 0.01), True),
+    ):
+        picture = chart(np.linspace(*reached, 50)[:, None], limits)
+        red = any(isinstance(mark, Polyline) and mark.stroke is Tone.ERROR for mark in picture.marks)
+        labelled = any("over limit" in mark.text for mark in text_marks(picture))
+        assert (red, labelled) == (beyond, beyond), reached
+
+
 def test_nan_values_leave_a_gap_in_the_line() -> None:
     values = np.ones((100, 1))
     values[40:60] = np.nan

@@ -122,10 +122,12 @@ def test_warnings_have_joint_time_and_value_in_display_units() -> None:
 
 
 def test_warnings_of_a_prismatic_joint_are_in_metres() -> None:
-    joint = Prismatic(limits=JointLimits(position=(0.0, 1.0)))
+    joint = Prismatic(limits=JointLimits(position=(0.0, 1.0), torque=10.0))
     robot = Robot(name="slide", links=(Link(name="z", joint=joint, mass=1.0),))
-    (finding,) = limit_findings(robot, np.array([0.0, 1.0]), np.array([[0.0], [1.25]]))
-    assert "(0 … 1 m)" in finding.text and "1.25 m" in finding.text
+    time, q, tau = np.array([0.0, 1.0]), np.array([[0.0], [1.25]]), np.array([[0.0], [12.0]])
+    out_of_range, too_strong = limit_findings(robot, time, q, tau=tau)
+    assert "(0 … 1 m)" in out_of_range.text and "1.25 m" in out_of_range.text
+    assert "needs more force than allowed (at most 10 N)" in too_strong.text
 
 
 def test_additional_interpolated_rows_change_no_average() -> None:

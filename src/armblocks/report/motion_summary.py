@@ -238,7 +238,7 @@ def _exceeded(
     verb = {
         LimitKind.POSITION: "leaves its range",
         LimitKind.SPEED: "is faster than allowed",
-        LimitKind.TORQUE: "needs more torque than allowed",
+        LimitKind.TORQUE: f"needs more {'torque' if unit == 'rad' else 'force'} than allowed",
     }[kind]
     allowed = (
         f"{table_number(low * convert)} … {table_number(high * convert)}"

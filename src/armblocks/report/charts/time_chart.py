@@ -166,7 +166,8 @@ def _beyond(trace: Trace, values: _Array) -> NDArray[np.bool_]:
     if trace.limits is None:
         return np.zeros(len(values), dtype=np.bool_)
     low, high = trace.limits
-    return (values > high + 1e-9 * abs(high)) | (values < low - 1e-9 * abs(low))
+    slack = 1e-9 * max(abs(low), abs(high))
+    return (values > high + slack) | (values < low - slack)
 
 
 def _end_labels(panel: Panel, up: Scale, right: float) -> list[Mark]:
@@ -182,12 +183,8 @@ def _end_labels(panel: Panel, up: Scale, right: float) -> list[Mark]:
     for k, y in zip(order, positions):
         trace = panel.traces[k]
         tone, dash = trace_tone(trace.index), trace_dash(trace.index)
-        broken = trace.limits is not None and bool(
-            np.any(
-                (trace.values > trace.limits[1] * (1 + 1e-9)) | (trace.values < trace.limits[0] * (1 + 1e-9))
-            )
-        )
-        label = trace.label + (" over limit" if broken else "")
+        exceeds = bool(_beyond(trace, trace.values).any())
+        label = trace.label + (" over limit" if exceeds else "")
         marks.append(
             Polyline(
                 [(right + 3, preferred[k]), (right + 10, y), (right + 24, y)],
@@ -202,8 +199,8 @@ def _end_labels(panel: Panel, up: Scale, right: float) -> list[Mark]:
                 y + 3.8,
                 shorten(label, SMALL_SIZE, _LABEL_ROOM - 31),
                 SMALL_SIZE,
-                Tone.ERROR if broken else Tone.INK,
-                bold=broken,
+                Tone.ERROR if exceeds else Tone.INK,
+                bold=exceeds,
             )
         )
     return marks
