@@ -18,6 +18,7 @@ from armblocks.blocks import (
     PulseGenerator,
     Ramp,
     SineWave,
+    Sqrt,
     Sum,
     UnitDelay,
     ZeroOrderHold,
@@ -145,6 +146,15 @@ def test_a_loop_through_an_extrapolating_hold_is_solved_at_each_sample_time(run:
 def test_a_loop_through_an_extrapolating_hold_with_a_gain_above_1_is_refused() -> None:
     with pytest.raises(ArmblocksError, match=r"is inf at 0\.25 s"):
         native("rk45")(loop_through_a_hold(-2.0), 1.0)
+
+
+@pytest.mark.parametrize("block", [FirstOrderHold(period=0.2), PWM(period=0.2)])
+def test_a_sample_that_is_not_a_number_is_an_error_of_the_block_that_causes_it(block: Block) -> None:
+    builder = DiagramBuilder("d")
+    root = builder.add("root", Sqrt(), builder.add("falling", Ramp(slope=-1.0, initial=0.5)))
+    builder.add("block", block, root)
+    with pytest.raises(ArmblocksError, match="'root/y' is nan"):
+        native("rk45")(builder.build(), 1.0)
 
 
 def loop_through_a_hold(gain: float) -> Diagram:

@@ -6,7 +6,7 @@ ticks and events at t_k: as long as the input differs from the sample at that in
 
 from __future__ import annotations
 
-from casadi import SX, fabs, fmax, if_else, logic_and, logic_not, logic_or, mmax, mmin, vertcat
+from casadi import SX, fabs, fmax, if_else, logic_and, logic_or, mmax, mmin, vertcat
 
 from armblocks.blocks.switching import since
 from armblocks.diagram import (
@@ -49,8 +49,9 @@ def sampling_guards(t: SX, x: Signals, p: Signals, value: SX, sample: SX) -> Sig
 
     The two entries of the second guard alternate, because an entry that has fired needs the other sign first.
     """
-    close = fabs(value - sample) <= SAME_VALUE * fmax(fabs(value), fabs(sample))
-    differs = logic_and(_just_sampled(t, x, p), mmax(logic_not(close)))
+    # False for NaN, which no repetition changes: the run then ends with an error at the block that causes it.
+    apart = fabs(value - sample) > SAME_VALUE * fmax(fabs(value), fabs(sample))
+    differs = logic_and(_just_sampled(t, x, p), mmax(apart))
     values = [if_else(logic_and(differs, x["odd"] == turn), -1.0, 1.0) for turn in (0.0, 1.0)]
     return {"instant": since(t, sample_time(p, x["count"])), "again": vertcat(*values)}
 
