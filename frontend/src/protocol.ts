@@ -854,7 +854,7 @@ export interface SheetBlock {
   inputs: SheetPort[];
   outputs: SheetPort[];
   opens: boolean;
-  name_at: "below" | "above" | "left" | "right" | "corner" | "hidden";
+  shown_name_side: "below" | "above" | "left" | "right" | "corner" | "hidden";
   parameters: {
     [k: string]: unknown;
   };

@@ -1,4 +1,5 @@
 import type { Request } from './messages'
+import { storedData } from './stored_data'
 
 const STORAGE_KEY = 'armblocks-unsent'
 
@@ -18,5 +19,5 @@ export function storeUnsent(requests: Iterable<Request>): void {
 
 /** The stored requests from before the reload of this tab. */
 export function unsent(): Request[] {
-  return JSON.parse(sessionStorage.getItem(STORAGE_KEY) ?? '[]') as Request[]
+  return storedData<Request[]>(sessionStorage, STORAGE_KEY) ?? []
 }

@@ -64,7 +64,7 @@ def test_stability_function_has_the_order_of_the_exponential(tableau: Rosenbrock
 
 
 def test_the_textbook_form_of_implicit_euler_gives_its_tableau() -> None:
-    made = RosenbrockTableau(
+    tableau = RosenbrockTableau(
         name="euler",
         title="",
         source="",
@@ -72,4 +72,4 @@ def test_the_textbook_form_of_implicit_euler_gives_its_tableau() -> None:
         dense_order=1,
         **from_textbook(alpha=((),), gamma=((1.0,),), b=(1.0,), dense=((1.0,),)),  # pyright: ignore
     )
-    assert made.content == IMPLICIT_EULER.content
+    assert tableau.content == IMPLICIT_EULER.content

@@ -263,6 +263,21 @@ def open_studio(browser: Browser, studio: Studio) -> Iterator[Callable[[str], Pa
         yield opened
 
 
+@pytest.fixture(scope="module")
+def shared(open_studio: Callable[[str], Page]) -> Page:
+    """A page with an example, for all tests of a file."""
+    return open_studio("van_der_pol_pid")
+
+
+@pytest.fixture
+def sheet(shared: Page) -> Page:
+    """The shared page with a fresh copy of the example."""
+    from building import open_fresh_example
+
+    open_fresh_example(shared)
+    return shared
+
+
 @pytest.hookimpl(trylast=True)  # after the fixtures of an interrupted run
 def pytest_sessionfinish() -> None:
     """Close the browser when the tests end for any reason."""

@@ -111,7 +111,7 @@ function Name({ block }: { block: SheetBlock }) {
   if (!editing)
     return (
       <div
-        className={`name ${block.name_at}${nameWidth(block.name) < MAX_NAME_WIDTH ? '' : ' long'}`}
+        className={`name ${block.shown_name_side}${nameWidth(block.name) < MAX_NAME_WIDTH ? '' : ' long'}`}
         onDoubleClick={(event) => {
           event.stopPropagation()
           rename(block.name)
@@ -122,7 +122,7 @@ function Name({ block }: { block: SheetBlock }) {
     )
   return (
     <input
-      className={`name nodrag ${block.name_at}`}
+      className={`name nodrag ${block.shown_name_side}`}
       aria-label={`Name of ${block.name}`}
       autoFocus
       defaultValue={block.name}

@@ -40,8 +40,8 @@ export function nameWidth(name: string): number {
 }
 
 /** The area of a block's name, if it is visible. */
-export function nameArea({ name, name_at: at, place: { x, y }, width, height }: SheetBlock): Rectangle[] {
-  if (at === 'hidden') return []
+export function nameArea({ name, shown_name_side: side, place: { x, y }, width, height }: SheetBlock): Rectangle[] {
+  if (side === 'hidden') return []
   const wide = nameWidth(name)
   const middle = { x: x + (width - wide) / 2, y: y + height / 2 - 7 }
   const corner = {
@@ -50,7 +50,7 @@ export function nameArea({ name, name_at: at, place: { x, y }, width, height }: 
     left: { x: x - 5 - wide, y: middle.y },
     right: { x: x + width + 5, y: middle.y },
     corner: { x: x + 0.78 * width, y: y - 15 },
-  }[at]
+  }[side]
   return [{ ...corner, width: wide, height: 14 }]
 }
 

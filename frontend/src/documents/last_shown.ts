@@ -1,4 +1,5 @@
 import type { DocumentState } from '../protocol'
+import { storedData } from '../stored_data'
 
 /** The last document of a tab, which is shown again after a reload. */
 interface ShownDocument {
@@ -20,8 +21,6 @@ export function storeShown({ document, path, origin }: DocumentState, inside: st
 
 /** The last document of this tab, unless its address has changed since. */
 export function lastShown(): ShownDocument | undefined {
-  const stored = sessionStorage.getItem(STORAGE_KEY)
-  if (!stored) return undefined
-  const { address, shown } = JSON.parse(stored) as { address: string; shown: ShownDocument }
-  return location.hash === address ? shown : undefined
+  const stored = storedData<{ address: string; shown: ShownDocument }>(sessionStorage, STORAGE_KEY)
+  return stored && location.hash === stored.address ? stored.shown : undefined
 }

@@ -1,4 +1,5 @@
 import { create } from 'zustand'
+import { storedData } from '../stored_data'
 
 /** The displayed items in addition to the bodies. */
 export interface ViewOptions {
@@ -20,16 +21,11 @@ const DEFAULTS: ViewOptions = {
   follow: false,
 }
 
-function storedOptions(): Partial<ViewOptions> {
-  try {
-    return JSON.parse(localStorage.getItem(STORAGE_KEY) ?? '{}') as Partial<ViewOptions>
-  } catch {
-    return {}
-  }
-}
-
 /** Display options of arms, shared by all views and stored. */
-export const useViewOptions = create<ViewOptions>(() => ({ ...DEFAULTS, ...storedOptions() }))
+export const useViewOptions = create<ViewOptions>(() => ({
+  ...DEFAULTS,
+  ...storedData<Partial<ViewOptions>>(localStorage, STORAGE_KEY),
+}))
 
 export function toggle(option: keyof ViewOptions): void {
   useViewOptions.setState((now) => ({ [option]: !now[option] }))

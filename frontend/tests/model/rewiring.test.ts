@@ -33,7 +33,7 @@ function block(name: string, inputs = ['u'], outputs = ['y']): SheetBlock {
     inputs: inputs.map((input, k) => port(input, 0, 20 + 10 * k)),
     outputs: outputs.map((output, k) => port(output, 60, 20 + 10 * k)),
     opens: false,
-    name_at: 'below',
+    shown_name_side: 'below',
     parameters: {},
     formulas: {},
     mask: [],

@@ -8,7 +8,6 @@ to standard error.
 from __future__ import annotations
 
 import os
-import sys
 import warnings
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -109,8 +108,3 @@ def tidy_warnings(console: Console) -> Generator[None]:
         warnings.simplefilter("always", ArmblocksWarning)
         warnings.showwarning = show
         yield
-
-
-def is_interactive(stream: TextIO = sys.stderr) -> bool:
-    """Whether the output is interactive; if not, progress is printed as plain lines."""
-    return stream.isatty()

@@ -52,6 +52,8 @@ class Placement:
     colour: str = "none"
 
     def __post_init__(self) -> None:
+        if self.rotation in ROTATIONS and self.name_side in NAME_SIDES and self.colour in BLOCK_COLOURS:
+            return  # placements are made for every block at every edit
         for name, allowed in _APPEARANCE.items():
             value = getattr(self, name)
             if value not in allowed:

@@ -43,6 +43,21 @@ def folded(name: str) -> str:
     return unicodedata.normalize("NFC", unicodedata.normalize("NFKD", name).casefold())
 
 
+class FreeNames:
+    """The names that no block and no signal of a sheet has yet."""
+
+    def __init__(self, used_names: Iterable[str]) -> None:
+        self._used = {folded(name) for name in used_names}
+
+    def take(self, name: str) -> str:
+        """Return the name, with a number where it is used already; it is used from now on."""
+        free, number = name, 2
+        while folded(free) in self._used:
+            free, number = f"{name} {number}", number + 1
+        self._used.add(folded(free))
+        return free
+
+
 def check_signal_names(blocks: Iterable[str], names: Mapping[PortRef, str], where: str) -> None:
     """Raise ``DiagramError`` for a name that another signal or a block of the sheet has, or that data files
     do not allow: columns of a vector are named ``signal[0]``.

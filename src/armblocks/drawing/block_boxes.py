@@ -46,6 +46,9 @@ class Box:
     rotation: int = 0
     """Degrees clockwise."""
     name_side: str = "auto"
+    """The chosen side of the name."""
+    shown_name_side: str = "below"
+    """The side where the name is drawn, see :func:`with_inputs`."""
     colour: str = "none"
     inputs: tuple[BoxPort, ...] = ()
     outputs: tuple[BoxPort, ...] = ()
@@ -59,30 +62,6 @@ class Box:
     def name_width(self) -> float:
         """Maximum width of the block's name, px."""
         return min(text_width(self.name, NAME_SIZE), 168.0)
-
-    @property
-    def shown_name_side(self) -> str:
-        """The side of the name: below, above, left, right, hidden, or ``corner``, the upper right one of a
-        block with wires from above and below.
-
-        A side with ports has no name, because its wires would cross it.
-        """
-        ports = self._sides_with_ports()
-        if self.name_side != "auto" and self.name_side not in ports:
-            return self.name_side
-        if not self.upright:
-            return "right"
-        return "corner" if "below" in ports else "below"
-
-    def _sides_with_ports(self) -> set[str]:
-        ports = (*self.inputs, *self.outputs)
-        edges = {
-            "left": any(port.x <= self.x for port in ports),
-            "right": any(port.x >= self.x + self.width for port in ports),
-            "above": any(port.y <= self.y for port in ports),
-            "below": any(port.y >= self.y + self.height for port in ports),
-        }
-        return {side for side, has_ports in edges.items() if has_ports}
 
     def at(self, x: float, y: float) -> Box:
         """The box at another position."""
@@ -161,6 +140,32 @@ def flipped_box(box: Box) -> Box:
     return _with_ports(replace(box, flipped=True))
 
 
+def with_inputs(box: Box, inputs: Sequence[BoxPort]) -> Box:
+    """The box with other input ports, and with its name on a side without ports, where wires do not cross it.
+
+    The side is below, above, left, right, hidden, or ``corner``, the upper right one of a block with wires
+    from above and below.
+    """
+    own = replace(box, inputs=tuple(inputs))
+    return replace(own, shown_name_side=_free_name_side(own))
+
+
+def _free_name_side(box: Box) -> str:
+    ports = (*box.inputs, *box.outputs)
+    has_ports = {
+        "left": any(port.x <= box.x for port in ports),
+        "right": any(port.x >= box.x + box.width for port in ports),
+        "above": any(port.y <= box.y for port in ports),
+        "below": any(port.y >= box.y + box.height for port in ports),
+        "auto": True,
+    }
+    if not has_ports.get(box.name_side):
+        return box.name_side
+    if not box.upright:
+        return "right"
+    return "corner" if has_ports["below"] else "below"
+
+
 def _with_ports(box: Box) -> Box:
     """The box with its ports, which are rotated with the block."""
     width, height = (box.width, box.height) if box.upright else (box.height, box.width)
@@ -170,7 +175,7 @@ def _with_ports(box: Box) -> Box:
         inputs = tuple(_rotated_by_90(port, height) for port in inputs)
         outputs = tuple(_rotated_by_90(port, height) for port in outputs)
         width, height = height, width
-    return replace(box, x=0.0, y=0.0, inputs=inputs, outputs=outputs).at(box.x, box.y)
+    return with_inputs(replace(box, x=0.0, y=0.0, outputs=outputs), inputs).at(box.x, box.y)
 
 
 def _rotated_by_90(port: BoxPort, height: float) -> BoxPort:

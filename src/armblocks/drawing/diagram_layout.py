@@ -9,7 +9,7 @@ from typing import TypeAlias
 from armblocks.diagram import Block, Diagram, Inport, Outport, Placement
 from armblocks.diagram.signs import Outline
 from armblocks.drawing.arrangement import arranged_boxes
-from armblocks.drawing.block_boxes import Box, BoxPort, sized_box, standing_box
+from armblocks.drawing.block_boxes import Box, BoxPort, sized_box, standing_box, with_inputs
 from armblocks.drawing.block_faces import face_size
 
 SumSides: TypeAlias = tuple[str, str, str]
@@ -85,7 +85,7 @@ def turned_sum(box: Box, sides: SumSides) -> Box:
         above: BoxPort(above, x, box.y, 0, 1),
         below: BoxPort(below, x, box.y + box.height, 0, -1),
     }
-    return replace(box, inputs=tuple(ports[port.name] for port in box.inputs))
+    return with_inputs(box, [ports[port.name] for port in box.inputs])
 
 
 def sum_sides(diagram: Diagram) -> Mapping[str, SumSides]:

@@ -37,7 +37,7 @@ def name_position(
     if not flat:
         (ax, ay), (_, by) = segments[0]
         return ax + _GAP, (ay + by) / 2 + 0.36 * NAME_SIZE, "start"
-    areas = [area for obstacle in obstacles for area in _areas(obstacle)]
+    areas = [area for obstacle in obstacles for area in obstacle.areas]
     half = text_width(name, NAME_SIZE) / 2
     candidates = [
         ((a[0] + b[0]) / 2, y) for a, b in flat for y in (a[1] - _GAP, a[1] + _GAP + 0.8 * NAME_SIZE)
@@ -52,14 +52,6 @@ def name_position(
     )
     x, y = next(free, candidates[0])
     return x, y, "middle"
-
-
-def _areas(obstacle: Obstacle) -> tuple[tuple[float, float, float, float], ...]:
-    x, y, width, height = obstacle.label
-    return (
-        (obstacle.x, obstacle.y, obstacle.x + obstacle.width, obstacle.y + obstacle.height),
-        (x, y, x + width, y + height),
-    )
 
 
 def _length(one: Point, other: Point) -> float:

@@ -143,13 +143,7 @@ def _level(target: WireEnd, source: WireEnd) -> WireEnd:
 
 def _sides(obstacles: Iterable[Obstacle]) -> list[tuple[float, ...]]:
     """Left, top, right and bottom of each block and of its name."""
-    return [
-        (
-            *(o.x, o.y, o.x + o.width, o.y + o.height),
-            *(o.label[0], o.label[1], o.label[0] + o.label[2], o.label[1] + o.label[3]),
-        )
-        for o in obstacles
-    ]
+    return [block + label for block, label in (obstacle.areas for obstacle in obstacles)]
 
 
 def _ends(net: Net) -> Floats:

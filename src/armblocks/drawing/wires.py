@@ -7,6 +7,9 @@ from dataclasses import dataclass
 
 from armblocks.drawing.wire_search import Point
 
+Area = tuple[float, float, float, float]
+"""Left, upper, right and lower edge of a rectangle, px."""
+
 
 @dataclass(frozen=True)
 class Obstacle:
@@ -17,6 +20,15 @@ class Obstacle:
     width: float
     height: float
     label: tuple[float, float, float, float]
+
+    @property
+    def areas(self) -> tuple[Area, Area]:
+        """The areas of the block and of its name."""
+        x, y, width, height = self.label
+        return (
+            (self.x, self.y, self.x + self.width, self.y + self.height),
+            (x, y, x + width, y + height),
+        )
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from armblocks.formats.json_document import Node, closed_members
 
 _TEXTS = ("doc", "unit")
 _BOUNDS = ("minimum", "above", "maximum")
-_SAID = (*_TEXTS, *_BOUNDS, "choices", "dimensions")
-_KEYS = ("name", "kind", "default", *_SAID)
+_OPTIONS = (*_TEXTS, *_BOUNDS, "choices", "dimensions")
+_KEYS = ("name", "kind", "default", *_OPTIONS)
 _PLAIN = Parameter(name="", kind=ParameterKind.NUMBER, doc="", default=0.0)
 """A parameter with only the required fields; the others have their defaults."""
 
@@ -24,8 +24,8 @@ ReadValue = Callable[[Parameter, Node], object]
 
 def mask_parameter_to(rule: Parameter, write: WriteValue) -> dict[str, object]:
     """A parameter as plain values, without fields that have their defaults."""
-    message = {key: value for key in _SAID if (value := getattr(rule, key)) != getattr(_PLAIN, key)}
-    return {"name": rule.name, "kind": rule.kind.value, "default": write(rule, rule.default), **message}
+    options = {key: value for key in _OPTIONS if (value := getattr(rule, key)) != getattr(_PLAIN, key)}
+    return {"name": rule.name, "kind": rule.kind.value, "default": write(rule, rule.default), **options}
 
 
 def mask_parameter_from(node: Node, read: ReadValue) -> Parameter:

@@ -288,8 +288,8 @@ class Parser:
             self.in_matrix, self.depth = outer, self.depth - 1
             return value
         if self.at_operator("["):
-            rows, broken = self._rows("[", "]")
-            return Matrix(rows, broken, token.at)
+            rows, line_breaks = self._rows("[", "]")
+            return Matrix(rows, line_breaks, token.at)
         if self.at_operator("{"):
             rows, _ = self._rows("{", "}")
             if len(rows) > 1 and any(len(row) != 1 for row in rows):

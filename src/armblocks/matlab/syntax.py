@@ -53,10 +53,10 @@ class All:
 
 @dataclass(frozen=True, slots=True)
 class Matrix:
-    """``[a b; c d]``; ``broken`` where only newlines separate rows, without ``;``."""
+    """``[a b; c d]``; ``line_breaks``: only newlines separate rows, without ``;``."""
 
     rows: tuple[tuple[Expression, ...], ...]
-    broken: bool
+    line_breaks: bool
     at: Position
 
 

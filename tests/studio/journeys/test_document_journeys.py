@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 
 import pytest
 from building import add, block, new_diagram, wait_until
@@ -11,11 +10,6 @@ from document_files import edit_from_outside, names, save_as
 from playwright.sync_api import Page, WebSocketRoute, expect
 
 from conftest import Studio
-
-
-@pytest.fixture(scope="module")
-def shared(open_studio: Callable[[str], Page]) -> Page:
-    return open_studio("van_der_pol_pid")
 
 
 @pytest.fixture

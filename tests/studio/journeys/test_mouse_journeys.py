@@ -3,24 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 
-import pytest
 from accessibility import axe
-from building import block, copied_names, edge, middle, open_fresh_example, run, select_block, wait_until
+from building import block, copied_names, edge, middle, run, select_block, wait_until
 from playwright.sync_api import Locator, Page, expect
-
-
-@pytest.fixture(scope="module")
-def shared(open_studio: Callable[[str], Page]) -> Page:
-    return open_studio("van_der_pol_pid")
-
-
-@pytest.fixture
-def sheet(shared: Page) -> Page:
-    """The page shared by this file, with a fresh copy of an example."""
-    open_fresh_example(shared)
-    return shared
 
 
 def entry(page: Page, name: str) -> Locator:

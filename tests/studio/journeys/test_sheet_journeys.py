@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -14,7 +13,6 @@ from building import (
     copied_names,
     edge,
     middle,
-    open_fresh_example,
     run,
     select_block,
     wait_until,
@@ -30,18 +28,6 @@ from conftest import Studio
 @pytest.fixture(scope="module")
 def shared_folder(studio: Studio) -> Path:
     return studio.folder
-
-
-@pytest.fixture(scope="module")
-def shared(open_studio: Callable[[str], Page]) -> Page:
-    return open_studio("van_der_pol_pid")
-
-
-@pytest.fixture
-def sheet(shared: Page) -> Page:
-    """The page shared by this file, with a fresh copy of an example."""
-    open_fresh_example(shared)
-    return shared
 
 
 def command(page: Page, typed: str) -> None:

@@ -99,6 +99,15 @@ def test_selected_blocks_alone_and_a_sheet_without_open_ports() -> None:
     assert added == [Ground, Terminator]
 
 
+def test_new_blocks_have_names_that_no_signal_of_the_sheet_has() -> None:
+    builder = DiagramBuilder("named")
+    source = builder.add("one", Gain(gain=2.0))
+    builder.name_signal(source, "ground")
+    document = Document(placed(builder.draft()), load_robot)
+    document.edit(GroundPorts())
+    assert sorted(document.diagram.blocks) == ["Ground 2", "Terminator", "one"]
+
+
 def test_a_ground_has_the_stated_shape() -> None:
     builder = DiagramBuilder("shapes")
     for name, dimensions in (("scalar", 1.0), ("vector", 3.0), ("matrix", [2.0, 4.0])):

@@ -3,6 +3,7 @@ import { Refusal } from '../../connection'
 import type { ChangeOf, ContentOf, Edit, EventOf } from '../../messages'
 import type { CellColumn, DocumentState, Readings, RobotContent, RobotTables } from '../../protocol'
 import { alteration, ask, connection } from '../../store'
+import { storedData } from '../../stored_data'
 
 /** A robot that this page shows or has shown, in the last state sent by the server. */
 export interface OpenRobot extends RobotContent {
@@ -106,9 +107,7 @@ useRobotEditor.subscribe(({ robots, current }, before) => {
  */
 export async function reattachRobots(): Promise<string | undefined> {
   const { robots, current } = useRobotEditor.getState()
-  const last = current
-    ? null
-    : (JSON.parse(sessionStorage.getItem(STORAGE_KEY) ?? 'null') as AttachedRobot | null)
+  const last = current ? null : storedData<AttachedRobot>(sessionStorage, STORAGE_KEY)
   const attach = async ({ document, path, origin }: AttachedRobot) => {
     const name = { document, document_kind: 'robot' as const, path, origin }
     const key = await ask({ kind: 'attach', ...name, in_front: false })

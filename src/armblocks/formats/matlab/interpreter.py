@@ -120,7 +120,7 @@ class Interpreter:
         lengths differ. In an assignment to a vector field they can only be one row. Three lines are not
         joined: they may be a triangle of a symmetric matrix.
         """
-        if not matrix.broken or len(matrix.rows) != 2 or len(matrix.rows[0]) == len(matrix.rows[1]):
+        if not matrix.line_breaks or len(matrix.rows) != 2 or len(matrix.rows[0]) == len(matrix.rows[1]):
             return matrix
         self.joined_lines.append(matrix.at.line)
         return replace(matrix, rows=((*matrix.rows[0], *matrix.rows[1]),))

@@ -55,7 +55,8 @@ class Joint(ABC):
 
     With ``s = q + offset`` the distal side rotates by ``angular s`` rad about ``axis`` and translates by
     ``linear s`` m along it. ``axis`` is a unit vector in the joint frame; it is normalised here, and the
-    robot rejects a zero axis. ``offset`` (rad or m) is added to the joint coordinate."""
+    robot rejects a zero axis. ``offset`` (rad or m) is added to the joint coordinate.
+    """
 
     axis: Vector3 = (0.0, 0.0, 1.0)
     offset: float = 0.0

@@ -41,8 +41,6 @@ class Edited(History[Value], ABC):
     kind: ClassVar[DocumentKind]
     edits: ClassVar[type[Edit]]
     """The base class of the edits of this kind of document."""
-    noun: ClassVar[str]
-    """The word for the value in messages: "drawing", "robot"."""
 
     def __init__(self, value: Value, *, version: int = 0) -> None:
         super().__init__(value, version=version)

@@ -159,7 +159,7 @@ def journaled_file(path: Path, kind: FileKind[Any, EditedT]) -> JournaledFile[Ed
         return _replayed(records, path, whole, kind)
     except (KeyError, TypeError, AttributeError) as error:
         raise FormatError(
-            "this is not a journal of the studio", where=str(path), fix="open the drawing's own file"
+            "this is not a journal of the studio", where=str(path), fix="open the document's own file"
         ) from error
 
 
@@ -188,7 +188,7 @@ def _snapshot(records: Sequence[Record], where: str) -> tuple[int, str]:
     """Return the latest snapshot from which all later records, undo included, can be repeated."""
     snapshots = [(record["version"], record["whole"]) for record in records if "whole" in record]
     if not snapshots:
-        raise FormatError("the journal contains no complete drawing", where=where, fix="it can be deleted")
+        raise FormatError("the journal contains no complete document", where=where, fix="it can be deleted")
     for number, text in sorted(snapshots, reverse=True):
         if _is_repeatable(records, number):
             return number, text

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Generic, TypeVar
+from typing import ClassVar, Generic, TypeVar
 
 from armblocks.errors import InputError
 
@@ -32,6 +32,9 @@ class History(Generic[Value]):
     the same version show the same value. ``saved`` is the value in the file, or ``None`` if no file
     contains one of these values. ``continued`` is true if the last replacement extended the previous step.
     """
+
+    noun: ClassVar[str]
+    """The word for the value in messages: "drawing", "robot"."""
 
     def __init__(self, value: Value, *, version: int = 0) -> None:
         self.value = value
@@ -99,8 +102,7 @@ class History(Generic[Value]):
         self.value = value
         self.version += 1
 
-    @staticmethod
-    def _pop(steps: list[Step[Value]], verb: str) -> Step[Value]:
+    def _pop(self, steps: list[Step[Value]], verb: str) -> Step[Value]:
         if not steps:
-            raise InputError(f"there is nothing to {verb}", where="the drawing", fix="edit it first")
+            raise InputError(f"there is nothing to {verb}", where=f"the {self.noun}", fix="edit it first")
         return steps.pop()

@@ -103,14 +103,14 @@ def read_journal(path: Path) -> tuple[list[Record], int]:
                 "the journal is too large",
                 where=str(path),
                 allowed=f"{MOST_BYTES} bytes",
-                fix="save the drawing, which starts another journal",
+                fix="save the document, which starts another journal",
             )
         data = path.read_bytes()
     except OSError as error:
         raise FormatError(
             f"the journal cannot be read ({error.strerror})",
             where=str(path),
-            fix="check the rights of the file, or open the drawing's own file",
+            fix="check the rights of the file, or open the document's own file",
         ) from error
     records: list[Record] = []
     whole = 0

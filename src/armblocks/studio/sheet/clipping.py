@@ -14,7 +14,7 @@ from armblocks import formats
 from armblocks.blocks import BLOCKS
 from armblocks.diagram import Block, Connection, Diagram, PortRef
 from armblocks.diagram.mask import formula_names
-from armblocks.diagram.names import folded
+from armblocks.diagram.names import FreeNames, folded
 from armblocks.drawing.block_boxes import standing_box
 from armblocks.drawing.wires import moved_bends
 from armblocks.errors import DiagramError
@@ -123,15 +123,8 @@ def _unused_names(
     diagram: Diagram, copied: Diagram, blocks: Collection[str], moved: Callable[[PortRef], PortRef]
 ) -> dict[PortRef, str]:
     """The names of the copied signals, numbered where a block or another signal of the sheet has the name."""
-    used_names = {folded(name) for name in (*diagram.blocks, *blocks, *diagram.signal_names.values())}
-    renamed: dict[PortRef, str] = {}
-    for ref, copied_name in copied.signal_names.items():
-        name, number = copied_name, 2
-        while folded(name) in used_names:
-            name, number = f"{copied_name} {number}", number + 1
-        used_names.add(folded(name))
-        renamed[moved(ref)] = name
-    return renamed
+    names = FreeNames((*diagram.blocks, *blocks, *diagram.signal_names.values()))
+    return {moved(ref): names.take(name) for ref, name in copied.signal_names.items()}
 
 
 def leaves_horizontally(wire: Connection, diagram: Diagram) -> bool:

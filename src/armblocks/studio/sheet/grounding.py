@@ -17,10 +17,11 @@ from armblocks.diagram import (
     PortRef,
     open_inputs,
 )
-from armblocks.diagram.names import folded
+from armblocks.diagram.names import FreeNames
 from armblocks.drawing.block_boxes import NAME_ROOM, Box, BoxPort
 from armblocks.drawing.diagram_drawing import obstacle
 from armblocks.drawing.diagram_layout import boxes
+from armblocks.drawing.wires import Area
 from armblocks.errors import DiagramError
 
 _WIDTH, _HEIGHT = 30.0, 20.0
@@ -34,9 +35,7 @@ _STEPS = sorted(
 """Shifts away from the port and across its direction, nearest first, in units of ``_STEP``."""
 _STEP = 20.0
 _GAP = 6.0
-
-_Area = tuple[float, float, float, float]
-"""Left, top, right and lower edge, px."""
+"""Minimum distance to other blocks, px."""
 
 
 def grounded(diagram: Diagram, names: Collection[str]) -> Diagram:
@@ -94,25 +93,18 @@ class _NewBlocks:
         self.blocks: dict[str, Block] = {}
         self.layout: dict[str, Placement] = {}
         self.connections: list[Connection] = []
-        self._used_names = {folded(name) for name in diagram.blocks}
-        self._used_areas: list[_Area] = [area for box in placed.values() for area in _areas(box)]
+        self._names = FreeNames((*diagram.blocks, *diagram.signal_names.values()))
+        self._used_areas: list[Area] = [area for box in placed.values() for area in obstacle(box).areas]
 
     def add(self, ref: PortRef, ports: Sequence[BoxPort], block: Block) -> None:
         """Add a block that drives an input, or is driven by an output."""
         port = next(port for port in ports if port.name == ref.port)
         drives = isinstance(block, Ground)
-        name = self._free_name(block.title)
+        name = self._names.take(block.title)
         self.blocks[name] = block
         self.layout[name] = self._place(port, -1 if drives else 1)
         own = PortRef(name, "y" if drives else "u")
         self.connections.append(Connection(own, ref) if drives else Connection(ref, own))
-
-    def _free_name(self, title: str) -> str:
-        name, number = title, 2
-        while folded(name) in self._used_names:
-            name, number = f"{title} {number}", number + 1
-        self._used_names.add(folded(name))
-        return name
 
     def _place(self, port: BoxPort, side: int) -> Placement:
         """The nearest free position in the direction of a port; ``side`` is 1 behind an output."""
@@ -139,7 +131,7 @@ class _NewBlocks:
             rotation=0 if upright else 90 if port.dy > 0 else 270,
         )
 
-    def _is_free(self, area: _Area) -> bool:
+    def _is_free(self, area: Area) -> bool:
         left, top, right, low = area
         return not any(
             left < other_right and other_left < right and top < other_low and other_top < low
@@ -147,17 +139,9 @@ class _NewBlocks:
         )
 
 
-def _new_area(corner: tuple[float, float], width: float, height: float) -> _Area:
-    """The area of a new block with its name below."""
+def _new_area(corner: tuple[float, float], width: float, height: float) -> Area:
+    """The area of a new block with its name below and a gap around them."""
     x, y = corner
     half_name = 40.0
     middle = x + width / 2
-    return middle - half_name, y - _GAP, middle + half_name, y + height + NAME_ROOM
-
-
-def _areas(box: Box) -> tuple[_Area, _Area]:
-    x, y, width, height = obstacle(box).label
-    return (
-        (box.x - _GAP, box.y - _GAP, box.x + box.width + _GAP, box.y + box.height + _GAP),
-        (x, y, x + width, y + height),
-    )
+    return middle - half_name, y - _GAP, middle + half_name, y + height + NAME_ROOM + _GAP

@@ -18,7 +18,7 @@ from armblocks.diagram import (
     PortRef,
     Subsystem,
 )
-from armblocks.diagram.names import check_block_name, folded
+from armblocks.diagram.names import FreeNames, check_block_name, folded
 from armblocks.errors import ArmblocksError, DiagramError, UnknownNameError
 from armblocks.robot import Robot
 
@@ -164,9 +164,9 @@ def grouped(names: Sequence[str], name: str, diagram: Diagram) -> Diagram:
     outputs = sorted(
         {w.source for w in diagram.connections if w.source.block in group and w.target.block not in group}
     )
-    free = _FreeNames((*group, *diagram.signal_names.values()))
-    ins = {source: free.name(source) for source in inputs}
-    outs = {source: free.name(source) for source in outputs}
+    free = FreeNames((*group, *diagram.signal_names.values()))
+    ins = {source: free.take(_port_title(source)) for source in inputs}
+    outs = {source: free.take(_port_title(source)) for source in outputs}
     inner_wires = [
         wire if wire.source.block in group else Connection(PortRef(ins[wire.source], "y"), wire.target)
         for wire in diagram.connections
@@ -226,16 +226,6 @@ def _inner_layout(
     return places
 
 
-class _FreeNames:
-    """Unique names for the In and Out blocks of a group."""
-
-    def __init__(self, used_names: Sequence[str]) -> None:
-        self._used = {folded(name) for name in used_names}
-
-    def name(self, source: PortRef) -> str:
-        title = source.block if source.port == "y" else source.port
-        number = 1
-        while folded(name := title if number == 1 else f"{title} {number}") in self._used:
-            number += 1
-        self._used.add(folded(name))
-        return name
+def _port_title(source: PortRef) -> str:
+    """The name of an In or Out block for a signal, if it is free."""
+    return source.block if source.port == "y" else source.port

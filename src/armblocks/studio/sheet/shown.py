@@ -163,7 +163,7 @@ def _drawn(
         inputs=_sheet_ports(box, into, inputs=True),
         outputs=_sheet_ports(box, out, inputs=False),
         opens=isinstance(block, DiagramBlock),
-        name_at=cast("Any", box.shown_name_side),
+        shown_name_side=cast("Any", box.shown_name_side),
         formulas=dict(block.formulas),
         mask=[_rule(rule, block) for rule in block.diagram.mask] if isinstance(block, DiagramBlock) else [],
         link=block.diagram.link if isinstance(block, DiagramBlock) else "",

@@ -68,7 +68,7 @@ class SheetBlock(Message):
     outputs: list[SheetPort]
     opens: bool
     """Whether the block contains a diagram."""
-    name_at: Literal["below", "above", "left", "right", "corner", "hidden"]
+    shown_name_side: Literal["below", "above", "left", "right", "corner", "hidden"]
     """The position of the name; ``corner`` is at the upper right corner."""
     parameters: dict[str, Any]
     """Values in the form of :func:`~armblocks.studio.sheet.parameter_values.parameter_json`."""
