@@ -40,7 +40,8 @@ export function nameWidth(name: string): number {
 }
 
 /** The area of a block's name, if it is visible. */
-export function nameArea({ name, shown_name_side: side, place: { x, y }, width, height }: SheetBlock): Rectangle[] {
+export function nameArea({ name, shown_name_side: side, place, width, height }: SheetBlock): Rectangle[] {
+  const { x, y } = place
   if (side === 'hidden') return []
   const wide = nameWidth(name)
   const middle = { x: x + (width - wide) / 2, y: y + height / 2 - 7 }

@@ -182,7 +182,8 @@ def open_fresh_example(page: Page) -> None:
 
     The title is not sufficient: the document of the previous test has the same title.
     """
-    page.keyboard.press("Escape")
+    for _ in range(2):  # closes the list and the dialog that a failed test may have left open
+        page.keyboard.press("Escape")
     before = page.evaluate("sessionStorage.getItem('armblocks-shown')")
     choose_in_menu(page, re.compile("^van_der_pol_pid a van der Pol"))
     page.wait_for_function("before => sessionStorage.getItem('armblocks-shown') !== before", arg=before)

@@ -40,20 +40,9 @@ def shared(open_studio: Callable[[str], Page]) -> Page:
 
 
 @pytest.fixture
-def page(shared: Page) -> Page:
+def page(sheet: Page) -> Page:
     """The shared page with a model without an arm, because software rendering of an arm is slow."""
-    return open_example(shared, "van_der_pol_pid")
-
-
-def open_example(page: Page, name: str) -> Page:
-    for _ in range(2):  # closes the list and the dialog that a failed test may have left open
-        page.keyboard.press("Escape")
-    page.get_by_role("button", name="Menu").click()
-    page.get_by_role("menuitem", name=re.compile(f"^{name} (?!not saved)[a-z]")).click()
-    expect(page.get_by_role("menu")).to_be_hidden()
-    expect(page.locator(".title")).to_have_text(name)
-    page.locator(".react-flow__node").first.wait_for()
-    return page
+    return sheet
 
 
 def show_theme(page: Page, theme: Literal["light", "dark"]) -> None:
