@@ -71,8 +71,8 @@ def puma560_multirate() -> Diagram:
     builder.connect(arm["q"], position["q"])
     builder.connect(arm["qd"], position["qd"])
     held = builder.add("1 kHz", ZeroOrderHold(sample_time=1e-3), position)
-    wanted = builder.add("to current", Gain(gain=1.0 / (robot.gear_ratios * k)), held)
-    error = builder.add("current error", Sum(signs="+-"), wanted)
+    reference = builder.add("to current", Gain(gain=1.0 / (robot.gear_ratios * k)), held)
+    error = builder.add("current error", Sum(signs="+-"), reference)
     current = builder.add(
         "current loop",
         DiscretePID(
@@ -123,8 +123,8 @@ def dc_motor_sampled_pid() -> Diagram:
         description="a DC motor's speed under a sampled PID, loaded at 2 s",
         settings=SimulationOptions(stop_time=4.0, sample_time=0.002),
     )
-    wanted = builder.add("wanted speed", Step(time=0.2, final=100.0))
-    error = builder.add("error", Sum(signs="+-"), wanted)
+    reference = builder.add("speed reference", Step(time=0.2, final=100.0))
+    error = builder.add("error", Sum(signs="+-"), reference)
     pid = DiscretePID(
         P=0.6, I=4.0, D=0.004, N=50.0, lower=-48.0, upper=48.0, anti_windup="clamping", sample_time=0.01
     )
@@ -132,11 +132,11 @@ def dc_motor_sampled_pid() -> Diagram:
     load = builder.add("load", Step(time=2.0, final=0.5))
     motor = builder.add("motor", DcMotor(R=1.2, L=5e-3, k=0.25, J=8e-3, b=1e-3), voltage, load)
     builder.connect(motor["w"], error["u2"])
-    builder.add("Speed", Scope(), builder.add("both", Mux(), wanted, motor["w"]))
+    builder.add("Speed", Scope(), builder.add("both", Mux(), reference, motor["w"]))
     builder.add("Current", Scope(), motor["i"])
     builder.add("Voltage", Scope(), voltage)
     for name, x, y in (
-        ("wanted speed", 40, 160),
+        ("speed reference", 40, 160),
         ("error", 180, 168),
         ("controller", 300, 160),
         ("load", 300, 280),
