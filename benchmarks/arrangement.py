@@ -52,17 +52,19 @@ def measured(diagram: Diagram) -> dict[str, float]:
     placed = boxes(diagram)
     nets, _ = wire_nets(diagram.connections, drawn_bends(diagram), placed)
     routed = route([obstacle(box) for box in placed.values()], nets)
-    pieces = [(k, *piece) for k, net in enumerate(routed) for path in net.paths for piece in pairwise(path)]
+    segments = [
+        (k, *segment) for k, net in enumerate(routed) for path in net.paths for segment in pairwise(path)
+    ]
     paths = [path for net in routed for path in net.paths]
     left, top = min(box.x for box in placed.values()), min(box.y for box in placed.values())
     width = max(box.x + box.width for box in placed.values()) - left
     height = max(box.y + box.height for box in placed.values()) - top
     return {
         "crossings": sum(
-            k != j and cross((a, b), (c, d)) for (k, a, b), (j, c, d) in combinations(pieces, 2)
+            k != j and cross((a, b), (c, d)) for (k, a, b), (j, c, d) in combinations(segments, 2)
         ),
         "bends": sum(max(len(path) - 2, 0) for path in paths),
-        "length": sum(abs(a[0] - b[0]) + abs(a[1] - b[1]) for _, a, b in pieces),
+        "length": sum(abs(a[0] - b[0]) + abs(a[1] - b[1]) for _, a, b in segments),
         "leftward": sum(
             placed[wire.target.block].x <= placed[wire.source.block].x for wire in diagram.connections
         ),
@@ -78,7 +80,7 @@ def measured(diagram: Diagram) -> dict[str, float]:
 
 
 def cross(one, other) -> bool:
-    """Whether two straight pieces cross."""
+    """Whether two straight segments cross."""
     (a, b), (c, d) = one, other
     if (a[0] == b[0]) == (c[0] == d[0]):
         return False
@@ -94,7 +96,7 @@ def arranged(diagram: Diagram) -> Diagram:
 def with_elk(diagrams: list[Diagram], elkjs: str) -> list[Diagram]:
     """The diagrams at the places of elkjs: the second input of a round sum is on its lower edge."""
     script = Path(__file__).with_name("elk.mjs")
-    done = subprocess.run(
+    completed = subprocess.run(
         ["node", script],
         input=json.dumps([elk_graph(diagram) for diagram in diagrams]),
         env={**os.environ, "ARMBLOCKS_ELKJS": elkjs},
@@ -110,7 +112,7 @@ def with_elk(diagrams: list[Diagram], elkjs: str) -> list[Diagram]:
             },
             bends={},
         )
-        for diagram, graph in zip(diagrams, json.loads(done.stdout))
+        for diagram, graph in zip(diagrams, json.loads(completed.stdout))
     ]
 
 
@@ -189,9 +191,9 @@ def main() -> None:
     print()
     for count in (100, 300, 1000):
         diagram = many_loops(count)
-        begin = time.perf_counter()
+        start_time = time.perf_counter()
         boxes(diagram)
-        print(f"{count} blocks arranged in {time.perf_counter() - begin:.2f} s")
+        print(f"{count} blocks arranged in {time.perf_counter() - start_time:.2f} s")
 
 
 if __name__ == "__main__":

@@ -50,7 +50,7 @@ def works() -> dict[str, Callable[[], object]]:
     def run_of(diagram: ab.Diagram, **options: Any) -> Callable[[], object]:
         return lambda: ab.simulate(diagram, **options)
 
-    found: dict[str, Callable[[], object]] = {
+    functions: dict[str, Callable[[], object]] = {
         name: run_of(ab.load_diagram(model))
         for name, model in (
             ("A kr180model", "kr180model"),
@@ -60,40 +60,40 @@ def works() -> dict[str, Callable[[], object]]:
         )
     }
     fixed = {"stop_time": 10.0, "step": 1e-3, "solver": "rk4", "sample_time": 0.01}
-    found["five blocks"] = run_of(five_blocks(), **fixed)
+    functions["five blocks"] = run_of(five_blocks(), **fixed)
     arm = ab.load_robot("puma560").nofriction("all")
     q, qd, qdd = np.random.default_rng(0).uniform(-2, 2, (3, 100_000, arm.n))
     out = np.empty_like(q)
-    found["puma560 rne, 100 000"] = lambda: arm.rne(q, qd, qdd, out=out)
-    found["puma560 jacob0, 100 000, new array"] = lambda: arm.jacob0(q)
-    found["puma560 inertia, 100 000, new array"] = lambda: arm.inertia(q)
+    functions["puma560 rne, 100 000"] = lambda: arm.rne(q, qd, qdd, out=out)
+    functions["puma560 jacob0, 100 000, new array"] = lambda: arm.jacob0(q)
+    functions["puma560 inertia, 100 000, new array"] = lambda: arm.inertia(q)
     few = [part[:8].copy() for part in (q, qd, qdd)]
     one = [part[0].copy() for part in (q, qd, qdd)]
-    found["puma560 rne, 8 samples"] = lambda: arm.rne(*few)
-    found["puma560 rne, one sample"] = lambda: arm.rne(*one)
-    for work in found.values():
+    functions["puma560 rne, 8 samples"] = lambda: arm.rne(*few)
+    functions["puma560 rne, one sample"] = lambda: arm.rne(*one)
+    for work in functions.values():
         work()
-    return found
+    return functions
 
 
 def serve() -> None:
     """The process of one checkout: measure one turn of each function named on standard input."""
     import armblocks
 
-    found = works()
+    functions = works()
     counts: dict[str, int] = {}
-    print(json.dumps([str(Path(armblocks.__file__).parents[2]), list(found)]), flush=True)
+    print(json.dumps([str(Path(armblocks.__file__).parents[2]), list(functions)]), flush=True)
     for line in sys.stdin:
         name = json.loads(line)
-        work = found[name]
+        work = functions[name]
         if name not in counts:
-            begin = time.perf_counter()
+            start = time.perf_counter()
             work()
-            counts[name] = max(1, round(TURN_SECONDS / (time.perf_counter() - begin)))
-        begin = time.process_time()
+            counts[name] = max(1, round(TURN_SECONDS / (time.perf_counter() - start)))
+        start = time.process_time()
         for _ in range(counts[name]):
             work()
-        print(json.dumps((time.process_time() - begin) / counts[name]), flush=True)
+        print(json.dumps((time.process_time() - start) / counts[name]), flush=True)
 
 
 class Checkout:
@@ -133,19 +133,19 @@ def main() -> None:
     parser.add_argument("--turns", type=int, default=40)
     parser.add_argument("--only", default="", help="names that contain this text")
     parser.add_argument("--serve", action="store_true", help=argparse.SUPPRESS)
-    given = parser.parse_args()
-    if given.serve:
+    arguments = parser.parse_args()
+    if arguments.serve:
         serve()
         return
-    checkouts = [Checkout(folder.resolve()) for folder in given.checkouts]
+    checkouts = [Checkout(folder.resolve()) for folder in arguments.checkouts]
     for checkout in checkouts:
         print(checkout.place)
     print(f"{'µs, smallest / lower quartile':36}" + "".join(f"{k + 1:>22}" for k in range(len(checkouts))))
     for name in checkouts[0].names:
-        if given.only not in name:
+        if arguments.only not in name:
             continue
         seconds: list[list[float]] = [[] for _ in checkouts]
-        for _ in range(given.turns):
+        for _ in range(arguments.turns):
             for row, checkout in zip(seconds, checkouts):
                 row.append(checkout.turn(name))
         cells = [(1e6 * min(row), 1e6 * statistics.quantiles(row, n=4)[0]) for row in seconds]

@@ -95,9 +95,9 @@ def drake_run() -> float:
     ResetIntegratorFromFlags(simulator, "runge_kutta5", 0.01)
     simulator.get_mutable_integrator().set_target_accuracy(1e-3)
     simulator.Initialize()
-    begin = time.perf_counter()
+    start_time = time.perf_counter()
     simulator.AdvanceTo(T)
-    return time.perf_counter() - begin
+    return time.perf_counter() - start_time
 
 
 def compare(repeats: int) -> tuple[Timing, Timing]:

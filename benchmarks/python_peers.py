@@ -42,10 +42,10 @@ class _MendedBdsim(MetaPathFinder):
     def find_spec(self, name: str, path: Sequence[str] | None, target: Any = None) -> Any:
         if name != "bdsim.run_sim":
             return None
-        found = importlib.machinery.PathFinder.find_spec(name, path)
-        if found is not None and found.origin is not None:
-            found.loader = _MendedSource(name, found.origin)
-        return found
+        spec = importlib.machinery.PathFinder.find_spec(name, path)
+        if spec is not None and spec.origin is not None:
+            spec.loader = _MendedSource(name, spec.origin)
+        return spec
 
 
 class _MendedSource(importlib.machinery.SourceFileLoader):
@@ -71,9 +71,9 @@ def bdsim_run(model: str) -> dict[str, Any]:
     bd = sim.blockdiagram()
     settings = BDSIM[model](bd)
     bd.compile()
-    begin = time.perf_counter()
+    start_time = time.perf_counter()
     out = sim.run(bd, **settings)
-    seconds = time.perf_counter() - begin
+    seconds = time.perf_counter() - start_time
     return {"seconds": seconds, "steps": len(out.t), "final": np.asarray(out.x)[-1].tolist()}
 
 
@@ -143,7 +143,7 @@ def _bdsim_multirate(bd: Any) -> dict[str, Any]:
     now, path = bd.TIME(), bd.FUNCTION(lambda t: quintic(t, 4.0), nin=1, nout=3)
     arm, inverse = bd.FDYN(robot, q0=zero), bd.IDYN(robot)
     e, ed, kp, kd, total = bd.SUM("+-"), bd.SUM("+-"), bd.GAIN(900.0), bd.GAIN(60.0), bd.SUM("+++")
-    torque, wanted = bd.ZOH(position, x0=rest), bd.FUNCTION(lambda tau: tau / (k * G), nin=1, nout=1)
+    torque, reference = bd.ZOH(position, x0=rest), bd.FUNCTION(lambda tau: tau / (k * G), nin=1, nout=1)
     missing, held = bd.SUM("+-"), bd.ZOH(current, x0=zero)
     scaled = bd.FUNCTION(lambda u: integral_gain * u, nin=1, nout=1)
     integral = bd.INTEGRATOR_S(current, x0=R * rest / (k * G))
@@ -163,8 +163,8 @@ def _bdsim_multirate(bd: Any) -> dict[str, Any]:
     bd.connect(kd, total[2])
     bd.connect(total, inverse[2])
     bd.connect(inverse, torque)
-    bd.connect(torque, wanted)
-    bd.connect(wanted, missing[0])
+    bd.connect(torque, reference)
+    bd.connect(reference, missing[0])
     bd.connect(winding, missing[1], rate[1], drive)
     bd.connect(missing, held, scaled)
     bd.connect(scaled, integral)
@@ -192,9 +192,9 @@ def pathsim_run(model: str) -> dict[str, Any]:
     from pathsim import Simulation
 
     simulation = Simulation(blocks, connections, log=False, **settings)
-    begin = time.perf_counter()
+    start_time = time.perf_counter()
     message = simulation.run(duration, adaptive=adaptive)
-    seconds = time.perf_counter() - begin
+    seconds = time.perf_counter() - start_time
     steps = int(message.get("total_steps", 0))
     return {"seconds": seconds, "steps": steps, "final": [float(block.outputs[0]) for block in outputs]}
 

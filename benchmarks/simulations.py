@@ -220,9 +220,9 @@ def _drake_run(
     else:
         integrator.set_target_accuracy(accuracy)
     simulator.Initialize()
-    begin = time.perf_counter()
+    start_time = time.perf_counter()
     simulator.AdvanceTo(stop)
-    seconds = time.perf_counter() - begin
+    seconds = time.perf_counter() - start_time
     final = context.get_continuous_state_vector().CopyToVector().tolist()
     return Run(seconds, integrator.get_num_steps_taken(), final)
 
@@ -310,7 +310,7 @@ def rows(group: str, repeats: int) -> list[Row]:
     """Every comparison of a group, in the order A B C A B C …"""
     logging.getLogger("drake").setLevel(logging.ERROR)
     peers = PythonPeers()
-    found: list[Row] = []
+    rows_of_group: list[Row] = []
     for case in cases(peers)[group]:
         case.ours()
         result = (case.compared or case.ours)()
@@ -324,12 +324,12 @@ def rows(group: str, repeats: int) -> list[Row]:
                 times[k].append(run.seconds * peer.times)
                 worst[k] = max(worst[k], float(np.abs(np.asarray(run.final)[peer.ends] - end).max()))
             mine += in_turn([case.ours], 1)[0].turns
-        found += [
+        rows_of_group += [
             Row(case.what, peer.name, Timing(tuple(times[k])), Timing(tuple(mine)), peer.target, worst[k])
             for k, peer in enumerate(case.peers)
         ]
     peers.close()
-    return found
+    return rows_of_group
 
 
 GROWTH = """
@@ -370,14 +370,14 @@ def growth(repeats: int, counts: Sequence[int] = (10, 100, 1000, 10_000)) -> lis
         for count in counts:
             turns: list[list[float]] = []
             for _ in range(repeats if count <= 1000 else max(1, repeats // 3)):
-                done = subprocess.run(
+                completed = subprocess.run(
                     [sys.executable, "-c", GROWTH, str(count), kinds],
                     env={**os.environ, "ARMBLOCKS_CACHE_DIR": ""},
                     capture_output=True,
                     text=True,
                     check=True,
                 )
-                turns.append(json.loads(done.stdout))
+                turns.append(json.loads(completed.stdout))
             best = min(turns, key=sum)
             typical = statistics.median(map(sum, turns))
             table.append(

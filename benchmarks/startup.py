@@ -33,9 +33,9 @@ def first_result(repeats: int) -> tuple[Timing, Timing]:
 
 def first_use(folder: str) -> float:
     """Seconds of one process with an empty cache."""
-    begin = time.perf_counter()
+    start = time.perf_counter()
     subprocess.run([PYTHON, "-c", FIRST_RNE], check=True, env={**os.environ, "ARMBLOCKS_CACHE_DIR": folder})
-    return time.perf_counter() - begin
+    return time.perf_counter() - start
 
 
 def whole_report(repeats: int) -> Timing:

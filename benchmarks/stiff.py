@@ -160,8 +160,8 @@ def scipys(problem: Problem, method: str) -> Solve:
 
     def solve() -> tuple[np.ndarray, int]:
         span = (0.0, problem.stop)
-        found = solve_ivp(f, span, problem.start, method=method, rtol=RTOL, atol=problem.atol, **more)
-        return found.y[:, -1], found.t.size - 1
+        solution = solve_ivp(f, span, problem.start, method=method, rtol=RTOL, atol=problem.atol, **more)
+        return solution.y[:, -1], solution.t.size - 1
 
     return solve
 
@@ -200,8 +200,8 @@ def sundaes(system: CompiledSystem, problem: Problem) -> Solve | None:
     solver = CVODE(rates, **options)
 
     def solve() -> tuple[np.ndarray, int]:
-        found = solver.solve(np.array([0.0, problem.stop]), problem.start)
-        return found.y[-1], -1
+        solution = solver.solve(np.array([0.0, problem.stop]), problem.start)
+        return solution.y[-1], -1
 
     return solve
 
@@ -249,10 +249,10 @@ def stiff_part(repeats: int) -> list[str]:
     lines = ["## Stiff systems", "", f"At rtol {RTOL:g}.", ""]
     lines += ["| problem | solver | steps | error | time | beside rodas5p |", "|---|---|---|---|---|---|"]
     for problem in PROBLEMS:
-        found = outcomes(problem, repeats)
-        for row in found:
+        outcomes_of_problem = outcomes(problem, repeats)
+        for row in outcomes_of_problem:
             steps = f"{row.steps:,}" if row.steps >= 0 else ""
-            ratio = row.seconds / found[0].seconds
+            ratio = row.seconds / outcomes_of_problem[0].seconds
             cells = (problem.name, row.solver, steps, f"{row.error:.1e}", f"{row.seconds * 1e3:,.3f} ms")
             lines.append("| " + " | ".join((*cells, f"{ratio:,.1f} x")) + " |")
     return [*lines, "", *(__doc__ or "").strip().splitlines()[4:]]

@@ -65,9 +65,9 @@ FIRST_AND_LAST = """() => new Promise((done) => {
         const came = () => heard.find((one) => one.kind === 'samples').at - from
         const times = () => [first - from, performance.now() - from, came()]
         if (first && ended) requestAnimationFrame(() => done(times()))
-        else requestAnimationFrame(look)
+        else requestAnimationFrame(check)
     }
-    requestAnimationFrame(look)
+    requestAnimationFrame(check)
     dispatchEvent(new KeyboardEvent('keydown', { key: 'Enter', ctrlKey: true }))
 })"""
 
@@ -75,7 +75,7 @@ FIRST_AND_LAST = """() => new Promise((done) => {
 @contextmanager
 def served(folder: str, model: str) -> Iterator[tuple[str, float]]:
     """Yield the login link of a studio, and the seconds until it was printed."""
-    begin = time.perf_counter()
+    start_time = time.perf_counter()
     environment = {**os.environ, "COLUMNS": "300"}
     environment.pop("PYTHONDONTWRITEBYTECODE", None)  # an installed package has bytecode
     process = subprocess.Popen(
@@ -88,8 +88,8 @@ def served(folder: str, model: str) -> Iterator[tuple[str, float]]:
     assert process.stdout is not None
     try:
         for line in process.stdout:
-            if found := re.search(r"http://\S+", line):
-                yield found.group(), time.perf_counter() - begin
+            if match := re.search(r"http://\S+", line):
+                yield match.group(), time.perf_counter() - start_time
                 return
         raise SystemExit("the studio did not start")
     finally:
@@ -111,8 +111,8 @@ def page_of(browser: Browser) -> Iterator[Page]:
 
 def until(page: Page, expression: str) -> None:
     """Wait until a JavaScript expression is true; it is evaluated in every animation frame."""
-    look = f"() => (({expression}) ? done() : requestAnimationFrame(look))"
-    page.evaluate(f"() => new Promise((done) => {{ const look = {look}; look() }})")
+    check = f"() => (({expression}) ? done() : requestAnimationFrame(check))"
+    page.evaluate(f"() => new Promise((done) => {{ const check = {check}; check() }})")
 
 
 @contextmanager
@@ -133,12 +133,12 @@ def opened(browser: Browser, model: str, hear: Callable | None = None) -> Iterat
 def start(browser: Browser) -> float:
     """Seconds from the command to the page with its model, in an open browser."""
     with tempfile.TemporaryDirectory() as folder, page_of(browser) as page:
-        begin = time.perf_counter()
+        start_time = time.perf_counter()
         with served(folder, "kr180model") as (link, _):
             page.goto(link, wait_until="commit")
             page.locator(".react-flow__node").first.wait_for()
             page.evaluate(DRAWN)
-            return time.perf_counter() - begin
+            return time.perf_counter() - start_time
 
 
 def run_times(browser: Browser, repeats: int) -> list[tuple[float, float, float]]:
@@ -148,11 +148,11 @@ def run_times(browser: Browser, repeats: int) -> list[tuple[float, float, float]
     """
     with opened(browser, "kr180model") as page:
         page.locator(".robot canvas").wait_for()
-        found = []
+        seconds = []
         for _ in range(repeats + 1):
             page.wait_for_timeout(1500)  # the next worker starts, as between two runs of a user
-            found.append(tuple(milliseconds / 1e3 for milliseconds in page.evaluate(FIRST_AND_LAST)))
-        return found[1:]
+            seconds.append(tuple(milliseconds / 1e3 for milliseconds in page.evaluate(FIRST_AND_LAST)))
+        return seconds[1:]
 
 
 def many_blocks(folder: str) -> str:
@@ -175,11 +175,11 @@ def first_thousand(browser: Browser) -> float:
         served(folder, many_blocks(folder)) as (link, _),
         page_of(browser) as page,
     ):
-        begin = time.perf_counter()
+        start_time = time.perf_counter()
         page.goto(link, wait_until="commit")
         until(page, THOUSAND_SHOWN)
         page.evaluate(DRAWN)
-        return time.perf_counter() - begin
+        return time.perf_counter() - start_time
 
 
 def thousand(browser: Browser, repeats: int) -> tuple[float, list[float], list[float]]:
@@ -193,11 +193,11 @@ def thousand(browser: Browser, repeats: int) -> tuple[float, list[float], list[f
             file = page.get_by_role("dialog").get_by_text("thousand.json")
             file.wait_for()
             page.wait_for_timeout(3000)
-            begin = time.perf_counter()
+            start_time = time.perf_counter()
             file.click()
             until(page, THOUSAND_SHOWN)
             page.evaluate(DRAWN)
-            load = time.perf_counter() - begin
+            load = time.perf_counter() - start_time
             page.wait_for_timeout(3000)
             page.locator('.react-flow__node[data-id="b 20 12"]').click()
             answers, pictures = [], []
@@ -212,10 +212,10 @@ def thousand(browser: Browser, repeats: int) -> tuple[float, list[float], list[f
                 page.keyboard.press(key)
                 until(page, "heard.some(({ kind }) => kind === 'changed')")
                 drawn = page.evaluate(DRAWN)
-                sent, came = page.evaluate(
+                sent, received = page.evaluate(
                     "['sent', 'changed'].map((wanted) => heard.find(({ kind }) => kind === wanted).at)"
                 )
-                answers.append((came - sent) / 1e3)
+                answers.append((received - sent) / 1e3)
                 pictures.append((drawn - page.evaluate("window.pressed")) / 1e3)
                 page.wait_for_timeout(300)
             return load, answers, pictures
@@ -252,12 +252,12 @@ def live(browser: Browser) -> tuple[int, int, list[float]]:
                 page.keyboard.type("abcdefgh"[typed % 8])
                 typed += 1
                 page.wait_for_timeout(150)
-            came = page.evaluate("heard.reduce((sum, { count = 0 }) => sum + count, 0)")
+            received = page.evaluate("heard.reduce((sum, { count = 0 }) => sum + count, 0)")
             # Events are recorded from 16 ms on; unrecorded key presses were faster.
             keys = "latency.filter(({ name }) => name === 'keydown').map(({ duration }) => duration)"
             slow = page.evaluate(keys)
-            found = [duration / 1e3 for duration in slow]
-            return came, round(SECONDS * RATE) + 1, found + [0.016] * (typed - len(found))
+            delays = [duration / 1e3 for duration in slow]
+            return received, round(SECONDS * RATE) + 1, delays + [0.016] * (typed - len(delays))
 
 
 def download(browser: Browser) -> tuple[float, float, float]:
@@ -295,11 +295,11 @@ async def session(uri: str, cookie: str, origin: str, ended: list[str], waits: l
                     continue
                 reply = json.loads(message)
                 if reply["kind"] == "reply":
-                    begin, answer = requested.pop(reply["number"])
+                    start_time, answer = requested.pop(reply["number"])
                     if reply.get("fault"):
                         answer.set_exception(RuntimeError(reply["fault"]["what"]))
                     else:
-                        answer.set_result(time.perf_counter() - begin)
+                        answer.set_result(time.perf_counter() - start_time)
                 elif reply["kind"] in ("opened", "changed"):
                     document.update(reply["state"])
                 elif reply["kind"] == "run_progress" and reply["state"] in ("done", "failed", "stopped"):
@@ -355,9 +355,9 @@ def verdict(value: float, target: float) -> str:
     return "met" if value <= target else "missed"
 
 
-def median_row(what: str, found: list[float], target: float) -> list[str]:
-    middle = statistics.median(found)
-    return [what, f"{middle:.3f} s", f"{min(found):.3f} s", f"{target:g} s", verdict(middle, target)]
+def median_row(what: str, times: list[float], target: float) -> list[str]:
+    middle = statistics.median(times)
+    return [what, f"{middle:.3f} s", f"{min(times):.3f} s", f"{target:g} s", verdict(middle, target)]
 
 
 def studio_part(repeats: int) -> list[str]:
@@ -374,9 +374,9 @@ def studio_part(repeats: int) -> list[str]:
             lambda: download_rows(browser),
         ]
         for measure in measures:
-            found = measure()
-            rows += found
-            print(*found, sep="\n", flush=True)
+            measured_rows = measure()
+            rows += measured_rows
+            print(*measured_rows, sep="\n", flush=True)
         browser.close()
     ended, waits = sessions()
     good = ended.count("done")
@@ -425,11 +425,11 @@ def thousand_rows(browser: Browser, repeats: int) -> list[list[str]]:
 
 
 def live_rows(browser: Browser) -> list[list[str]]:
-    came, expected, waits = live(browser)
+    received, expected, waits = live(browser)
     what = f"{CHANNELS} channels at {RATE // 1000} kHz live, {SECONDS:g} s"
-    lost = f"{what}: samples lost of {expected:,}"
+    label = f"{what}: samples lost of {expected:,}"
     return [
-        [lost, f"{expected - came:,}", "", "0", verdict(expected - came, 0)],
+        [label, f"{expected - received:,}", "", "0", verdict(expected - received, 0)],
         median_row(f"the same: key → next picture (largest {max(waits):.3f} s)", waits, 0.1),
     ]
 

@@ -129,19 +129,19 @@ def prose(text: str) -> str:
     """The text of a docstring as Markdown: code stays code, and all other text, also formulas with stars, is
     plain."""
     parts = re.split(r"(?::\w+:)?(`+)(.+?)\1", text)
-    found = [
+    tokens = [
         re.sub(r"([*_\[\]|$<>#\\~])", r"\\\1", plain) + (f"`{code}`" if code else "")
         for plain, code in zip(parts[::3], [*parts[2::3], ""])
     ]
-    return "".join(found)
+    return "".join(tokens)
 
 
 def table(headings: Iterable[str], rows: Iterable[Iterable[str]]) -> list[str]:
     """A Markdown table, followed by an empty line."""
     heads, cells = list(headings), [[cell.replace("\n", " ") for cell in row] for row in rows]
     # An empty column, such as the units of ports without units, is omitted.
-    kept = [k for k in range(len(heads)) if any(row[k] for row in cells)]
-    heads, cells = [heads[k] for k in kept], [[row[k] for k in kept] for row in cells]
+    kept_columns = [k for k in range(len(heads)) if any(row[k] for row in cells)]
+    heads, cells = [heads[k] for k in kept_columns], [[row[k] for k in kept_columns] for row in cells]
     body = ["| " + " | ".join(row) + " |" for row in cells]
     return ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads), *body, ""]
 
@@ -223,12 +223,12 @@ def behaviour(diagram: Diagram) -> list[str]:
     if block.virtual:
         return []  # without equations; the flat diagram does not contain it
     shapes = infer_shapes(diagram).inputs[diagram.name]
-    kept: list[tuple[str, State]] = [
+    states: list[tuple[str, State]] = [
         *(("continuous state", state) for state in block.states(shapes)),
         *(("discrete state", state) for state in block.discrete_states(shapes)),
         *(("mode", state) for state in block.modes(shapes)),
     ]
-    rows = [(f"`{state.name}`", what, state.unit, prose(state.doc)) for what, state in kept]
+    rows = [(f"`{state.name}`", what, state.unit, prose(state.doc)) for what, state in states]
     rows += [
         (f"`{guard.name}`", f"event {DIRECTIONS[guard.direction]}", "", prose(guard.doc))
         for guard in block.guards(shapes)

@@ -24,22 +24,22 @@ SOURCES = ("docs", "src/armblocks", "robots", "examples", "libraries")
 """Sources of the pages; blocks, robots, examples and docstrings are on the pages, too."""
 NOT_SOURCES = ("docs/_build", "docs/reference", "src/armblocks/studio/web")
 """Folders with generated files."""
-LEFT_OUT = ("debug.css", "file.png", "plus.png", "minus.png", "skeleton.css")
+EXCLUDED = ("debug.css", "file.png", "plus.png", "minus.png", "skeleton.css")
 """Files of the theme that no page uses."""
 
 
 def needed() -> bool:
     """Whether the pages are missing or outdated."""
-    there = STAMP.is_file() and (SITE / "index.html").is_file()
-    return not there or STAMP.read_text(encoding="utf-8") != digest()
+    exists = STAMP.is_file() and (SITE / "index.html").is_file()
+    return not exists or STAMP.read_text(encoding="utf-8") != digest()
 
 
 def digest() -> str:
     """A hash of all sources of the pages."""
-    found = hashlib.sha256()
+    hash_of_sources = hashlib.sha256()
     for path in _sources():
-        found.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
-    return found.hexdigest()
+        hash_of_sources.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+    return hash_of_sources.hexdigest()
 
 
 def _sources() -> Iterator[Path]:
@@ -65,14 +65,16 @@ def build() -> None:
     # code.
     with tempfile.TemporaryDirectory() as doctrees:
         command += ["-d", doctrees, str(DOCS), str(SITE)]
-        done = subprocess.run(command, cwd=ROOT, env=environment, stdin=subprocess.DEVNULL, stdout=sys.stderr)
-    if done.returncode != 0:
+        completed = subprocess.run(
+            command, cwd=ROOT, env=environment, stdin=subprocess.DEVNULL, stdout=sys.stderr
+        )
+    if completed.returncode != 0:
         raise SystemExit(
             "The documentation could not be built; the reason is printed above.\n"
             "To install armblocks without the documentation: ARMBLOCKS_SKIP_DOCS=1 pip install .\n"
             f"To install the tools for the documentation: pip install --editable '{ROOT}[docs]'"
         )
-    for name in LEFT_OUT:
+    for name in EXCLUDED:
         (SITE / "_static" / name).unlink(missing_ok=True)
     shutil.rmtree(SITE / "_sources", ignore_errors=True)
     STAMP.write_text(before, encoding="utf-8")

@@ -11,7 +11,7 @@ from armblocks.pictures.picture import Group, Mark, Picture, Polyline
 
 TOLERANCE = 0.1
 """Maximum distance of an omitted point from the drawn line, px."""
-FEWEST = 24
+MIN_POINTS = 24
 """Lines with fewer points are unchanged."""
 
 
@@ -25,7 +25,7 @@ def _lighter(mark: Mark) -> Mark:
         return replace(mark, marks=tuple(_lighter(inner) for inner in mark.marks))
     if isinstance(mark, Polyline):
         points = np.asarray(mark.points, dtype=np.float64)
-        if len(points) > FEWEST and np.isfinite(points).all():
+        if len(points) > MIN_POINTS and np.isfinite(points).all():
             return replace(mark, points=points[kept_points(points)])
     return mark
 
@@ -35,8 +35,8 @@ def kept_points(points: NDArray[np.float64]) -> NDArray[np.bool_]:
 
     Source: Douglas and Peucker, "Algorithms for the reduction of the number of points", 1973.
     """
-    kept = np.zeros(len(points), dtype=np.bool_)
-    kept[[0, -1]] = True
+    mask = np.zeros(len(points), dtype=np.bool_)
+    mask[[0, -1]] = True
     open_spans = [(0, len(points) - 1)]
     while open_spans:
         first, last = open_spans.pop()
@@ -50,6 +50,6 @@ def kept_points(points: NDArray[np.float64]) -> NDArray[np.bool_]:
         farthest = int(distances.argmax())
         if distances[farthest] > TOLERANCE:
             middle = first + 1 + farthest
-            kept[middle] = True
+            mask[middle] = True
             open_spans += [(first, middle), (middle, last)]
-    return kept
+    return mask

@@ -20,6 +20,6 @@ def show_by_theme(_app: object, _page: str, source: list[str]) -> None:
     source[0] = _PICTURE.sub(_both, source[0])
 
 
-def _both(found: re.Match[str]) -> str:
-    dark, alternative, light = found.groups()
+def _both(match: re.Match[str]) -> str:
+    dark, alternative, light = match.groups()
     return f"![{alternative}]({light}){{.only-light}}![{alternative}]({dark}){{.only-dark}}"

@@ -68,7 +68,7 @@ def _call(title: str, command: list[str]) -> None:
     """Run a step; its title goes to standard error, its output only if it fails."""
     start = time.monotonic()
     print(f"   {title} …", end="", flush=True, file=sys.stderr)
-    done = subprocess.run(
+    completed = subprocess.run(
         command,
         cwd=FRONTEND,
         stdin=subprocess.DEVNULL,
@@ -78,8 +78,8 @@ def _call(title: str, command: list[str]) -> None:
         errors="replace",
     )
     print(f" {time.monotonic() - start:.0f} s", flush=True, file=sys.stderr)
-    if done.returncode != 0:
-        sys.stderr.write(done.stdout + done.stderr)
+    if completed.returncode != 0:
+        sys.stderr.write(completed.stdout + completed.stderr)
         raise SystemExit(
             "The page of the studio could not be built; the reason is printed above.\n"
             "To install armblocks without the page: ARMBLOCKS_SKIP_WEB=1 pip install .\n"

@@ -65,5 +65,5 @@ def _node_wheel() -> Path:
 
 
 if __name__ == "__main__":
-    done = subprocess.run([*npm_command(), *sys.argv[1:]], cwd=FRONTEND, stdin=subprocess.DEVNULL)
-    sys.exit(done.returncode)
+    completed = subprocess.run([*npm_command(), *sys.argv[1:]], cwd=FRONTEND, stdin=subprocess.DEVNULL)
+    sys.exit(completed.returncode)

@@ -52,26 +52,28 @@ ARM64_TESTS = (
 def output(command: Sequence[str | Path], environment: Mapping[str, str] = {}, cwd: Path = ROOT) -> str:
     """Return the output of a command; exit the script if the command fails."""
     texts = [str(part) for part in command]
-    found = subprocess.run(texts, cwd=cwd, env={**os.environ, **environment}, capture_output=True, text=True)
-    if found.returncode:
-        sys.exit(f"'{' '.join(texts)}' failed:\n{found.stdout[-2000:]}{found.stderr[-4000:]}")
-    return found.stdout
+    completed = subprocess.run(
+        texts, cwd=cwd, env={**os.environ, **environment}, capture_output=True, text=True
+    )
+    if completed.returncode:
+        sys.exit(f"'{' '.join(texts)}' failed:\n{completed.stdout[-2000:]}{completed.stderr[-4000:]}")
+    return completed.stdout
 
 
 def x86_64_hashes(groups: Sequence[str]) -> dict[str, str]:
     """Return the hashes of each kind of code that this processor can run."""
     ask = "from llvmlite import binding; print(binding.get_host_cpu_features().flatten())"
     features = output([PYTHON, "-c", ask]).strip().split(",")
-    found: dict[str, str] = {}
+    hashes: dict[str, str] = {}
     for title, cpu, lanes, feature, environment in X86_64:
         if f"+{feature}" not in features:
             say(f"== {title}: skipped, not supported by this processor")
             continue
         with tempfile.TemporaryDirectory() as cache:
-            given = {"ARMBLOCKS_CACHE_DIR": cache, "PYTHONPATH": str(ROOT / "src"), **environment}
-            found[title] = output([PYTHON, HASHES, "--cpu", cpu, "--lanes", str(lanes), *groups], given)
-        say(f"== {title}\n{found[title]}")
-    return found
+            variables = {"ARMBLOCKS_CACHE_DIR": cache, "PYTHONPATH": str(ROOT / "src"), **environment}
+            hashes[title] = output([PYTHON, HASHES, "--cpu", cpu, "--lanes", str(lanes), *groups], variables)
+        say(f"== {title}\n{hashes[title]}")
+    return hashes
 
 
 class Arm64:
@@ -118,25 +120,27 @@ class Arm64:
         say("== fetch ARM64 wheels")
         names = (*REQUIREMENTS, *TEST_REQUIREMENTS)
         ask = f"from importlib.metadata import version; print(*(version(name) for name in {names}))"
-        wanted = [f"{name}=={found}" for name, found in zip(names, output([PYTHON, "-c", ask]).split())]
+        requirements = [
+            f"{name}=={version}" for name, version in zip(names, output([PYTHON, "-c", ask]).split())
+        ]
         version = ".".join(str(part) for part in self._python_version())
         platforms = [part for glibc in GLIBC for part in ("--platform", f"manylinux{glibc}_aarch64")]
         pip = [PYTHON, "-m", "pip", "download", "-q", "--only-binary=:all:", "--python-version", version]
-        output([*pip, "--implementation", "cp", *platforms, "-d", self.folder / "wheels", *wanted])
+        output([*pip, "--implementation", "cp", *platforms, "-d", self.folder / "wheels", *requirements])
         for wheel in sorted((self.folder / "wheels").glob("*.whl")):
             output([PYTHON, "-m", "zipfile", "-e", wheel, self.site])
 
     def _python_version(self) -> tuple[int, int]:
         """The version of the newest unpacked Python."""
-        found = [
+        paths = [
             path.name for path in (self.root / "usr" / "bin").glob("python3.*") if path.name[8:].isdigit()
         ]
-        return 3, max(int(name[8:]) for name in found)
+        return 3, max(int(name[8:]) for name in paths)
 
     def _qemu(self) -> Path:
         for name in ("qemu-aarch64-static", "qemu-aarch64"):
-            if there := shutil.which(name):
-                return Path(there)
+            if installed := shutil.which(name):
+                return Path(installed)
         own = self.folder / "qemu"
         if not own.exists():
             say("== fetch qemu-user-static")
@@ -171,11 +175,11 @@ def main() -> int:
     if platform.machine().lower() not in ("x86_64", "amd64"):
         parser.error("this script compares with an x86-64 processor and has to run on one")
     prepare("test")
-    found = x86_64_hashes(requested.groups)
+    hashes = x86_64_hashes(requested.groups)
     if requested.arm64:
         arm64 = Arm64(FOLDER)
-        found["ARM64"] = arm64.run(HASHES, *requested.groups)
-        say(f"== ARM64\n{found['ARM64']}")
+        hashes["ARM64"] = arm64.run(HASHES, *requested.groups)
+        say(f"== ARM64\n{hashes['ARM64']}")
         if not requested.no_tests:
             say("== tests on ARM64")
             say(
@@ -192,10 +196,10 @@ def main() -> int:
                     *ARM64_TESTS,
                 )
             )
-    if len(set(found.values())) > 1:
+    if len(set(hashes.values())) > 1:
         say("the hashes differ")
         return 1
-    say(f"the hashes of {', '.join(found)} agree")
+    say(f"the hashes of {', '.join(hashes)} agree")
     return 0
 
 

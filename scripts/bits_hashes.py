@@ -74,7 +74,7 @@ def rounded_constants() -> Numbers:
         arguments = (
             zip(values, rng.permutation(values)) if name in ("atan2", "hypot", "power") else zip(values)
         )
-        yield name, np.array([function(*map(float, given)) for given in arguments])
+        yield name, np.array([function(*map(float, numbers_in)) for numbers_in in arguments])
 
 
 def linear_algebra() -> Numbers:
@@ -138,11 +138,11 @@ def robots() -> Numbers:
             if not hasattr(traced, "casadi_function"):
                 continue
             kernel = compile_function(traced)
-            given = [4.0 * rng.random((ROWS, *slot.shape)) - 2.0 for slot in traced.inputs]
-            results = kernel(*given)
+            numbers_in = [4.0 * rng.random((ROWS, *slot.shape)) - 2.0 for slot in traced.inputs]
+            results = kernel(*numbers_in)
             for part in results if isinstance(results, tuple) else (results,):
                 yield f"{robot.name} {name}", part
-            single = kernel(*(array[0] for array in given))
+            single = kernel(*(array[0] for array in numbers_in))
             for part in single if isinstance(single, tuple) else (single,):
                 yield f"{robot.name} {name} single", part
 
@@ -159,9 +159,9 @@ def constants() -> Numbers:
     import armblocks as ab
     from armblocks.blocks import AnalogFilter, Clock, DigitalFilter, Expression, Integrator
 
-    def run(name: str, solver: str, put: Callable[[ab.DiagramBuilder], object]) -> Numbers:
+    def run(name: str, solver: str, add_design: Callable[[ab.DiagramBuilder], object]) -> Numbers:
         builder = ab.DiagramBuilder("d")
-        builder.log(put(builder))  # pyright: ignore[reportArgumentType]
+        builder.log(add_design(builder))  # pyright: ignore[reportArgumentType]
         result = ab.simulate(builder.build(), stop_time=1.0, sample_time=0.1, solver=solver)
         for path in result.names:
             yield f"{name} {solver} {path}", np.asarray(result[path])
@@ -182,12 +182,20 @@ def constants() -> Numbers:
     for design in ("butterworth", "chebyshev1", "chebyshev2"):
         for kind in ("low_pass", "high_pass", "band_pass", "band_stop"):
             for block in (AnalogFilter, DigitalFilter):
-                given = {"edge": 0.31, "upper_edge": 0.47, "order": 5, "design": design, "filter_type": kind}
+                numbers_in = {
+                    "edge": 0.31,
+                    "upper_edge": 0.47,
+                    "order": 5,
+                    "design": design,
+                    "filter_type": kind,
+                }
                 more = {"sample_time": 0.01} if block is DigitalFilter else {}
                 yield from run(
                     f"{block.__name__} {design} {kind}",
                     "rk4",
-                    lambda d, block=block, all=given | more: d.add("f", block(**all), d.add("c", Clock())),
+                    lambda d, block=block, all=numbers_in | more: d.add(
+                        "f", block(**all), d.add("c", Clock())
+                    ),
                 )
 
 

@@ -31,8 +31,10 @@ def say(text: str) -> None:
 
 def run(*command: str | Path, cwd: Path = ROOT) -> int:
     """Run a command without standard input, with its output passed through; return the exit code."""
-    done = subprocess.run([str(part) for part in command], cwd=cwd, env=ENVIRONMENT, stdin=subprocess.DEVNULL)
-    return done.returncode
+    completed = subprocess.run(
+        [str(part) for part in command], cwd=cwd, env=ENVIRONMENT, stdin=subprocess.DEVNULL
+    )
+    return completed.returncode
 
 
 def prepare(*extras: str) -> None:

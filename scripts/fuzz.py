@@ -39,23 +39,23 @@ def main() -> int:
 
     def seeds() -> Iterator[int]:
         for seed in itertools.count(arguments.seed):
-            done = arguments.count and seed - arguments.seed >= arguments.count
-            if done or time.monotonic() > end:
+            finished = arguments.count and seed - arguments.seed >= arguments.count
+            if finished or time.monotonic() > end:
                 return
             yield seed
 
-    found = 0
+    finding_count = 0
     for finding in fuzz(seeds(), arguments.laws, counts, reduce_for=arguments.reduce):
-        found += 1
-        print(f"--- {found} ---\n{finding.report()}\n", flush=True)
-        if found >= arguments.findings:
+        finding_count += 1
+        print(f"--- {finding_count} ---\n{finding.report()}\n", flush=True)
+        if finding_count >= arguments.findings:
             break
     totals = {name: value for name, value in counts.items() if ": " not in name}
     print(f"seeds from {arguments.seed}:", ", ".join(f"{value} {name}" for name, value in totals.items()))
     for name, value in counts.most_common():
         if ": " in name:
             print(f"{value:6} {name}")
-    return 1 if found else 0
+    return 1 if finding_count else 0
 
 
 if __name__ == "__main__":

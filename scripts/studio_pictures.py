@@ -30,7 +30,7 @@ PICTURES = ROOT / "docs" / "pictures"
 SCRIPT = ROOT / "tests" / "formats" / "kr180_as_printed.m"
 """The script of the paper as printed."""
 FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-PATIENCE_MS = 180_000
+TIMEOUT_MS = 180_000
 THEMES: tuple[Literal["light", "dark"], ...] = ("light", "dark")
 THEME_MS = 2000
 """Time in which the page draws its views and curves in another theme, ms."""
@@ -66,12 +66,12 @@ def studio(model: str) -> Generator[str]:
         assert process.stdout is not None
         message = ""
         try:
-            while not (found := re.search(r"http://\S+", message)):
+            while not (match := re.search(r"http://\S+", message)):
                 line = process.stdout.readline()
                 if not line:
                     raise SystemExit(f"the studio did not start: {message}")
                 message += line.strip()
-            yield found.group()
+            yield match.group()
         finally:
             process.send_signal(signal.SIGINT)
             process.wait()
@@ -86,7 +86,7 @@ def shown(browser: Browser, size: tuple[int, int], model: str = "kr180model") ->
             device_scale_factor=1.5,
             reduced_motion="reduce",
         )
-        page.set_default_timeout(PATIENCE_MS)
+        page.set_default_timeout(TIMEOUT_MS)
         page.add_init_script(
             "if (location.protocol === 'http:') localStorage.setItem('armblocks-tour-seen', 'yes')"
         )
@@ -149,9 +149,9 @@ def keep(page: Page, name: str, part: Locator | None = None) -> None:
         page.emulate_media(color_scheme=theme, reduced_motion="reduce")
         page.wait_for_timeout(THEME_MS)
         shot = page.screenshot(animations="disabled", clip=part and inside(part))
-        taken = Image.open(io.BytesIO(shot)).convert("RGB")
+        image = Image.open(io.BytesIO(shot)).convert("RGB")
         path = PICTURES / f"{name}-{theme}.webp"
-        path.write_bytes(min(_lossless(taken), _lossy(taken), key=len))  # the pictures are part of the wheel
+        path.write_bytes(min(_lossless(image), _lossy(image), key=len))  # the pictures are part of the wheel
         print(f"{path.relative_to(ROOT)}: {path.stat().st_size / 1000:.0f} kB", flush=True)
 
 
@@ -282,7 +282,7 @@ def notebook(browser: Browser) -> None:
             viewport={"width": 1160, "height": 560},
             device_scale_factor=1.5,
         )
-        page.set_default_timeout(PATIENCE_MS)
+        page.set_default_timeout(TIMEOUT_MS)
         page.goto((Path(folder) / "notebook.html").as_uri())
         page.evaluate(SHOW_WIDGET, [str(widget._esm), {**state, "time": 4.5}, samples])
         page.frame_locator("iframe").locator(".robot canvas").wait_for()

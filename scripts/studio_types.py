@@ -57,16 +57,18 @@ def tones() -> str:
 
 def main() -> int:
     """Write or check both files."""
-    wanted = {FRONTEND / "src" / "protocol.ts": types(), FRONTEND / "src" / "tones.css": tones()}
+    expected = {FRONTEND / "src" / "protocol.ts": types(), FRONTEND / "src" / "tones.css": tones()}
     stale = [
-        path for path, text in wanted.items() if not path.exists() or path.read_text(encoding="utf-8") != text
+        path
+        for path, text in expected.items()
+        if not path.exists() or path.read_text(encoding="utf-8") != text
     ]
     if "--check" in sys.argv:
         for path in stale:
             print(f"{path.name} is not up to date: run python3 scripts/studio_types.py")
         return 1 if stale else 0
     for path in stale:
-        path.write_text(wanted[path], encoding="utf-8")
+        path.write_text(expected[path], encoding="utf-8")
         print(f"wrote {path.name}")
     return 0
 

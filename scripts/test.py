@@ -147,13 +147,13 @@ def main() -> int:
     prepare("test")
     prepare_browser()
     start = time.perf_counter()
-    done = run_steps([name for name in STEPS if not requested or name in requested])
+    results = run_steps([name for name in STEPS if not requested or name in requested])
     say("== summary")
-    for step in done:
+    for step in results:
         verdict = "passed" if step.code == 0 else f"FAILED (exit code {step.code})"
         say(f"   {step.name:<10} {verdict:<24} {step.seconds:6.1f} s")
     say(f"   all together {time.perf_counter() - start:31.1f} s")
-    return 1 if any(step.code != 0 for step in done) else 0
+    return 1 if any(step.code != 0 for step in results) else 0
 
 
 if __name__ == "__main__":

@@ -5,9 +5,9 @@ from __future__ import annotations
 from armblocks.diagram import Diagram, content_key, trace_diagram
 from armblocks.integration.system import CompiledSystem, compile_system
 
-MOST = 32
+CAPACITY = 32
 """Number of cached systems; the variants of one test run one after another."""
-_KEPT: dict[str, CompiledSystem] = {}
+_CACHE: dict[str, CompiledSystem] = {}
 
 
 def compiled(diagram: Diagram) -> CompiledSystem:
@@ -15,9 +15,9 @@ def compiled(diagram: Diagram) -> CompiledSystem:
     key = content_key(diagram)
     if key is None:
         return compile_system(trace_diagram(diagram))
-    if key not in _KEPT:
+    if key not in _CACHE:
         system = compile_system(trace_diagram(diagram))
-        while len(_KEPT) >= MOST:
-            del _KEPT[next(iter(_KEPT))]
-        _KEPT[key] = system
-    return _KEPT[key]
+        while len(_CACHE) >= CAPACITY:
+            del _CACHE[next(iter(_CACHE))]
+        _CACHE[key] = system
+    return _CACHE[key]

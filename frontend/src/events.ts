@@ -146,7 +146,7 @@ function diagramChanged(event: EventOf<'changed'>, change: ChangeOf<'diagram'>):
   const { document } = useStudio.getState()
   if (document?.state.document !== event.state.document) return
   if (event.before !== document.state.version && event.state.version !== document.state.version)
-    void ask({ kind: 'look', document: event.state.document, inside: document.inside })
+    void ask({ kind: 'show_sheet', document: event.state.document, inside: document.inside })
   else {
     useStudio.setState(showState(withChange(document, event.state, change)))
     storeShown(event.state, document.inside)

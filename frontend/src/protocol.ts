@@ -24,9 +24,7 @@ export interface Envelope {
     | Drop
     | Files
     | Find
-    | KeepFile
-    | KeepMine
-    | Look
+    | IgnoreFileChange
     | New
     | Open
     | OpenShipped
@@ -47,7 +45,9 @@ export interface Envelope {
     | Run
     | Save
     | AskScene
+    | ShowSheet
     | SetSpeed
+    | StoreFile
     | TrustSource
     | Tune
     | TypedValue
@@ -482,28 +482,11 @@ export interface Find {
   text: string;
 }
 /**
- * Store a dropped file with a table in the project folder; ``replace``: also over another file.
- */
-export interface KeepFile {
-  kind: "keep_file";
-  name: string;
-  content: string;
-  replace?: boolean;
-}
-/**
  * Keep the document although its file has changed on disk; the next save overwrites the file.
  */
-export interface KeepMine {
-  kind: "keep_mine";
+export interface IgnoreFileChange {
+  kind: "ignore_file_change";
   document: string;
-}
-/**
- * Display the sheet inside a subsystem; the empty path is the top sheet.
- */
-export interface Look {
-  kind: "look";
-  document: string;
-  inside: string[];
 }
 /**
  * Create a new document.
@@ -718,6 +701,14 @@ export interface AskScene {
   kind: "scene";
 }
 /**
+ * Display the sheet inside a subsystem; the empty path is the top sheet.
+ */
+export interface ShowSheet {
+  kind: "show_sheet";
+  document: string;
+  inside: string[];
+}
+/**
  * Change the speed of a run; ``None`` runs as fast as possible.
  */
 export interface SetSpeed {
@@ -726,9 +717,18 @@ export interface SetSpeed {
   speed?: number | null;
 }
 /**
- * Trust the content of a Python file that the page has shown, or no content of it.
+ * Store a dropped table file in the project folder; ``replace``: overwrite a file of the same name.
+ */
+export interface StoreFile {
+  kind: "store_file";
+  name: string;
+  content: string;
+  replace?: boolean;
+}
+/**
+ * Trust a Python file with the content that the page has shown, or withdraw the trust.
  *
- * Refused if the file has another content than ``digest`` by now.
+ * The request is refused if the content of the file no longer has this ``digest``.
  */
 export interface TrustSource {
   kind: "trust_source";
@@ -1110,7 +1110,7 @@ export interface RunStarted {
   run: string;
   stop_time: number;
   channels: Channel[];
-  views: ViewOf[];
+  views: SinkView[];
   aliases: {
     [k: string]: string;
   };
@@ -1132,7 +1132,7 @@ export interface Channel {
 /**
  * The plot or 3-D view of a sink; ``signals`` are the recorded signals that it shows.
  */
-export interface ViewOf {
+export interface SinkView {
   block: string;
   kind: string;
   signals: string[];
@@ -1226,10 +1226,8 @@ export interface Replies {
   data_files: DataFile[];
   drop: string[];
   files: FileList;
-  find: Found[];
-  keep_file: KeptFile;
-  keep_mine: null;
-  look: null;
+  find: FoundBlock[];
+  ignore_file_change: null;
   new: string;
   open: string[];
   open_shipped: string;
@@ -1252,7 +1250,9 @@ export interface Replies {
   run: string;
   save: string;
   scene: RobotScene;
+  show_sheet: null;
   speed: null;
+  store_file: StoredFile;
   trust_source: null;
   tune: null;
   typed: unknown;
@@ -1278,18 +1278,11 @@ export interface FileList {
 /**
  * A block found by a search; ``match`` is the matching value, ``""`` if the name or type matches.
  */
-export interface Found {
+export interface FoundBlock {
   inside: string[];
   name: string;
   title: string;
   match: string;
-}
-/**
- * The path of a dropped file; ``stored`` is false if another file has this name.
- */
-export interface KeptFile {
-  path: string;
-  stored: boolean;
 }
 /**
  * The sheets of a model as a tree.
@@ -1303,8 +1296,8 @@ export interface Outline {
  * The columns of a file, and the table of the chosen ones, or its ``fault``.
  *
  * ``time`` is the column with the times, ``chosen`` are those of the values. ``rows`` are the first rows of
- * these columns as text. ``times`` (s) and ``curves`` are points for a plot: the least and the greatest
- * values of groups of rows. ``spacing`` is the least and the greatest distance of two times, s.
+ * these columns as text. ``times`` (s) and ``curves`` are points for a plot: the minimum and
+ * the maximum of groups of rows. ``spacing`` is the minimum and the maximum difference of successive times, s.
  */
 export interface TablePreview {
   columns: TableColumn[];
@@ -1436,4 +1429,11 @@ export interface SceneJoint {
   offset: number;
   radius: number;
   [k: string]: unknown;
+}
+/**
+ * The path of a dropped file; ``stored`` is false if a file with this name and another content exists.
+ */
+export interface StoredFile {
+  path: string;
+  stored: boolean;
 }

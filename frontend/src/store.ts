@@ -14,7 +14,7 @@ import type {
   SheetBlock,
   SheetNote,
   Tunable,
-  ViewOf,
+  SinkView,
   Wire,
   WireKind,
   WireLines,
@@ -55,7 +55,7 @@ export interface RunView {
   solver: string
   reason: string
   channels: Channel[]
-  views: ViewOf[]
+  views: SinkView[]
   aliases: Record<string, string>
   tunables: Tunable[]
 }
@@ -218,7 +218,7 @@ export function bringToFront({ document, kind, path, origin }: DocumentState): P
 /** Show the sheet inside a subsystem; the empty path is the top sheet. */
 export function openSheet(inside: string[]): void {
   const document = useStudio.getState().document
-  if (document) void ask({ kind: 'look', document: document.state.document, inside })
+  if (document) void ask({ kind: 'show_sheet', document: document.state.document, inside })
 }
 
 /** Show the sheet of a block and select the block. */
@@ -226,7 +226,7 @@ export async function showBlock(inside: string[], name: string): Promise<void> {
   const { document } = useStudio.getState()
   if (!document) return
   if (document.inside.join('/') !== inside.join('/'))
-    await ask({ kind: 'look', document: document.state.document, inside })
+    await ask({ kind: 'show_sheet', document: document.state.document, inside })
   useStudio.setState({ selection: new Set([name]), blockToCentre: name })
 }
 

@@ -67,9 +67,9 @@ class InputError(ArmblocksError):
     """A call was given a wrong shape, dtype, value or option."""
 
 
-LONGEST_NAME = 60
+MAX_NAME_LENGTH = 60
 """Maximum number of characters of an unknown name in a message."""
-LONGEST_LIST = 200
+MAX_LIST_LENGTH = 200
 """Maximum number of characters of a list of names in a message. A longer list is cut to the nearest names."""
 
 
@@ -82,7 +82,7 @@ class UnknownNameError(ArmblocksError):
         self.known: Sequence[str] = sorted(known)
         folded = {entry.casefold(): entry for entry in self.known}
         near = difflib.get_close_matches(name.casefold(), list(folded), n=1, cutoff=0.5)
-        shown = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
+        shown = name if len(name) <= MAX_NAME_LENGTH else f"{name[:MAX_NAME_LENGTH]}..."
         super().__init__(
             f"there is no {kind} named '{shown}'",
             where=where,
@@ -95,7 +95,7 @@ def _legible(names: Sequence[str], unknown: str) -> str:
     """All names if they are few, else the names most similar to the unknown one and the number of others."""
     if not names:
         return "none exist"
-    if len(whole := ", ".join(names)) <= LONGEST_LIST:
+    if len(whole := ", ".join(names)) <= MAX_LIST_LENGTH:
         return whole
     matcher = difflib.SequenceMatcher(b=unknown.casefold())
 
@@ -105,10 +105,10 @@ def _legible(names: Sequence[str], unknown: str) -> str:
 
     chosen: list[str] = []
     for name in sorted(names, key=lambda name: -likeness(name)):
-        if sum(map(len, chosen)) + 2 * len(chosen) + len(name) > LONGEST_LIST - 30:
+        if sum(map(len, chosen)) + 2 * len(chosen) + len(name) > MAX_LIST_LENGTH - 30:
             break
         chosen.append(name)
-    return f"{', '.join(sorted(chosen) or [names[0][:LONGEST_LIST]])}, and {len(names) - len(chosen)} more"
+    return f"{', '.join(sorted(chosen) or [names[0][:MAX_LIST_LENGTH]])}, and {len(names) - len(chosen)} more"
 
 
 def check_arguments(kind: type, values: Sequence[object], named: Mapping[str, object]) -> None:

@@ -39,8 +39,10 @@ def loop(controller: Block, *, delay: bool = False) -> Diagram:
     """A sampled controller of y' = u - y / 2, between sampled blocks with the same clock."""
     builder = DiagramBuilder("d")
     plant = builder.add("plant", Integrator())
-    seen = builder.add("seen", TransportDelay(delay=0.07), plant) if delay else plant
-    sampled = builder.add("sampled", Gain(gain=2.0), builder.add("hold", ZeroOrderHold(sample_time=T), seen))
+    measured = builder.add("seen", TransportDelay(delay=0.07), plant) if delay else plant
+    sampled = builder.add(
+        "sampled", Gain(gain=2.0), builder.add("hold", ZeroOrderHold(sample_time=T), measured)
+    )
     action = builder.add("controller", controller, sampled)
     after = builder.add("after", UnitDelay(sample_time=T), action)
     force = builder.add("force", Sum(signs="++-"), action, after, builder.add("half", Gain(gain=0.5), plant))
@@ -163,7 +165,7 @@ def test_a_failed_call_names_block_and_time_and_keeps_the_earlier_samples() -> N
     def late(u: float, t: float) -> Any:
         return {0.0: 1.0, 1.0: np.ones(3), 2.0: np.nan}.get(t, 1 / 0 if t > 2.5 else u)
 
-    for begin, says in (
+    for begin, expected_message in (
         (0.0, r"block 'f' at t = 1 s: 'y' is \[1\. 1\. 1\.\], of shape \(3,\)"),
         (1.0, r"'y' is nan"),
         (2.0, r"the function late failed: ZeroDivisionError"),
@@ -176,7 +178,7 @@ def test_a_failed_call_names_block_and_time_and_keeps_the_earlier_samples() -> N
         shifted.__name__ = "late"
         block = CalledPythonFunction(function=shifted, sample_time=1.0)
         builder.add("x", Integrator(), builder.add("f", block, builder.add("u", SineWave())))
-        with pytest.raises(SimulationError, match=says) as caught:
+        with pytest.raises(SimulationError, match=expected_message) as caught:
             ab.simulate(builder.build(), stop_time=5.0, sample_time=0.25)
         partial = caught.value.partial
         assert isinstance(partial, ab.SimulationResult)

@@ -361,6 +361,6 @@ def test_the_message_about_an_initial_shape_names_port_and_parameter() -> None:
     builder.add(
         "block", block, builder.add("u", Constant(value=1.0)), builder.add("x0", Constant(value=[1.0] * 3))
     )
-    says = r"'initial' has shape \(3,\) and 'parameter initial' has shape \(2,\)"
-    with pytest.raises(DiagramError, match=says):
+    message = r"'initial' has shape \(3,\) and 'parameter initial' has shape \(2,\)"
+    with pytest.raises(DiagramError, match=message):
         builder.build()

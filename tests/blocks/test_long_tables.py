@@ -240,11 +240,11 @@ def test_a_long_spline_is_tuned_during_a_run_without_compilation() -> None:
     run.set("curve.positions", X + 0.5)
     run.advance()
     assert run.simulation.compiled is compiled
-    done = run.result()
+    run_result = run.result()
     for first, last, x, y in ((0.0, 1.0, X, Y), (1.0, 2.0, X, -Y), (2.0, 4.1, X + 0.5, -Y)):
-        part = (done.time > first + 0.05) & (done.time < last - 0.05)
-        expected = CubicSpline(x, y)(np.clip(done.time[part], x[0], x[-1]))
-        np.testing.assert_allclose(done["curve"][part], expected, rtol=1e-9, atol=1e-12)
+        part = (run_result.time > first + 0.05) & (run_result.time < last - 0.05)
+        expected = CubicSpline(x, y)(np.clip(run_result.time[part], x[0], x[-1]))
+        np.testing.assert_allclose(run_result["curve"][part], expected, rtol=1e-9, atol=1e-12)
 
 
 def test_a_long_spline_that_depends_on_a_mask_parameter_is_updated() -> None:

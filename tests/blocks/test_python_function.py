@@ -101,7 +101,7 @@ def test_a_file_names_the_function_and_needs_trust(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("reference", "says"),
+    ("reference", "message"),
     [
         ("control.py:missing", r"control\.py has no function named 'missing'"),
         ("control.py:number", r"control\.py has no function named 'number'"),
@@ -109,12 +109,12 @@ def test_a_file_names_the_function_and_needs_trust(tmp_path: Path) -> None:
         ("broken.py:law", r"the code of broken\.py, line 1, fails: ZeroDivisionError"),
     ],
 )
-def test_invalid_references_to_functions_are_refused(reference: str, says: str, tmp_path: Path) -> None:
+def test_invalid_references_to_functions_are_refused(reference: str, message: str, tmp_path: Path) -> None:
     (tmp_path / "control.py").write_text(CODE)
     (tmp_path / "broken.py").write_text("1 / 0\n")
     document = ab.save_diagram(fed(PythonFunction(), SineWave()), tmp_path / "d.json")
     document.write_text(document.read_text().replace('"function": ""', f'"function": "{reference}"'))
-    with pytest.raises(FormatError, match=says):
+    with pytest.raises(FormatError, match=message):
         ab.load_diagram(document, trust=True)
 
 

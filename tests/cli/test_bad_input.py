@@ -203,7 +203,7 @@ def test_unsupported_code_in_a_robot_script_is_refused_with_its_line(
 
 
 def test_debugging_shows_the_traceback(tmp_path: Path) -> None:
-    done = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, "-m", "armblocks", "show", "puma650"],
         cwd=tmp_path,
         stdin=subprocess.DEVNULL,
@@ -211,19 +211,19 @@ def test_debugging_shows_the_traceback(tmp_path: Path) -> None:
         text=True,
         env={**os.environ, "ARMBLOCKS_DEBUG": "1"},
     )
-    assert done.returncode == 1
-    assert "Traceback" in done.stderr
-    assert "UnknownNameError" in done.stderr
+    assert completed.returncode == 1
+    assert "Traceback" in completed.stderr
+    assert "UnknownNameError" in completed.stderr
 
 
 def test_without_debugging_a_process_shows_no_traceback(
     spawn: Callable[..., "subprocess.CompletedProcess[str]"],
 ) -> None:
-    done = spawn("show", "puma650")
-    assert done.returncode == 2
-    assert done.stdout == ""
-    assert done.stderr.startswith("error: ")
-    assert "Traceback" not in done.stderr
+    completed = spawn("show", "puma650")
+    assert completed.returncode == 2
+    assert completed.stdout == ""
+    assert completed.stderr.startswith("error: ")
+    assert "Traceback" not in completed.stderr
 
 
 @pytest.mark.skipif(os.name == "nt", reason="a signal cannot be sent to a child alone on Windows")

@@ -32,8 +32,8 @@ def test_without_a_command_the_help_is_shown(invoke: Invoke) -> None:
 def test_the_version_is_that_of_the_package(spawn: Spawn) -> None:
     from importlib.metadata import version
 
-    done = spawn("--version")
-    assert (done.returncode, done.stdout.strip()) == (0, f"armblocks {version('armblocks')}")
+    completed = spawn("--version")
+    assert (completed.returncode, completed.stdout.strip()) == (0, f"armblocks {version('armblocks')}")
 
 
 @pytest.mark.parametrize("robot", ab.list_robots())
@@ -105,7 +105,7 @@ def test_the_shell_completes_names_and_files_without_a_heavy_import(tmp_path: Pa
     (tmp_path / "models").mkdir()
     for name in ("motor.json", "model.txt", "models/arm.json"):
         (tmp_path / name).touch()
-    done = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, "-c", COMPLETE, json.dumps(list(COMPLETED))],
         env={**os.environ, "_ARMBLOCKS_COMPLETE": "complete_bash"},
         cwd=tmp_path,
@@ -113,7 +113,7 @@ def test_the_shell_completes_names_and_files_without_a_heavy_import(tmp_path: Pa
         capture_output=True,
         text=True,
     )
-    assert json.loads(done.stdout or "0") == [COMPLETED, []], done.stderr
+    assert json.loads(completed.stdout or "0") == [COMPLETED, []], completed.stderr
 
 
 def test_bench_prints_a_time_for_every_method(invoke: Invoke) -> None:
@@ -130,7 +130,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> tuple["subprocess.Comple
     import sys
 
     folder = tmp_path_factory.mktemp("run")
-    done = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, "-m", "armblocks", "run", "kr180model", "--format", "npz", "--format", "mat"],
         cwd=folder,
         stdin=subprocess.DEVNULL,
@@ -139,15 +139,15 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> tuple["subprocess.Comple
         encoding="utf-8",
         timeout=300,
     )
-    return done, folder / "kr180model-report"
+    return completed, folder / "kr180model-report"
 
 
 def test_run_prints_where_the_report_is(
     report: tuple["subprocess.CompletedProcess[str]", Path],
 ) -> None:
-    done, folder = report
-    assert done.returncode == 0, done.stderr
-    assert "kr180model-report" in done.stdout
+    completed, folder = report
+    assert completed.returncode == 0, completed.stderr
+    assert "kr180model-report" in completed.stdout
     assert (folder / "report.html").is_file()
 
 

@@ -79,9 +79,9 @@ def test_an_interrupt_is_raised_after_all_helpers_have_stopped_writing(
     monkeypatch.setattr(batch_threads, "_helpers", Later)
     monkeypatch.setattr(batch_threads.time, "sleep", sleep)
 
-    def shares(given: ctypes.Array[ctypes.c_int64], hold: int, patience: int) -> None:
+    def shares(shared_job: ctypes.Array[ctypes.c_int64], hold: int, patience: int) -> None:
         nonlocal job
-        job = given
+        job = shared_job
         job[1] = 1  # a helper is still working when the caller has finished
 
     job: ctypes.Array[ctypes.c_int64]

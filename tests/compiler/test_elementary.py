@@ -23,7 +23,7 @@ EXTENDED = np.finfo(np.longdouble).nmant > 60
 RNG = np.random.default_rng(20)
 COUNT = 3000
 HUGE = np.finfo(np.float64).max
-ENDLESS = (np.inf, -np.inf, np.nan)
+NOT_FINITE = (np.inf, -np.inf, np.nan)
 
 
 def powers(low: float, high: float) -> Values:
@@ -78,10 +78,10 @@ CASES: dict[str, tuple[Opcode, Callable[..., Any], tuple[Values, ...], float]] =
 }
 
 
-def units_off(got: Values, reference: NDArray[np.longdouble]) -> Values:
+def units_off(actual: Values, reference: NDArray[np.longdouble]) -> Values:
     """Return errors in units in the last place of the result."""
     size = np.spacing(np.abs(reference).astype(np.float64))
-    return np.abs((got.astype(np.longdouble) - reference) / size).astype(np.float64)
+    return np.abs((actual.astype(np.longdouble) - reference) / size).astype(np.float64)
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -91,8 +91,8 @@ def test_errors_stay_below_two_units_in_the_last_place(name: str) -> None:
     ordinary = (
         np.abs(extended) > 1e-300
     )  # smaller results are close to the subnormal range, where a unit is relatively large
-    got = native(single_operation(opcode), 8)(*arguments)
-    error = units_off(got, extended)[ordinary]
+    actual = native(single_operation(opcode), 8)(*arguments)
+    error = units_off(actual, extended)[ordinary]
     assert error.max() < allowed + (0.0 if EXTENDED else 1.0)
 
 
@@ -108,8 +108,8 @@ def test_powers_are_within_one_unit() -> None:
     with np.errstate(all="ignore"):
         extended = base.astype(np.longdouble) ** exponent.astype(np.longdouble)
     ordinary = (extended > 1e-300) & (extended < 1e300)
-    got = native(single_operation(Opcode.POWER), 8)(base, exponent)
-    error = units_off(got[ordinary], extended[ordinary])
+    actual = native(single_operation(Opcode.POWER), 8)(base, exponent)
+    error = units_off(actual[ordinary], extended[ordinary])
     assert error.max() < (1.0 if EXTENDED else 2.0)
 
 
@@ -146,7 +146,7 @@ def test_special_values_agree_with_numpy(opcode: Opcode) -> None:
             1e300,
             -1e300,
             HUGE,
-            *ENDLESS,
+            *NOT_FINITE,
         ]
     )
     grids = np.meshgrid(*[values] * opcode.arity)
@@ -154,10 +154,10 @@ def test_special_values_agree_with_numpy(opcode: Opcode) -> None:
     with np.errstate(all="ignore"):
         expected = np.asarray(reference(*arguments), dtype=np.float64)
     for lanes in (1, 8):
-        got = native(single_operation(opcode), lanes)(*arguments)
-        np.testing.assert_allclose(got, expected, rtol=1e-15, atol=1e-323)
+        actual = native(single_operation(opcode), lanes)(*arguments)
+        np.testing.assert_allclose(actual, expected, rtol=1e-15, atol=1e-323)
         numbers = ~np.isnan(expected)
-        assert np.array_equal(np.signbit(got[numbers]), np.signbit(expected[numbers]))
+        assert np.array_equal(np.signbit(actual[numbers]), np.signbit(expected[numbers]))
 
 
 def _remainder(x: Values, y: Values) -> Values:

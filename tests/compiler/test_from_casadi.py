@@ -81,7 +81,7 @@ def all_of(arity: int) -> tuple[TracedFunction, Kernel]:
     return function, compile_function(function)
 
 
-def means_what_casadi_means(names: Sequence[str], *columns: np.ndarray) -> None:
+def check_agreement_with_casadi(names: Sequence[str], *columns: np.ndarray) -> None:
     """Compare native code for one sample and for lanes, and the interpreter, with CasADi at many points."""
     (function, kernel), samples = all_of(len(columns)), [column[:, None] for column in columns]
     # CasADi expects one sample per column.
@@ -94,12 +94,12 @@ def means_what_casadi_means(names: Sequence[str], *columns: np.ndarray) -> None:
 
 
 def test_unary_operations_agree_with_casadi() -> None:
-    means_what_casadi_means(list(UNARY), np.append(VALUES, np.nan))
+    check_agreement_with_casadi(list(UNARY), np.append(VALUES, np.nan))
 
 
 def test_binary_operations_agree_with_casadi() -> None:
     x, y = np.meshgrid(VALUES, VALUES)
-    means_what_casadi_means(list(BINARY), x.ravel(), y.ravel())
+    check_agreement_with_casadi(list(BINARY), x.ravel(), y.ravel())
 
 
 def test_minimum_and_maximum_propagate_nan() -> None:

@@ -21,7 +21,7 @@ from armblocks.compiler.target import Target
 from armblocks.equations import TracedFunction, signature
 from armblocks.errors import InputError
 
-BACK = 300
+LAG = 300
 """Distance to the oldest value that the recursion uses: longer than several pieces."""
 
 
@@ -32,7 +32,7 @@ def long_function(count: int) -> TracedFunction:
     def equations(x: SX, u: SX) -> tuple[SX, SX]:
         values = [x[0], x[1]]
         for k in range(count):
-            a, b, c = values[-1], values[-2], values[max(0, len(values) - BACK)]
+            a, b, c = values[-1], values[-2], values[max(0, len(values) - LAG)]
             values.append(ca.if_else(a < b, 0.7 * a + 0.2 * c, 0.6 * b - 0.3 * a * u[k % 3] + 0.01 * k))
             if k % 97 == 0:
                 values.append(ca.sin(values[-1]))
@@ -48,7 +48,7 @@ def long_function(count: int) -> TracedFunction:
 
 
 @cache
-def function_in_pieces() -> Kernel:
+def divided_function() -> Kernel:
     """The long function, compiled in several pieces."""
     return compile_function(long_function(600))
 
@@ -66,9 +66,9 @@ def test_a_long_function_in_pieces_equals_the_uncut_one_bit_for_bit(monkeypatch:
     x, u = rng.normal(size=(21, 2)), rng.normal(size=(21, 3))
     # A huge angle, for which the vector code calls the scalar code.
     x[20, 0] = 1e200
-    in_pieces = function_in_pieces()
-    actual = in_pieces(x, u)
-    singles = [in_pieces(x[row], u[row]) for row in range(21)]
+    divided = divided_function()
+    actual = divided(x, u)
+    singles = [divided(x[row], u[row]) for row in range(21)]
     message = [interpret(tape, [x[row], u[row]]) for row in (0, 7, 19)]
     monkeypatch.setenv("ARMBLOCKS_CACHE_DIR", "")
     monkeypatch.setattr(pieces, "LONGEST", 10**9)
@@ -86,21 +86,21 @@ def test_every_operation_and_store_is_in_one_piece_of_limited_length() -> None:
     stores = {
         k: (register,) for k, register in enumerate(register for part in tape.outputs for register in part)
     }
-    done = cut(tape, stores)
-    operations = [k for piece in done.pieces for k in range(piece.first, piece.last)]
+    division = cut(tape, stores)
+    operations = [k for piece in division.pieces for k in range(piece.first, piece.last)]
     assert operations == list(range(len(tape.operations)))
-    assert sorted(k for piece in done.pieces for k in piece.stores) == sorted(stores)
-    for piece in done.pieces:
+    assert sorted(k for piece in division.pieces for k in piece.stores) == sorted(stores)
+    for piece in division.pieces:
         assert piece.last - piece.first + ACCESS_WEIGHT * len(piece.stores) <= 2 * LENGTH
     # Storage is reused: the last 300 values are in use, not all 1500.
-    assert done.size < 2 * BACK + LENGTH
+    assert division.size < 2 * LAG + LENGTH
 
 
 @pytest.mark.parametrize("effort", ["LONG", "VERY_LONG"])
 def test_less_optimisation_does_not_change_the_bits(effort: str, monkeypatch: pytest.MonkeyPatch) -> None:
     traced = long_function(600)
     x, u = np.random.default_rng(1).normal(size=(2, 11, 3))
-    expected = function_in_pieces()(x[:, :2], u)
+    expected = divided_function()(x[:, :2], u)
     monkeypatch.setenv("ARMBLOCKS_CACHE_DIR", "")
     monkeypatch.setattr(native, "LONG", 0)
     if effort == "VERY_LONG":

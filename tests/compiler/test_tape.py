@@ -81,7 +81,7 @@ def test_simplification_does_not_change_the_bits(opcode: Opcode, x: float, c: fl
         operands = (builder.constant(c), builder.input(0, 0))
         value = builder.add(opcode, *(operands if left else reversed(operands)))
         negated = builder.add(Opcode.NEGATE, value)
-        got = interpret(builder.build([[value, negated]]), [[x]])[0]
+        actual = interpret(builder.build([[value, negated]]), [[x]])[0]
         a, b = (c, x) if left else (x, c)
         with np.errstate(all="ignore"):
             plain = {
@@ -90,7 +90,7 @@ def test_simplification_does_not_change_the_bits(opcode: Opcode, x: float, c: fl
                 Opcode.MULTIPLY: np.multiply,
                 Opcode.DIVIDE: np.divide,
             }[opcode](a, b)
-        assert same_bits(got, np.array([plain, -plain]))
+        assert same_bits(actual, np.array([plain, -plain]))
 
 
 def test_constants_are_folded() -> None:
@@ -144,7 +144,7 @@ def test_the_operation_count_of_a_tape() -> None:
 def test_the_interpreter_rounds_a_multiply_add_only_once(numbers: tuple[float, float, float]) -> None:
     a, b, c = numbers
     with np.errstate(all="ignore"):
-        got = float(multiply_add(*(np.array([number]) for number in numbers))[0])
+        actual = float(multiply_add(*(np.array([number]) for number in numbers))[0])
         plain = float(np.float64(a) * b + c)
     if not all(map(math.isfinite, numbers)):
         # With an infinite addend the sum is the addend, even where the rounded product would overflow.
@@ -157,7 +157,7 @@ def test_the_interpreter_rounds_a_multiply_add_only_once(numbers: tuple[float, f
         except OverflowError:
             expected = math.inf if exact > 0 else -math.inf
         expected = math.copysign(expected, 1 if exact > 0 else -1)
-    assert same_bits(np.array([got]), np.array([expected]))
+    assert same_bits(np.array([actual]), np.array([expected]))
 
 
 def test_the_interpreter_broadcasts_inputs_and_checks_their_sizes() -> None:

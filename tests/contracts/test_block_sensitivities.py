@@ -49,7 +49,7 @@ REFUSED = (
 Array = NDArray[np.float64]
 
 
-def shaken(block: Block, random: np.random.Generator) -> Block:
+def perturbed(block: Block, random: np.random.Generator) -> Block:
     """Return the block with random changes of its tunable parameters where these are valid."""
     for rule in block.own_parameters():
         value = np.asarray(block.parameter_value(rule.name)) if rule.tunable else np.array("")
@@ -81,7 +81,7 @@ def case(kind: str, surroundings: str, seed: int) -> tuple[Diagram, str, Sequenc
     shown = [other for other, block in example.blocks.items() if block.views() and other != name]
     for other, block in example.blocks.items():
         if other not in shown:
-            changed = shaken(block, random)
+            changed = perturbed(block, random)
             builder.add(
                 other, enabled(name, changed) if (other, surroundings) == (name, "enabled") else changed
             )
@@ -138,26 +138,26 @@ def extrapolated(plain: Sequence[Sequence[Array]], ratio: int) -> list[tuple[Arr
     return estimates
 
 
-def agree(
+def derivatives_agree(
     diagram: Diagram, result: ab.SensitivityResult, parameter: str, value: Array, outputs: Sequence[str]
 ) -> bool:
     """Return whether the derivatives agree with the differences, or no differences can be computed."""
     random = np.random.default_rng(len(parameter))
     along = random.uniform(0.5, 1.0, value.shape) * np.maximum(np.abs(value), 0.1)
-    judged = False
+    compared_outputs = False
     for step in (1e-3, 1e-5):
         try:
             for compared in differences(diagram, parameter, value, along, step, outputs):
-                judged, wrong = True, False
-                for output, (expected, doubt) in zip(outputs, compared):
+                compared_outputs, wrong = True, False
+                for output, (expected, uncertainty) in zip(outputs, compared):
                     actual = result[output, parameter].reshape(*expected.shape, -1) @ along.ravel()
-                    bound = 1e-4 * (0.05 + np.abs(expected).max()) + 10.0 * doubt
+                    bound = 1e-4 * (0.05 + np.abs(expected).max()) + 10.0 * uncertainty
                     wrong |= bool((~(np.abs(actual - expected) <= bound)).any())
                 if not wrong:
                     return True
         except ArmblocksError:
             continue  # a changed parameter is outside its bounds
-    return not judged
+    return not compared_outputs
 
 
 @pytest.mark.parametrize(("kind", "surroundings"), CASES)
@@ -177,7 +177,7 @@ def test_sensitivities_agree_with_differences_of_runs(kind: str, surroundings: s
     ]
     for result in sensitivities(diagram, names, outputs):
         for name in result.parameters:
-            assert agree(diagram, result, name, np.asarray(values[name]), outputs), name
+            assert derivatives_agree(diagram, result, name, np.asarray(values[name]), outputs), name
 
 
 def sensitivities(

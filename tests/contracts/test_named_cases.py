@@ -19,13 +19,13 @@ import pytest
 import armblocks as ab
 from armblocks import blocks as bl
 from armblocks.diagram import PortRef, structure
-from armblocks.diagram.structure import MOST_BLOCKS
+from armblocks.diagram.structure import MAX_BLOCKS
 from armblocks.errors import AlgebraicLoopError, ArmblocksError, ArmblocksWarning, RobotError
 from armblocks.formats import list_robots, load_robot, write_robot
 from armblocks.robot import JointLimits, Link, Motor, Prismatic, Revolute, Robot, plausibility_findings
 from armblocks.spatial import transl
 
-MOST_CHARACTERS = 400
+MAX_CHARACTERS = 400
 
 
 def message(error: ArmblocksError, folder: Path | None = None) -> str:
@@ -33,7 +33,7 @@ def message(error: ArmblocksError, folder: Path | None = None) -> str:
     assert error.where
     assert error.fix
     text = str(error) if folder is None else str(error).replace(f"{folder}/", "")
-    assert len(text) < MOST_CHARACTERS
+    assert len(text) < MAX_CHARACTERS
     assert text.isprintable()
     return text
 
@@ -122,7 +122,7 @@ DIAGRAMS: list[tuple[str, Callable[[ab.DiagramBuilder], None], str]] = [
     ("an empty name", named(" "), "a block has an empty name"),
     ("a formula that is code", code, "no function named '__import__'"),
     ("101 nested subsystems", deep, "subsystems are nested more than 100 levels deep"),
-    ("2^60 blocks", doubled_sixty_times, f"Allowed: at most {MOST_BLOCKS}"),
+    ("2^60 blocks", doubled_sixty_times, f"Allowed: at most {MAX_BLOCKS}"),
 ]
 
 
@@ -161,12 +161,12 @@ def test_a_million_blocks_are_refused_while_they_are_built() -> None:
         for k in range(1_000_000):
             builder.add(f"c{k}", block)
     text = message(refused.value)
-    assert f"case': the diagram has {MOST_BLOCKS + 1} blocks" in text
+    assert f"case': the diagram has {MAX_BLOCKS + 1} blocks" in text
     assert "use vectors" in text
 
 
 def test_a_file_of_very_many_blocks_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(structure, "MOST_BLOCKS", 1_000)  # the test above covers the actual limit
+    monkeypatch.setattr(structure, "MAX_BLOCKS", 1_000)  # the test above covers the actual limit
     blocks: dict[str, Any] = {f"c{k}": {"type": "Ground"} for k in range(1_001)}
     path = tmp_path / "case.json"
     path.write_text(json.dumps({"format": 1, "name": "case", "blocks": blocks}), encoding="utf-8")
@@ -236,7 +236,7 @@ def test_negative_viscous_friction_raises_a_warning() -> None:
         arm(motor=Motor(viscous_friction=-0.1))
 
 
-DOUBTFUL: list[tuple[dict[str, Any], str]] = [
+IMPLAUSIBLE: list[tuple[dict[str, Any], str]] = [
     ({"joint": limited(-180.0, 180.0)}, "link 'bar': the joint turns from -180 to 180 rad"),
     ({"length": 450.0}, "it reaches 450 m. Are its lengths in millimetres?"),
     ({"joint": limited(0.0, 800.0, Prismatic)}, "Are its lengths in millimetres?"),
@@ -247,7 +247,7 @@ DOUBTFUL: list[tuple[dict[str, Any], str]] = [
 
 @pytest.mark.parametrize(
     ("fields", "words"),
-    DOUBTFUL,
+    IMPLAUSIBLE,
     ids=["degrees", "millimetres", "millimetres of travel", "kg mm2", "gravity up"],
 )
 def test_a_probable_error_of_unit_or_sign_raises_a_warning(
@@ -255,7 +255,7 @@ def test_a_probable_error_of_unit_or_sign_raises_a_warning(
 ) -> None:
     (text,) = map(str, plausibility_findings(arm(**fields)))
     assert words in text
-    assert len(text) < MOST_CHARACTERS
+    assert len(text) < MAX_CHARACTERS
     (tmp_path / "arm.json").write_bytes(write_robot(arm(**fields)))
     with pytest.warns(ArmblocksWarning) as caught:
         load_robot(str(tmp_path / "arm.json"))

@@ -12,7 +12,7 @@ import armblocks as ab
 from armblocks import blocks as bl
 from armblocks.errors import ArmblocksError
 
-MOST_CHARACTERS = 400
+MAX_CHARACTERS = 400
 
 
 def ramp() -> ab.Diagram:
@@ -27,7 +27,7 @@ def message(error: ArmblocksError) -> str:
     assert error.what
     assert error.where
     assert error.fix
-    assert len(str(error)) < MOST_CHARACTERS
+    assert len(str(error)) < MAX_CHARACTERS
     return str(error)
 
 

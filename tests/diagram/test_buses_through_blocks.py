@@ -84,8 +84,8 @@ def with_bus(block: Block, inputs: tuple[str, ...]) -> Diagram:
         if mark in inputs:
             wires[mark] = bus_of(builder, mark, signals(builder, mark, factor))
     through = builder.add("block", block, *(wires[name] for name in inputs))
-    taken = builder.add("taken", BusSelector(elements=", ".join(NAMES)), through)
-    builder.add("scope", Scope(inputs=3), *(taken[name.rpartition(".")[2]] for name in NAMES))
+    selected = builder.add("taken", BusSelector(elements=", ".join(NAMES)), through)
+    builder.add("scope", Scope(inputs=3), *(selected[name.rpartition(".")[2]] for name in NAMES))
     return builder.build()
 
 

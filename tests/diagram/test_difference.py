@@ -36,10 +36,12 @@ from armblocks.diagram import (
 
 def loop(names: Mapping[str, str] | None = None, *, inner: str = "law", **blocks: Block) -> Diagram:
     """A controlled integrator with a subsystem; ``names`` and ``blocks`` replace names and blocks."""
-    called = {name: name for name in ("wanted", "error", "controller", "plant", "scope")} | dict(names or {})
+    called = {name: name for name in ("reference", "error", "controller", "plant", "scope")} | dict(
+        names or {}
+    )
     builder = DiagramBuilder("loop")
-    wanted = builder.add(called["wanted"], blocks.get("wanted", Step(time=0.5)))
-    error = builder.add(called["error"], Sum(signs="+-"), wanted)
+    reference = builder.add(called["reference"], blocks.get("reference", Step(time=0.5)))
+    error = builder.add(called["error"], Sum(signs="+-"), reference)
     with builder.subsystem(called["controller"], error) as controller:
         e = controller.input("e")
         controller.output("u", controller.add(inner, blocks.get("law", Gain(gain=3.0)), e))
@@ -107,24 +109,24 @@ def test_layout_inside_a_subsystem_is_no_difference() -> None:
 def test_every_changed_parameter_is_reported_with_both_values() -> None:
     before = loop()
     difference = diagram_difference(
-        before, with_parameters(before, {"wanted.time": 0.75, "controller/law.gain": 4})
+        before, with_parameters(before, {"reference.time": 0.75, "controller/law.gain": 4})
     )
     only(difference, "parameters")
     assert [(c.path, c.name, c.before, c.after) for c in difference.parameters] == [
         ("controller/law", "gain", 3.0, 4.0),
-        ("wanted", "time", 0.5, 0.75),
+        ("reference", "time", 0.5, 0.75),
     ]
 
 
 def test_a_changed_block_type_is_reported_with_the_parameters_of_both() -> None:
-    difference = diagram_difference(loop(), loop(wanted=Constant(value=2.0)))
+    difference = diagram_difference(loop(), loop(reference=Constant(value=2.0)))
     only(difference, "types", "parameters")
-    assert [(c.path, c.before, c.after) for c in difference.types] == [("wanted", "Step", "Constant")]
+    assert [(c.path, c.before, c.after) for c in difference.types] == [("reference", "Step", "Constant")]
     assert ("value", None, 2.0) in [(c.name, c.before, c.after) for c in difference.parameters]
     assert ("time", 0.5, None) in [(c.name, c.before, c.after) for c in difference.parameters]
 
 
-@pytest.mark.parametrize("old_name", ["wanted", "error", "controller", "plant", "scope"])
+@pytest.mark.parametrize("old_name", ["reference", "error", "controller", "plant", "scope"])
 def test_a_renamed_block_is_recognised(old_name: str) -> None:
     difference = diagram_difference(loop(), loop({old_name: "another"}))
     only(difference, "renamed")
@@ -132,7 +134,7 @@ def test_a_renamed_block_is_recognised(old_name: str) -> None:
 
 
 def test_connected_blocks_that_are_all_renamed_are_recognised() -> None:
-    names = {"wanted": "a", "error": "b", "controller": "c", "plant": "d", "scope": "e"}
+    names = {"reference": "a", "error": "b", "controller": "c", "plant": "d", "scope": "e"}
     difference = diagram_difference(loop(), loop(names))
     only(difference, "renamed")
     assert {entry.before: entry.after for entry in difference.renamed} == names
@@ -174,12 +176,12 @@ def test_indistinguishable_blocks_are_each_paired_at_most_once() -> None:
 
 
 def test_a_block_with_other_name_and_other_parameter_is_a_new_block() -> None:
-    difference = diagram_difference(loop(), loop({"wanted": "target"}, wanted=Step(time=9.0)))
+    difference = diagram_difference(loop(), loop({"reference": "target"}, reference=Step(time=9.0)))
     only(difference, "added", "removed", "wires_added", "wires_removed")
-    assert [entry.path for entry in difference.removed] == ["wanted"]
+    assert [entry.path for entry in difference.removed] == ["reference"]
     assert [(entry.path, entry.block) for entry in difference.added] == [("target", Step(time=9.0))]
     assert [str(entry.wire) for entry in difference.wires_added] == ["target/y -> error/u1"]
-    assert [str(entry.wire) for entry in difference.wires_removed] == ["wanted/y -> error/u1"]
+    assert [str(entry.wire) for entry in difference.wires_removed] == ["reference/y -> error/u1"]
 
 
 def test_a_changed_connection_is_reported_with_its_subsystem() -> None:
@@ -222,14 +224,14 @@ def test_settings_and_description_are_reported() -> None:
 
 
 def test_logged_outputs_are_reported_with_the_new_block_names() -> None:
-    before = dataclasses.replace(loop(), logged=(PortRef("plant", "y"), PortRef("wanted", "y")))
+    before = dataclasses.replace(loop(), logged=(PortRef("plant", "y"), PortRef("reference", "y")))
     after = dataclasses.replace(
         loop({"plant": "tank"}), logged=(PortRef("tank", "y"), PortRef("controller", "u"))
     )
     difference = diagram_difference(before, after)
     only(difference, "renamed", "logged_added", "logged_removed")
     assert [(entry.path, str(entry.port)) for entry in difference.logged_added] == [("", "controller/u")]
-    assert [(entry.path, str(entry.port)) for entry in difference.logged_removed] == [("", "wanted/y")]
+    assert [(entry.path, str(entry.port)) for entry in difference.logged_removed] == [("", "reference/y")]
 
 
 def test_changed_texts_of_notes_are_reported_and_moved_notes_are_not() -> None:
@@ -252,7 +254,7 @@ def test_changed_texts_of_notes_are_reported_and_moved_notes_are_not() -> None:
     [
         loop({"plant": "tank"}),
         loop(law=Gain(gain=8.0)),
-        loop({"wanted": "target"}, wanted=Step(time=9.0)),
+        loop({"reference": "target"}, reference=Step(time=9.0)),
         chains("a", "b"),
         dataclasses.replace(loop(), logged=(PortRef("plant", "y"),), notes={"/a": Note(x=0, y=0, text="a")}),
         ab.load_diagram("van_der_pol_pid"),
@@ -261,8 +263,8 @@ def test_changed_texts_of_notes_are_reported_and_moved_notes_are_not() -> None:
 )
 def test_the_difference_in_the_other_direction_is_the_reverse(after: Diagram) -> None:
     before = loop()
-    there, back = diagram_difference(before, after), diagram_difference(after, before)
-    assert swapped(there).added == back.added
+    forward, backward = diagram_difference(before, after), diagram_difference(after, before)
+    assert swapped(forward).added == backward.added
     for kind in (
         "removed",
         "types",
@@ -273,6 +275,6 @@ def test_the_difference_in_the_other_direction_is_the_reverse(after: Diagram) ->
         "logged_added",
         "notes",
     ):
-        assert getattr(swapped(there), kind) == getattr(back, kind)
-    assert set(swapped(there).parameters) == set(back.parameters)
-    assert there.count == back.count
+        assert getattr(swapped(forward), kind) == getattr(backward, kind)
+    assert set(swapped(forward).parameters) == set(backward.parameters)
+    assert forward.count == backward.count

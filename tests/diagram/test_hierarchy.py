@@ -47,9 +47,11 @@ from armblocks.errors import AlgebraicLoopError, DiagramError, InputError, Unkno
 def loop_in_levels() -> Diagram:
     """A control loop: controller and plant are subsystems, and the controller contains another one."""
     builder = DiagramBuilder("loop")
-    wanted = builder.add("wanted", Step(time=0.5, final=2.0))
-    with builder.subsystem("controller", wanted) as controller:
-        error = controller.add("error", Sum(signs="+-"), controller.input("wanted"), controller.input("is"))
+    reference = builder.add("reference", Step(time=0.5, final=2.0))
+    with builder.subsystem("controller", reference) as controller:
+        error = controller.add(
+            "error", Sum(signs="+-"), controller.input("reference"), controller.input("is")
+        )
         with controller.subsystem("law", error) as law:
             u = law.input("e")
             law.output("u", law.add("pid", PID(P=3.0, I=1.5, D=0.2, N=40.0), u))
@@ -70,8 +72,8 @@ def loop_in_levels() -> Diagram:
 def flat_loop() -> Diagram:
     """The same diagram without subsystems."""
     builder = DiagramBuilder("loop")
-    wanted = builder.add("wanted", Step(time=0.5, final=2.0))
-    error = builder.add("error", Sum(signs="+-"), wanted)
+    reference = builder.add("reference", Step(time=0.5, final=2.0))
+    error = builder.add("error", Sum(signs="+-"), reference)
     pid = builder.add("pid", PID(P=3.0, I=1.5, D=0.2, N=40.0), error)
     acceleration = builder.add("acceleration", Sum(signs="+-"), pid)
     speed = builder.add("speed", Integrator(), acceleration)
@@ -84,7 +86,7 @@ def flat_loop() -> Diagram:
 
 
 PATHS = {
-    "wanted": "wanted",
+    "reference": "reference",
     "controller/error": "error",
     "controller/law/pid": "pid",
     "plant/acceleration": "acceleration",

@@ -227,13 +227,13 @@ def test_units_are_propagated_through_blocks() -> None:
 
 def test_signals_that_are_added_to_a_speed_take_its_unit() -> None:
     builder = DiagramBuilder("d")
-    traj, wanted = builder.add("traj", JTraj()), builder.add("wanted", Step())
-    builder.add("error", Sum(signs="+-"), wanted, traj["qd"])
-    builder.add("both", Mux(), wanted, traj["qd"])
+    traj, set_point = builder.add("traj", JTraj()), builder.add("reference", Step())
+    builder.add("error", Sum(signs="+-"), set_point, traj["qd"])
+    builder.add("both", Mux(), set_point, traj["qd"])
     clock, load = builder.add("clock", Clock()), builder.add("load", Step())
     builder.add("mixed", Sum(signs="+++"), load, traj["q"], clock)
     units = {slot.name: slot.unit for slot in trace_diagram(builder.build()).signals_layout}
-    assert units["wanted/y"] == units["error/y"] == units["both/y"] == "rad/s"
+    assert units["reference/y"] == units["error/y"] == units["both/y"] == "rad/s"
     assert units["load/y"] == units["mixed/y"] == ""
 
 

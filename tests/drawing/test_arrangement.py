@@ -85,8 +85,8 @@ def test_laws_of_arranged_diagrams(seed: int) -> None:
     result = arranged(diagram)
     expect_apart(result)
     assert set(result.layout) == set(diagram.blocks)
-    seen, wanted = connections_in_the_drawing(result)
-    assert seen == wanted
+    inferred, expected = connections_in_the_drawing(result)
+    assert inferred == expected
     assert arranged(result) == result
     elsewhere = {name: Placement(x=draw.randint(0, 500), y=7.0, flipped=True) for name in diagram.blocks}
     assert arranged(replace(diagram, layout=elsewhere)) == result
@@ -183,5 +183,5 @@ def test_blocks_without_connections_and_incomplete_ones_have_places() -> None:
     builder.connect(loop, loop)
     diagram = arranged(builder.draft())
     expect_apart(diagram)
-    lost = Connection(PortRef("b1", "gone"), PortRef("b2", "u"))
-    expect_apart(arranged(replace(diagram, connections=(lost,))))
+    dangling = Connection(PortRef("b1", "gone"), PortRef("b2", "u"))
+    expect_apart(arranged(replace(diagram, connections=(dangling,))))

@@ -111,8 +111,8 @@ def test_blocks_do_not_overlap(diagram: Diagram) -> None:
 
 def test_the_connections_can_be_read_from_the_drawing(diagram: Diagram) -> None:
     """Every connection is drawn as a line, because these sheets have enough room."""
-    seen, wanted = connections_in_the_drawing(diagram)
-    assert seen == wanted
+    inferred, expected = connections_in_the_drawing(diagram)
+    assert inferred == expected
     assert all(drawn_lines(diagram).values())
 
 

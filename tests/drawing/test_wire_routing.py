@@ -220,9 +220,9 @@ AB, CD = ((0, 0), (100, 0)), ((0, 40), (100, 40))
 def test_the_reader_detects_ambiguous_drawings(
     lines: list[Path], dots: list[tuple[float, float]], message: str
 ) -> None:
-    seen = Drawing({"e": Block(40, 50, 20, 20)}, PORTS, lines, dots, {})
+    sheet_drawing = Drawing({"e": Block(40, 50, 20, 20)}, PORTS, lines, dots, {})
     with pytest.raises(AmbiguousError, match=message):
-        read(seen)
+        read(sheet_drawing)
 
 
 def test_the_reader_follows_crossings_branches_and_labels() -> None:

@@ -105,13 +105,13 @@ def _check_shape(line: Sequence[Point]) -> None:
     for a, b in pairwise(line):
         if (a[0] == b[0]) == (a[1] == b[1]):
             raise AmbiguousError(f"a segment is neither horizontal nor vertical: {a} {b}")
-    pieces = list(pairwise(line))
-    for i, one in enumerate(pieces):
-        for j in range(i + 2, len(pieces)):
-            step = j == i + 2 and _same_direction(one, pieces[j])
-            if _gap(one, pieces[j]) < NEAR and not step:
+    segments = list(pairwise(line))
+    for i, one in enumerate(segments):
+        for j in range(i + 2, len(segments)):
+            step = j == i + 2 and _same_direction(one, segments[j])
+            if _gap(one, segments[j]) < NEAR and not step:
                 raise AmbiguousError(f"a line meets itself: {line}")
-        if i and _backwards(pieces[i - 1], one):
+        if i and _backwards(segments[i - 1], one):
             raise AmbiguousError(f"a line runs back on itself: {line}")
 
 
@@ -126,12 +126,12 @@ def _same_direction(one: tuple[Point, Point], other: tuple[Point, Point]) -> boo
 def _check_blocks(line: Sequence[Point], drawing: Drawing) -> None:
     """Check the distance to other ports and blocks, and that the outer segments leave their blocks
     outwards."""
-    pieces = list(pairwise(line))
+    segments = list(pairwise(line))
     for name, port in _nearby(line, drawing.ports).items():
         here = (port.x, port.y)
-        for k, (a, b) in enumerate(pieces):
+        for k, (a, b) in enumerate(segments):
             if (k == 0 and _is_at(port, a) and port.is_output) or (
-                k == len(pieces) - 1 and _is_at(port, b) and not port.is_output
+                k == len(segments) - 1 and _is_at(port, b) and not port.is_output
             ):
                 other = b if port.is_output else a
                 along = (other[0] - port.x) * port.out[0] + (other[1] - port.y) * port.out[1]
@@ -143,9 +143,9 @@ def _check_blocks(line: Sequence[Point], drawing: Drawing) -> None:
     for name, block in drawing.blocks.items():
         if not block.meets(hull[0], hull[1], NEAR):
             continue
-        for k, (a, b) in enumerate(pieces):
+        for k, (a, b) in enumerate(segments):
             at_own_port = (k == 0 and _is_of(name, a, drawing, is_output=True)) or (
-                k == len(pieces) - 1 and _is_of(name, b, drawing, is_output=False)
+                k == len(segments) - 1 and _is_of(name, b, drawing, is_output=False)
             )
             if block.meets(a, b, 0.0 if at_own_port else NEAR):
                 raise AmbiguousError(f"a line runs under {name}: {line}")
@@ -177,7 +177,7 @@ def _is_at(port: Port, point: Point) -> bool:
 def _contacts(drawing: Drawing, groups: _Groups) -> set[int]:
     """Join the lines that meet at dots; returns the lines that start on another line."""
     begins: set[int] = set()
-    for (i, one), (j, other) in _close_pieces(drawing.lines):
+    for (i, one), (j, other) in _close_segments(drawing.lines):
         first, second = drawing.lines[i], drawing.lines[j]
         for number, line, whole in ((i, first, other), (j, second, one)):
             if _gap(whole, (line[0], line[0])) == 0.0 and _dot_at(line[0], drawing.dots):
@@ -193,17 +193,17 @@ def _contacts(drawing: Drawing, groups: _Groups) -> set[int]:
     return begins
 
 
-def _close_pieces(
+def _close_segments(
     lines: Sequence[Sequence[Point]],
 ) -> Iterator[tuple[tuple[int, tuple[Point, Point]], tuple[int, tuple[Point, Point]]]]:
     """Pairs of near segments of two different lines."""
-    pieces = [(k, piece) for k, line in enumerate(lines) for piece in pairwise(line)]
-    if not pieces:
+    segments = [(k, segment) for k, line in enumerate(lines) for segment in pairwise(line)]
+    if not segments:
         return
     boxes = np.array(
-        [(min(a[0], b[0]), min(a[1], b[1]), max(a[0], b[0]), max(a[1], b[1])) for _, (a, b) in pieces]
+        [(min(a[0], b[0]), min(a[1], b[1]), max(a[0], b[0]), max(a[1], b[1])) for _, (a, b) in segments]
     )
-    owner = np.array([k for k, _ in pieces])
+    owner = np.array([k for k, _ in segments])
     near = (
         (boxes[:, None, 0] < boxes[None, :, 2] + NEAR)
         & (boxes[None, :, 0] < boxes[:, None, 2] + NEAR)
@@ -212,7 +212,7 @@ def _close_pieces(
         & (owner[:, None] < owner[None, :])
     )
     for i, j in np.argwhere(near).tolist():
-        yield pieces[i], pieces[j]
+        yield segments[i], segments[j]
 
 
 def _dot_at(point: Point, dots: Sequence[Point]) -> bool:
@@ -225,10 +225,10 @@ def _crosses(one: tuple[Point, Point], other: tuple[Point, Point]) -> bool:
         return False
     point = _crossing(one, other)
     return all(
-        min(abs(point[axis] - end[axis]) for end in piece) >= NEAR
-        and min(end[axis] for end in piece) < point[axis] < max(end[axis] for end in piece)
-        for piece in (one, other)
-        for axis in (int(piece[0][0] == piece[1][0]),)
+        min(abs(point[axis] - end[axis]) for end in segment) >= NEAR
+        and min(end[axis] for end in segment) < point[axis] < max(end[axis] for end in segment)
+        for segment in (one, other)
+        for axis in (int(segment[0][0] == segment[1][0]),)
     )
 
 

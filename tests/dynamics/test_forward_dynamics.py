@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from armblocks.dynamics import TRACES
 from armblocks.dynamics.aba import aba
 from armblocks.dynamics.base_parameters import regrouped
-from armblocks.dynamics.forward import MOST_JOINTS_BY_MATRIX, forward_dynamics
+from armblocks.dynamics.forward import MAX_JOINTS_BY_MATRIX, forward_dynamics
 from armblocks.dynamics.joint_motion import entries, joint_motions
 from armblocks.dynamics.rnea import Wrench
 from armblocks.errors import RobotError
@@ -46,7 +46,7 @@ def test_long_chains_use_the_articulated_body_algorithm():
             mass=1.0,
             inertia=random_inertia(random) + np.eye(3) * 0.1,
         )
-        for i in range(MOST_JOINTS_BY_MATRIX + 1)
+        for i in range(MAX_JOINTS_BY_MATRIX + 1)
     ]
     snake = Robot(name="snake", links=serial_chain(links))
     for q, qd, qdd in random_states(snake, 1):

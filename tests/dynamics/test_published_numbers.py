@@ -10,7 +10,7 @@ from robots_for_tests import evaluate
 QN = np.array([0, np.pi / 4, -np.pi, 0, np.pi / 4, 0])
 QZ = np.zeros(6)
 QR = np.array([0, np.pi / 2, -np.pi / 2, 0, 0, 0])
-ONES, STILL = np.ones(6), np.zeros(6)
+ONES, ZEROS = np.ones(6), np.zeros(6)
 TEN_DIGITS = {"rtol": 0, "atol": 0.51e-10}
 
 
@@ -32,7 +32,7 @@ def test_forward_kinematics(puma560: Robot):
 )
 def test_gravity_load(puma560: Robot, q: np.ndarray, expected: tuple[float, ...]):
     assert_allclose(evaluate(puma560, "gravload", q), expected, **TEN_DIGITS)
-    assert_allclose(evaluate(puma560, "rne", q, STILL, STILL), expected, **TEN_DIGITS)
+    assert_allclose(evaluate(puma560, "rne", q, ZEROS, ZEROS), expected, **TEN_DIGITS)
 
 
 def test_inverse_dynamics(puma560: Robot):
@@ -40,9 +40,9 @@ def test_inverse_dynamics(puma560: Robot):
     both = (32.4952427549, 60.8669884751, 17.7435949128, 1.4545190261, 1.2991104105, 0.7137808875)
     moving = (29.1421318969, 56.5043576095, 16.3527688584, 1.2644759915, 1.1239222794, 0.5196480975)
     smooth = (1.962036487, 37.7854298333, 6.6739373224, 0.1912661164, 0.2058204096, 0.1942810742)
-    assert_allclose(evaluate(puma560, "rne", QN, STILL, ONES), accelerated, **TEN_DIGITS)
+    assert_allclose(evaluate(puma560, "rne", QN, ZEROS, ONES), accelerated, **TEN_DIGITS)
     assert_allclose(evaluate(puma560, "rne", QN, ONES, ONES), both, **TEN_DIGITS)
-    assert_allclose(evaluate(puma560, "rne", QN, ONES, STILL), moving, **TEN_DIGITS)
+    assert_allclose(evaluate(puma560, "rne", QN, ONES, ZEROS), moving, **TEN_DIGITS)
     assert_allclose(evaluate(puma560.nofriction(), "rne", QN, ONES, ONES), smooth, **TEN_DIGITS)
 
 
@@ -52,7 +52,7 @@ def test_friction(puma560: Robot):
 
 
 def test_force_and_moment_at_the_last_link(puma560: Robot):
-    tau = evaluate(puma560.nofriction(), "rne_loaded", QN, STILL, STILL, (1, 2, 3, 1, 2, 3), np.zeros(10))
+    tau = evaluate(puma560.nofriction(), "rne_loaded", QN, ZEROS, ZEROS, (1, 2, 3, 1, 2, 3), np.zeros(10))
     # The source has six significant digits.
     assert_allclose(tau, (0.642756, 29.0866, 4.70321, 2.82843, -1.97175, 3), rtol=5e-6)
 
@@ -92,7 +92,7 @@ def test_forward_dynamics(puma560: Robot):
     expected = (-7.4102, -9.8432, -10.9694, -4.4314, -0.9881, 21.0228)
     assert_allclose(evaluate(puma560, "accel", QN, qd, tau), expected, rtol=0, atol=0.51e-4)
     falling = (-0.6619970387, -6.9292906973, -3.771483542, -0.0086542491, -0.0368875517, 1.2611e-6)
-    accel = evaluate(puma560.nofriction(), "accel", QN, STILL, STILL)
+    accel = evaluate(puma560.nofriction(), "accel", QN, ZEROS, ZEROS)
     assert_allclose(accel, falling, rtol=0, atol=1e-10)
 
 

@@ -14,13 +14,13 @@ from armblocks.equations.clock_ratios import common_period, exact_clocks, simple
 def test_rounded_sample_times_have_the_common_period_of_their_fractions() -> None:
     random = np.random.default_rng(9)
     for _ in range(200):
-        meant = [Fraction(int(a), int(b)) for a, b in random.integers(1, 1000, (3, 2))]
-        offsets = [period * Fraction(int(k), 64) for period, k in zip(meant, random.integers(0, 64, 3))]
-        clocks = exact_clocks([SampleClock(float(own), float(at)) for own, at in zip(meant, offsets)])
-        assert clocks == list(zip(meant, offsets))
+        periods = [Fraction(int(a), int(b)) for a, b in random.integers(1, 1000, (3, 2))]
+        offsets = [period * Fraction(int(k), 64) for period, k in zip(periods, random.integers(0, 64, 3))]
+        clocks = exact_clocks([SampleClock(float(own), float(at)) for own, at in zip(periods, offsets)])
+        assert clocks == list(zip(periods, offsets))
         period = common_period(clocks)
-        assert all((period / own).denominator == 1 for own in meant)
-        assert math.gcd(*(int(period / own) for own in meant)) == 1
+        assert all((period / own).denominator == 1 for own in periods)
+        assert math.gcd(*(int(period / own) for own in periods)) == 1
 
 
 def test_the_period_of_a_single_clock_is_unchanged_bit_for_bit() -> None:

@@ -28,9 +28,9 @@ def marked(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setitem(rounded_functions.FUNCTIONS, name, lambda *arguments: MARK)
 
 
-def constants_of(put: Callable[[ab.DiagramBuilder], object]) -> tuple[float, ...]:
+def constants_of(add_blocks: Callable[[ab.DiagramBuilder], object]) -> tuple[float, ...]:
     builder = ab.DiagramBuilder("d")
-    builder.log(put(builder))  # pyright: ignore[reportArgumentType]
+    builder.log(add_blocks(builder))  # pyright: ignore[reportArgumentType]
     return tape_from(trace_diagram(builder.build()).signals).constants
 
 
@@ -90,8 +90,8 @@ def test_powers_of_constants_keep_value_and_derivative() -> None:
         function = casadi.Function("f", [u], [value, casadi.jacobian(value, u)])
         for x in (-2.0, 0.0, 3.0):
             if base > 0.0 or (base < 0.0 or x >= 0.0):
-                got, slope = (float(part) for part in function(x))
-                assert got == pytest.approx(base**x, rel=1e-15)
+                actual, slope = (float(part) for part in function(x))
+                assert actual == pytest.approx(base**x, rel=1e-15)
                 if base > 0.0:
                     assert slope == pytest.approx(math.log(base) * base**x, rel=1e-14, abs=1e-15)
 

@@ -108,8 +108,8 @@ def test_the_gain_of_a_limiter_at_its_limit_is_zero() -> None:
 def sampled_servo(period: float) -> ab.Diagram:
     """x' = -x + hold(gain (1 - x)), with a hold of the given period."""
     builder = ab.DiagramBuilder("servo")
-    wanted = builder.add("wanted", Constant(value=1.0))
-    error = builder.add("error", Sum(signs="+-"), wanted)
+    reference = builder.add("reference", Constant(value=1.0))
+    error = builder.add("error", Sum(signs="+-"), reference)
     held = builder.add("hold", ZeroOrderHold(sample_time=period), builder.add("gain", Gain(gain=2.0), error))
     rate = builder.add("rate", Sum(signs="+-"), held)
     state = builder.add("x", Integrator(), rate)
@@ -120,7 +120,7 @@ def sampled_servo(period: float) -> ab.Diagram:
 
 def test_the_linear_system_of_a_sampled_loop_is_the_map_over_one_period() -> None:
     period = 0.3
-    system = ab.linearize(sampled_servo(period), "wanted", "x")
+    system = ab.linearize(sampled_servo(period), "reference", "x")
     decay = np.exp(-period)
     assert system.dt == period
     assert system.states == ("x/x",)  # the held output is computed anew at every tick
@@ -131,7 +131,7 @@ def test_the_linear_system_of_a_sampled_loop_is_the_map_over_one_period() -> Non
 
 def test_the_run_of_a_sampled_loop_agrees_with_its_linear_system() -> None:
     diagram, period = sampled_servo(0.3), 0.3
-    system = ab.linearize(diagram, "wanted", "x")
+    system = ab.linearize(diagram, "reference", "x")
     result = ab.simulate(diagram, stop_time=6.0, sample_time=period, rtol=1e-11, atol=1e-13)
     answer = system.step_response(6.0)
     assert np.allclose(answer.values[:, 0, 0], result["x"], atol=1e-9)

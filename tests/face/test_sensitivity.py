@@ -79,8 +79,8 @@ def differences(
 
 def sampled() -> ab.Diagram:
     builder = ab.DiagramBuilder("sampled")
-    wanted = builder.add("wanted", Constant(value=1.0))
-    error = builder.add("error", Sum(signs="+-"), wanted)
+    reference = builder.add("reference", Constant(value=1.0))
+    error = builder.add("error", Sum(signs="+-"), reference)
     held = builder.add("hold", ZeroOrderHold(sample_time=0.25), builder.add("gain", Gain(gain=2.0), error))
     rate = builder.add("rate", Sum(signs="+-"), held)
     state = builder.add("x", Integrator(), rate)
@@ -245,9 +245,11 @@ def test_sensitivities_agree_with_differences_of_runs(
         actual = result["x", parameter]
         # Where an event of one run is before a sample and that of another run after it, differences are
         # invalid.
-        expected, doubt = differences(diagram, parameter, "x", step, **settings)
-        assert np.mean(doubt < 1e-3) > 0.8
-        assert np.all(np.abs(actual - expected) <= 1e-5 * (1.0 + np.abs(expected)) + 10.0 * doubt), parameter
+        expected, uncertainty = differences(diagram, parameter, "x", step, **settings)
+        assert np.mean(uncertainty < 1e-3) > 0.8
+        assert np.all(np.abs(actual - expected) <= 1e-5 * (1.0 + np.abs(expected)) + 10.0 * uncertainty), (
+            parameter
+        )
         assert np.abs(actual).max() > 1e-2
 
 

@@ -90,8 +90,8 @@ def test_a_state_may_move_while_another_is_steady() -> None:
 
 def test_the_steady_state_of_a_sampled_controller_with_integral_action() -> None:
     builder = ab.DiagramBuilder("sampled")
-    wanted = builder.add("wanted", Constant(value=2.0))
-    error = builder.add("error", Sum(signs="+-"), wanted)
+    reference = builder.add("reference", Constant(value=2.0))
+    error = builder.add("error", Sum(signs="+-"), reference)
     control = builder.add("control", DiscreteIntegrator(sample_time=0.1), error)
     rate = builder.add("rate", Sum(signs="+-"), control)
     state = builder.add("x", Integrator(), rate)

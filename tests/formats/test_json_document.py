@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from armblocks.errors import FormatError
 from armblocks.formats.canonical_json import canonical_bytes
 from armblocks.formats.json_document import (
-    DEEPEST,
+    MAX_DEPTH,
     Node,
     closed_members,
     path_text,
@@ -124,7 +124,7 @@ def test_values_without_a_json_form_are_refused(value: object, message: str) -> 
 
 def test_a_too_deeply_nested_value_is_refused() -> None:
     value: list[object] = []
-    for _ in range(DEEPEST + 1):
+    for _ in range(MAX_DEPTH + 1):
         value = [value]
     with pytest.raises(FormatError, match="objects and arrays are nested too deeply"):
         canonical_bytes(value)

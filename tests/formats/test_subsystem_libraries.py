@@ -15,7 +15,7 @@ from armblocks.blocks import BLOCKS, Constant, Gain, Scope, SineWave, Subsystem
 from armblocks.diagram import Diagram, DiagramBuilder, block_count, formula, with_parameters
 from armblocks.errors import ArmblocksError, DiagramError, FormatError, UnknownNameError
 from armblocks.formats import diagram_from_bytes, diagram_to_bytes, load_robot
-from armblocks.formats.subsystem_libraries import DEEPEST_CHAIN
+from armblocks.formats.subsystem_libraries import MAX_LIBRARY_DEPTH
 
 
 def amplifier(inside: Subsystem | None = None) -> Diagram:
@@ -130,8 +130,8 @@ def cases(folder: Path) -> list[tuple[str, type[ArmblocksError], str]]:
     written(folder / "empty.json", {})
     written(folder / "circle.json", {"A": linked("ring.json#B")})
     written(folder / "ring.json", {"B": linked("circle.json#A"), "Self": linked("ring.json#Self")})
-    chain = {f"n{k}": linked(f"deep.json#n{k + 1}") for k in range(DEEPEST_CHAIN + 5)}
-    written(folder / "deep.json", {**chain, f"n{DEEPEST_CHAIN + 5}": {"blocks": {}}})
+    chain = {f"n{k}": linked(f"deep.json#n{k + 1}") for k in range(MAX_LIBRARY_DEPTH + 5)}
+    written(folder / "deep.json", {**chain, f"n{MAX_LIBRARY_DEPTH + 5}": {"blocks": {}}})
     pair = {
         f"n{k}": {"blocks": {name: {"type": "Subsystem", "library": f"wide.json#n{k + 1}"} for name in "ab"}}
         for k in range(30)
@@ -150,7 +150,7 @@ def cases(folder: Path) -> list[tuple[str, type[ArmblocksError], str]]:
         ("parts/base.json#Amplifire", UnknownNameError, "named 'Amplifire'.*did you mean 'Amplifier'"),
         ("circle.json#A", FormatError, r"in a cycle: circle.json#A -> ring.json#B -> circle.json#A"),
         ("ring.json#Self", FormatError, r"contain each other in a cycle: ring.json#Self -> ring.json#Self"),
-        ("deep.json#n0", FormatError, f"nested more than {DEEPEST_CHAIN} levels deep: deep.json#n0 -> "),
+        ("deep.json#n0", FormatError, f"nested more than {MAX_LIBRARY_DEPTH} levels deep: deep.json#n0 -> "),
         ("wide.json#n0", FormatError, r"the diagram has \d+ blocks.*at most 100000"),
         ("model.json#A", FormatError, "the key 'library' is missing.*not of a diagram"),
         (

@@ -104,7 +104,7 @@ def test_a_field_that_is_not_a_number_is_never_read_as_one(
 
 
 @pytest.mark.parametrize(
-    ("text", "says"),
+    ("text", "message"),
     [
         (
             "time,x\n0,1\n0,2\n0,3\n",
@@ -125,10 +125,10 @@ def test_a_field_that_is_not_a_number_is_never_read_as_one(
         ),
     ],
 )
-def test_errors_of_csv_files_name_the_line_or_the_row(tmp_path: Path, text: str, says: str) -> None:
+def test_errors_of_csv_files_name_the_line_or_the_row(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "a.csv"
     path.write_text(text)
-    with pytest.raises(ArmblocksError, match=says):
+    with pytest.raises(ArmblocksError, match=message):
         ab.load_table(path)
 
 
@@ -209,12 +209,12 @@ def test_types_of_parquet_columns() -> None:
     )
     table = table_of(file, "a", columns=("x", "flag"))
     assert np.asarray(table).tolist() == [[0.0, 1.0, 1.0], [1.999999999, 2.0, 0.0]]
-    for name, says in {
+    for name, message in {
         "gap": "row 2 of the column 'gap' is empty",
         "huge": r"exceed 2\^53",
         "word": "type string",
     }.items():
-        with pytest.raises(ArmblocksError, match=says):
+        with pytest.raises(ArmblocksError, match=message):
             table_of(file, "a", columns=(name,))
     with pytest.raises(UnknownNameError, match="no column named 'flags'"):
         table_of(file, "a", columns=("flags",))

@@ -52,8 +52,8 @@ def test_the_plan_solves_random_sparse_equations(seed: int) -> None:
     diagonal = np.concatenate([np.full(n, 5.0), np.zeros(m)])
     pattern = pattern_of(J, n)
     right = random.normal(size=n + m)
-    found = solve(plan_elimination(pattern), J[pattern.rows, pattern.columns], right, diagonal)
-    np.testing.assert_allclose(found, np.linalg.solve(np.diag(diagonal) + J, right), rtol=1e-9, atol=1e-11)
+    actual = solve(plan_elimination(pattern), J[pattern.rows, pattern.columns], right, diagonal)
+    np.testing.assert_allclose(actual, np.linalg.solve(np.diag(diagonal) + J, right), rtol=1e-9, atol=1e-11)
 
 
 def test_the_elimination_of_a_chain_has_no_fill_in() -> None:

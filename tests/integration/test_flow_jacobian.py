@@ -73,8 +73,8 @@ def test_every_operation_can_be_differentiated_and_compiled() -> None:
     point = np.tile([0.7, 0.9], n)
     empty = np.empty(0)
     J, T = interpret(tape, [np.zeros(1), point, empty, empty, empty])
-    found = np.zeros((2 * n, 2 * n))
-    found[list(jacobian.rows), list(jacobian.columns)] = J
+    actual = np.zeros((2 * n, 2 * n))
+    actual[list(jacobian.rows), list(jacobian.columns)] = J
     rate = ca.Function("f", [x], [f])
     h = 1e-6
     columns = [
@@ -84,6 +84,6 @@ def test_every_operation_can_be_differentiated_and_compiled() -> None:
     for k, name in enumerate(names):
         block = slice(2 * k, 2 * k + 2)
         np.testing.assert_allclose(
-            found[block, block], np.column_stack(columns)[block, block], rtol=1e-7, atol=1e-8, err_msg=name
+            actual[block, block], np.column_stack(columns)[block, block], rtol=1e-7, atol=1e-8, err_msg=name
         )
     np.testing.assert_array_equal(T, 0.0)

@@ -76,9 +76,9 @@ def test_both_eliminations_agree_with_numpy(n: int, filled: float) -> None:
     solver = Solver(random_sparse(n, n, filled) + np.eye(n), n)
     right = np.random.default_rng(0).normal(size=n)
     for how in ("sparse", "dense"):
-        accurate, found = solver.solve(how, right)
+        accurate, x = solver.solve(how, right)
         assert accurate
-        np.testing.assert_allclose(found, np.linalg.solve(solver.matrix, right), rtol=1e-10, atol=1e-12)
+        np.testing.assert_allclose(x, np.linalg.solve(solver.matrix, right), rtol=1e-10, atol=1e-12)
 
 
 @pytest.mark.parametrize("n", [2, 7, 40])
@@ -116,9 +116,9 @@ def test_a_vanishing_pivot_is_detected_and_pivoting_solves_the_equations() -> No
     expected = np.linalg.solve(solver.matrix, right)
     accurate, _ = solver.solve("sparse", right)
     assert not accurate
-    accurate, found = solver.solve("dense", right)
+    accurate, x = solver.solve("dense", right)
     assert accurate
-    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(x, expected, rtol=1e-9, atol=1e-12)
 
 
 def test_the_accuracy_check_does_not_depend_on_units() -> None:
@@ -142,6 +142,6 @@ def test_implicit_equations_are_eliminated_with_the_states() -> None:
     solver = Solver(J, n)
     assert solver.layout.plan is not None
     right = np.random.default_rng(4).normal(size=n + m)
-    accurate, found = solver.solve("sparse", right)
+    accurate, x = solver.solve("sparse", right)
     assert accurate
-    np.testing.assert_allclose(found, np.linalg.solve(solver.matrix, right), rtol=1e-9)
+    np.testing.assert_allclose(x, np.linalg.solve(solver.matrix, right), rtol=1e-9)

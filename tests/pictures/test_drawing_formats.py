@@ -15,11 +15,11 @@ from armblocks.pictures.style import PALETTE, Tone
 from armblocks.pictures.svg import escape, number, page_rules, svg_file, svg_inline
 
 SVG = "{http://www.w3.org/2000/svg}"
-NASTY = "<script>alert('x')</script>&\"\x00\x0b"
+SPECIAL_TEXT = "<script>alert('x')</script>&\"\x00\x0b"
 
 
 def one_of_each() -> Picture:
-    picture = Picture(width=120, height=80, title=NASTY, description=NASTY)
+    picture = Picture(width=120, height=80, title=SPECIAL_TEXT, description=SPECIAL_TEXT)
     pixels = np.zeros((4, 4, 4), dtype=np.uint8)
     pixels[..., 0], pixels[..., 3] = 255, 128
     picture.add(
@@ -29,7 +29,7 @@ def one_of_each() -> Picture:
         Rectangle(60, 10, 30, 20, radius=4, fill=Tone.SUNKEN, stroke=Tone.HAIRLINE),
         Disc(100, 20, 6, fill=Tone.TRACE_0),
         Raster(60, 40, 16, 16, pixels),
-        Group((Text(5, 70, NASTY, mono=True),), title=NASTY),
+        Group((Text(5, 70, SPECIAL_TEXT, mono=True),), title=SPECIAL_TEXT),
         Text(110, 70, "up", turn=90, anchor="end", bold=True, italic=True),
     )
     return picture

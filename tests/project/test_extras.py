@@ -17,9 +17,9 @@ from armblocks.extras import LIBRARIES, from_extra
 from armblocks.simulation.csv_rows import csv_rows
 
 ROOT = Path(__file__).resolve().parents[2]
-TYPERS_OWN = "pydantic"
+CORE_DEPENDENCY = "pydantic"
 """Also a dependency of the core, through typer."""
-COME_ALONG = {"anywidget": {"traitlets"}}
+INDIRECT = {"anywidget": {"traitlets"}}
 """Indirect dependencies."""
 
 WITHOUT_EXTRAS = """
@@ -82,8 +82,8 @@ sys.exit(app(["studio", "--no-browser"], standalone_mode=False))
 
 
 def test_the_core_runs_without_the_extras_and_names_missing_libraries(tmp_path: Path) -> None:
-    absent = sorted({name for names in LIBRARIES.values() for name in names} - {TYPERS_OWN} | {"PIL"})
-    done = subprocess.run(
+    absent = sorted({name for names in LIBRARIES.values() for name in names} - {CORE_DEPENDENCY} | {"PIL"})
+    completed = subprocess.run(
         [sys.executable, "-c", WITHOUT_EXTRAS, json.dumps(absent)],
         cwd=tmp_path,
         stdin=subprocess.DEVNULL,
@@ -91,16 +91,16 @@ def test_the_core_runs_without_the_extras_and_names_missing_libraries(tmp_path: 
         text=True,
         encoding="utf-8",
     )
-    assert done.returncode == 2, done.stderr
-    assert "the library 'starlette' is not installed; it is needed for the studio" in done.stderr
-    assert 'pip install "armblocks[studio]"' in done.stderr
-    assert 'for PNG figures and Parquet, too: pip install "armblocks[figures,data]"' in done.stdout
+    assert completed.returncode == 2, completed.stderr
+    assert "the library 'starlette' is not installed; it is needed for the studio" in completed.stderr
+    assert 'pip install "armblocks[studio]"' in completed.stderr
+    assert 'for PNG figures and Parquet, too: pip install "armblocks[figures,data]"' in completed.stdout
     written = {path.name for path in (tmp_path / "report").iterdir()}
     assert written == {"report.html", "diagram.svg", "data.csv", "figures"}
     assert {path.suffix for path in (tmp_path / "report" / "figures").iterdir()} == {".svg"}
     assert not (tmp_path / "other").exists()
     message = json.loads((tmp_path / "said.json").read_text(encoding="utf-8"))
-    wanted = {
+    expected = {
         "data frame": ("pandas", "data", "data frames"),
         "save parquet": ("pyarrow", "data", "Parquet files"),
         "save mat": ("scipy", "data", "MAT files"),
@@ -114,8 +114,8 @@ def test_the_core_runs_without_the_extras_and_names_missing_libraries(tmp_path: 
         "poles": ("scipy", "analysis", "poles of a linear system"),
         "widget": ("anywidget", "notebook", "widgets in notebooks"),
     }
-    assert message.keys() == wanted.keys()
-    for name, (library, extra, use) in wanted.items():
+    assert message.keys() == expected.keys()
+    for name, (library, extra, use) in expected.items():
         assert f"the library '{library}' is not installed; it is needed for {use}" in message[name]
         assert message[name].endswith(
             f'Allowed: everything else works without it. Fix: pip install "armblocks[{extra}]".'
@@ -128,7 +128,7 @@ def test_messages_and_pyproject_agree_on_the_libraries_of_the_extras() -> None:
     named = {name: {entry.partition(">")[0] for entry in extras[name]} for name in LIBRARIES}
     for name, libraries in LIBRARIES.items():
         brought = named[name] - {"armblocks[figures]"}
-        brought |= {other for library in brought for other in COME_ALONG.get(library, set())}
+        brought |= {other for library in brought for other in INDIRECT.get(library, set())}
         assert brought == set(libraries), name
     assert extras["all"] == [f"armblocks[{','.join(sorted(LIBRARIES))}]"]
     assert "armblocks[all,docs]" in extras["test"]

@@ -5,25 +5,25 @@ import subprocess
 import sys
 
 # Further modules that are imported only after the page of the studio is served.
-BEHIND_THE_PAGE = {"casadi", "pydantic"} | {
+LOADED_LATER = {"casadi", "pydantic"} | {
     f"armblocks.{package}" for package in ("blocks", "diagram", "drawing", "rendering", "report")
 }
-HEAVY = {"scipy", "matplotlib", "pandas", "pyarrow", "llvmlite", "starlette", "numpy"}
+SLOW = {"scipy", "matplotlib", "pandas", "pyarrow", "llvmlite", "starlette", "numpy"}
 
 
 def loaded_by(statement: str) -> set[str]:
     """Names of the modules that a new process has imported after the statement."""
     script = f"{statement}\nimport sys, json\nprint(json.dumps(sorted(sys.modules)))"
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    return set(json.loads(done.stdout))
+    completed = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    return set(json.loads(completed.stdout))
 
 
 def test_import_armblocks_imports_no_slow_library() -> None:
-    assert loaded_by("import armblocks") & (HEAVY | {"typer", "rich"}) == set()
+    assert loaded_by("import armblocks") & (SLOW | {"typer", "rich"}) == set()
 
 
 def test_the_command_line_starts_without_slow_libraries() -> None:
-    assert loaded_by("import armblocks.cli.main") & HEAVY == set()
+    assert loaded_by("import armblocks.cli.main") & SLOW == set()
 
 
 def test_data_files_are_written_without_pandas() -> None:
@@ -35,15 +35,15 @@ def test_data_files_are_written_without_pandas() -> None:
         "        log.append(np.zeros(3), np.ones((1, 3)))\n"
         "        log.finish({})"
     )
-    assert loaded_by(write) & (HEAVY - {"numpy"}) == {"pyarrow"}
+    assert loaded_by(write) & (SLOW - {"numpy"}) == {"pyarrow"}
 
 
 def test_the_page_of_the_studio_is_served_before_slow_imports() -> None:
     loaded = loaded_by("import armblocks.studio.server.launch")
     assert "starlette" in loaded
-    assert loaded & (HEAVY - {"starlette"} | BEHIND_THE_PAGE) == set()
+    assert loaded & (SLOW - {"starlette"} | LOADED_LATER) == set()
 
 
 def test_robot_scripts_are_evaluated_without_casadi() -> None:
     read = "from armblocks.formats import read_script; read_script(b'x = sin(1)', 'x.m')"
-    assert loaded_by(read) & (HEAVY - {"numpy"} | {"casadi"}) == set()
+    assert loaded_by(read) & (SLOW - {"numpy"} | {"casadi"}) == set()

@@ -42,14 +42,14 @@ def judge(folder: Path) -> tuple[dict[str, bool], dict[str, str]]:
         "import sys; sys.path.insert(0, 'src'); "
         "from importlinter.cli import lint_imports; sys.exit(lint_imports())"
     )
-    done = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, "-c", script], cwd=folder, capture_output=True, text=True, encoding="utf-8"
     )
-    text = re.sub(r"\x1b\[[0-9;]*m", "", done.stdout)
-    found = re.findall(r"^(.+?) (KEPT|BROKEN)", text, re.MULTILINE)
-    assert found, done.stdout + done.stderr
+    text = re.sub(r"\x1b\[[0-9;]*m", "", completed.stdout)
+    results = re.findall(r"^(.+?) (KEPT|BROKEN)", text, re.MULTILINE)
+    assert results, completed.stdout + completed.stderr
     sections = re.split(r"^(.+)\n-{4,}$", text.partition("Broken contracts\n")[2], flags=re.MULTILINE)
-    return {name: verdict == "KEPT" for name, verdict in found}, dict(zip(sections[1::2], sections[2::2]))
+    return {name: verdict == "KEPT" for name, verdict in results}, dict(zip(sections[1::2], sections[2::2]))
 
 
 @pytest.fixture

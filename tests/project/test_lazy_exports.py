@@ -35,11 +35,11 @@ def test_every_name_comes_from_the_module_that_type_checkers_see(package: str) -
     homes = homes_for_type_checkers(package)
     assert sorted(homes) == sorted(module.__all__)
     for name, home in homes.items():
-        found = getattr(module, name)
+        value = getattr(module, name)
         if home == f"{package}.{name}":
-            assert found is importlib.import_module(home)
+            assert value is importlib.import_module(home)
         else:
-            assert found is getattr(importlib.import_module(home), name)
+            assert value is getattr(importlib.import_module(home), name)
 
 
 @pytest.mark.parametrize("package", PACKAGES)

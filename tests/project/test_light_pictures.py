@@ -23,10 +23,10 @@ CURVES = {
 @pytest.mark.parametrize("name", CURVES)
 def test_omitted_points_are_within_the_tolerance_of_the_drawn_line(name: str) -> None:
     points = CURVES[name]
-    kept = np.flatnonzero(LIGHT["kept_points"](points))
-    assert kept[0] == 0
-    assert kept[-1] == len(points) - 1
-    for first, last in pairwise(kept):
+    indices = np.flatnonzero(LIGHT["kept_points"](points))
+    assert indices[0] == 0
+    assert indices[-1] == len(points) - 1
+    for first, last in pairwise(indices):
         chord = points[last] - points[first]
         length = max(float(chord @ chord), 1e-30)
         inner = points[first : last + 1] - points[first]

@@ -67,15 +67,15 @@ def messages() -> Iterator[tuple[str, list[str]]]:
             continue
         tree = ast.parse(text)
         scopes = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
-        seen: set[ast.Call] = set()
+        visited: set[ast.Call] = set()
         for scope in (*scopes, tree):
             inside = list(ast.walk(scope))
             calls = [node for node in inside if isinstance(node, ast.Call) and is_message(node)]
-            if not seen.issuperset(calls):
+            if not visited.issuperset(calls):
                 names = assigned(inside)
                 for node in calls:
-                    if node not in seen:
-                        seen.add(node)
+                    if node not in visited:
+                        visited.add(node)
                         yield f"{path.relative_to(SOURCE).as_posix()}:{node.lineno}", pieces_of(node, names)
 
 
@@ -118,7 +118,7 @@ def runs(pieces: list[str]) -> Iterator[tuple[str, ...]]:
 @pytest.fixture(scope="module")
 def tested() -> set[tuple[str, ...]]:
     """All sequences of one, two and three words in the texts of the tests."""
-    found: set[tuple[str, ...]] = set()
+    sequences: set[tuple[str, ...]] = set()
     for path in sorted((ROOT / "tests").rglob("*.py")):
         if path == Path(__file__):
             continue
@@ -126,8 +126,10 @@ def tested() -> set[tuple[str, ...]]:
             if isinstance(node, ast.Constant) and isinstance(node.value, str):
                 text = words(node.value)
                 for size in range(1, RUN_OF_WORDS + 1):
-                    found.update(tuple(text[start : start + size]) for start in range(len(text) - size + 1))
-    return found
+                    sequences.update(
+                        tuple(text[start : start + size]) for start in range(len(text) - size + 1)
+                    )
+    return sequences
 
 
 def test_every_message_occurs_in_a_test(tested: set[tuple[str, ...]]) -> None:

@@ -16,13 +16,13 @@ TREE = {
     for name, kind in vars(errors).items()
     if isinstance(kind, type) and issubclass(kind, errors.ArmblocksError)
 }
-OWN = {
+PROVIDED = {
     "UnknownNameError": {"where", "fix"},  # contains the nearest name and the kind of name
     "MissingLibraryError": {"where", "fix"},  # states its purpose and the install command
     "AlgebraicLoopError": {"where", "fix"},  # the loop is the place
 }
 """Error classes that provide the arguments themselves."""
-PLACE_IS_ADDED = ("blocks/", "diagram/shape_rules.py")
+PATH_ADDED = ("blocks/", "diagram/shape_rules.py")
 """Files in which blocks raise errors without ``where``: a block has no name. ``diagram.shapes``,
 ``diagram.model`` and ``simulation.calls`` add the path of the block."""
 
@@ -44,8 +44,8 @@ def constructions() -> Iterator[tuple[str, str, ast.Call]]:
 def lacking(place: str, kind: str, call: ast.Call) -> set[str]:
     """The missing arguments of an error's construction."""
     message = {keyword.arg for keyword in call.keywords if not _is_empty(keyword.value)}
-    missing = {"where", "fix"} - message - OWN.get(kind, set())
-    return missing - {"where"} if place.startswith(PLACE_IS_ADDED) else missing
+    missing = {"where", "fix"} - message - PROVIDED.get(kind, set())
+    return missing - {"where"} if place.startswith(PATH_ADDED) else missing
 
 
 def _is_empty(value: ast.expr) -> bool:
@@ -53,14 +53,14 @@ def _is_empty(value: ast.expr) -> bool:
 
 
 def test_every_error_has_a_place_and_a_remedy() -> None:
-    found = list(constructions())
-    assert len(found) > 300
-    silent = [
+    all_errors = list(constructions())
+    assert len(all_errors) > 300
+    incomplete = [
         f"{place} {kind} lacks {sorted(m)}"
-        for place, kind, call in found
+        for place, kind, call in all_errors
         if (m := lacking(place, kind, call))
     ]
-    assert silent == [], f"{len(silent)} errors give no help:\n" + "\n".join(silent)
+    assert incomplete == [], f"{len(incomplete)} errors give no help:\n" + "\n".join(incomplete)
 
 
 def test_the_check_detects_missing_arguments() -> None:

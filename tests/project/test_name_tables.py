@@ -67,9 +67,9 @@ def check(node: ast.expr) -> object:
 @pytest.mark.parametrize("page", PAGES)
 def test_every_name_of_the_tables_exists(page: str) -> None:
     commands = set(get_command(app).commands)  # pyright: ignore[reportAttributeAccessIssue]
-    found = list(names_here(page))
-    assert len(found) > 50
-    for code in found:
+    names = list(names_here(page))
+    assert len(names) > 50
+    for code in names:
         if code.startswith("armblocks "):
             assert code.split()[1] in commands, code
         else:

@@ -25,11 +25,11 @@ FORBIDDEN_IMPORTS = {
     "socket",
     "requests",
 }
-DOORS = {"studio/server/launch.py": {"socket", "urllib"}}
+EXCEPTIONS = {"studio/server/launch.py": {"socket", "urllib"}}
 """Files that may import one of these modules, because it is their purpose."""
 VAGUE_NAMES = {"utils", "util", "helpers", "helper", "manager", "core", "misc", "common"}
-LONGEST_FUNCTION = 80
-LONGEST_LINE = 110
+MAX_FUNCTION_LINES = 80
+MAX_LINE_LENGTH = 110
 CONTROL_FLOW = re.compile(r"\b(br label|br i1|switch i\d+|indirectbr) | = phi |\.(label|branch)\(")
 """LLVM IR text with jumps, branches or merges, and calls that would generate it."""
 
@@ -92,7 +92,7 @@ def test_nothing_is_evaluated_pickled_or_fetched(nodes: dict[str, list[ast.AST]]
     assert [
         f"{name}:{line}"
         for name, inside in nodes.items()
-        for line in forbidden_parts(inside, FORBIDDEN_IMPORTS - DOORS.get(name, set()))
+        for line in forbidden_parts(inside, FORBIDDEN_IMPORTS - EXCEPTIONS.get(name, set()))
     ] == []
 
 
@@ -115,7 +115,7 @@ def test_functions_have_at_most_80_lines(nodes: dict[str, list[ast.AST]]) -> Non
         for name, inside in nodes.items()
         for function in inside
         if isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef)
-        and (lines := (function.end_lineno or 0) - function.lineno + 1) > LONGEST_FUNCTION
+        and (lines := (function.end_lineno or 0) - function.lineno + 1) > MAX_FUNCTION_LINES
     ] == []
 
 
@@ -127,7 +127,7 @@ def test_lines_of_the_front_end_have_at_most_110_characters() -> None:
         for path in sources
         if path.name != "protocol.ts"  # generated
         for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1)
-        if len(line) > LONGEST_LINE
+        if len(line) > MAX_LINE_LENGTH
     ] == []
 
 
@@ -157,7 +157,7 @@ def circles(graph: Mapping[str, set[str]]) -> list[list[str]]:
     number: dict[str, int] = {}
     lowest: dict[str, int] = {}
     waiting: list[str] = []
-    found: list[list[str]] = []
+    groups: list[list[str]] = []
 
     def visit(module: str) -> None:
         number[module] = lowest[module] = len(number)
@@ -171,12 +171,12 @@ def circles(graph: Mapping[str, set[str]]) -> list[list[str]]:
             group = waiting[waiting.index(module) :]
             del waiting[-len(group) :]
             if len(group) > 1 or module in graph[module]:
-                found.append(sorted(group))
+                groups.append(sorted(group))
 
     for module in graph:
         if module not in number:
             visit(module)
-    return sorted(found)
+    return sorted(groups)
 
 
 @pytest.mark.parametrize(
@@ -207,8 +207,8 @@ def late():
     from armblocks.e import (f, g)
 """
     modules = {f"armblocks.{name}" for name in ("a", "b", "c", "d", "e", "e.f", "unused")}
-    found = set(imported(ast.walk(ast.parse(source)), modules))
-    assert found == {f"armblocks.{name}" for name in ("a", "b", "c", "d", "e", "e.f")}
+    groups = set(imported(ast.walk(ast.parse(source)), modules))
+    assert groups == {f"armblocks.{name}" for name in ("a", "b", "c", "d", "e", "e.f")}
 
 
 def test_there_are_no_import_cycles(nodes: dict[str, list[ast.AST]]) -> None:

@@ -82,10 +82,10 @@ def test_the_reference_has_every_public_name(wheel: Path) -> None:
         thing = getattr(ab, name)
         if inspect.ismodule(thing):
             continue  # each block has a page; errors are below
-        wanted = [f"armblocks.{name}"]
+        required = [f"armblocks.{name}"]
         if inspect.isclass(thing) and not issubclass(thing, Enum):
-            wanted += [f"armblocks.{name}.{member}" for member in public_members(thing)]
-        missing += [path for path in wanted if path not in described]
+            required += [f"armblocks.{name}.{member}" for member in public_members(thing)]
+        missing += [path for path in required if path not in described]
     for name, kind in inspect.getmembers_static(ab.errors, inspect.isclass):
         if issubclass(kind, ValueError | Warning) and f"armblocks.errors.{name}" not in described:
             missing.append(name)
@@ -105,7 +105,7 @@ app(["run", "kr180model", "--no-figures"], standalone_mode=False)
 def test_the_wheel_runs_without_the_checkout(wheel: Path, tmp_path: Path) -> None:
     site = tmp_path / "site"
     zipfile.ZipFile(wheel).extractall(site)
-    done = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, "-c", SCRIPT],
         cwd=tmp_path,
         env={**os.environ, "PYTHONPATH": str(site)},
@@ -114,8 +114,8 @@ def test_the_wheel_runs_without_the_checkout(wheel: Path, tmp_path: Path) -> Non
         text=True,
         encoding="utf-8",
     )
-    assert done.returncode == 0, done.stderr
-    module, page, *_ = done.stdout.splitlines()
+    assert completed.returncode == 0, completed.stderr
+    module, page, *_ = completed.stdout.splitlines()
     assert Path(module) == site / "armblocks" / "__init__.py"
     assert Path(page) == site / "armblocks" / "shipped" / "docs" / "reference" / "blocks" / "Gain.html"
     assert (tmp_path / "kr180model-report" / "report.html").is_file()

@@ -25,7 +25,7 @@ RECORD = 0.0625
 LIMITS = (-1.0, -0.5, 0.0, 0.5, 1.0)
 """Switching values of blocks, which sources reach exactly."""
 PERIODS = (0.0625, 0.125, 0.25, 0.1, 0.3, (0.125, 0.0625), (0.2, 0.1))
-LEFT_OUT = (
+EXCLUDED = (
     # These use files, call Python, end the run, or define the structure, which the generator builds itself.
     "FromFile ToFile PythonFunction CalledPythonFunction StopSimulation Assertion Spectrum ManualSwitch "
     "Goto From BusCreator BusSelector BusAssignment Merge Inport Outport Subsystem EnabledSubsystem "
@@ -261,7 +261,7 @@ class Maker:
             elif draw < 0.6:
                 pool = STATES.split()
             name = str(r.choice(pool))
-            if name in LEFT_OUT.split() or (name in SLOW.split() and r.random() < 0.9):
+            if name in EXCLUDED.split() or (name in SLOW.split() and r.random() < 0.9):
                 continue
             kind = BLOCKS[name]
             parameters = self.parameters(name)

@@ -6,7 +6,7 @@ import bisect
 
 import numpy as np
 
-SAME = 2.0**-50
+SAME_TIME = 2.0**-50
 POSITIONS = np.array([0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0])
 TO_COEFFICIENTS = np.linalg.inv(np.vander(POSITIONS, 4, increasing=True))
 
@@ -40,7 +40,7 @@ class History:
         return bool(np.max(np.abs(last - value)) > 1e-11 * (1.0 + np.max(np.abs(value))))
 
     def segment_at(self, when: float) -> int:
-        return bisect.bisect_right(self.jumps, when * (1.0 + SAME) + 1e-300)
+        return bisect.bisect_right(self.jumps, when * (1.0 + SAME_TIME) + 1e-300)
 
     def at(self, when: float, segment: int | None) -> np.ndarray:
         """Return the value at a time; ``segment`` selects a segment, whose polynomial may be extrapolated."""

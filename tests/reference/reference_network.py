@@ -13,7 +13,7 @@ from reference_order import EvaluationOrder, Node, assign_clocks
 
 from armblocks.diagram import Diagram, PortRef, flat_diagram, infer_shapes
 
-MOST_PASSES = 30
+MAX_PASSES = 30
 Link = tuple[np.ndarray, np.ndarray]
 """The array of an input, and the array of the signal that drives it."""
 Work = Callable[[], bool]
@@ -112,7 +112,7 @@ class Network:
         self.t, self.frozen = t, frozen
         self.time[0] = t
         plan = self._plan(frozen, flowing)
-        for _ in range(MOST_PASSES):
+        for _ in range(MAX_PASSES):
             changed = False
             for work in plan:
                 changed = work() or changed

@@ -100,14 +100,16 @@ class EvaluationOrder:
         groups = {loop: {loops[m] for n in loop for m in graph[n]} - {loop} for loop in loops.values()}
         order = list(TopologicalSorter(groups).static_order())
         self.loops = [loop for loop in order if len(loop) > 1 or loop[0] in graph[loop[0]]]
-        done: set[Node] = set()
+        evaluated: set[Node] = set()
         self.two_passes = False  # whether a mode is used before it is evaluated
         for loop in order:
             for node in loop:
                 self.two_passes = (
-                    self.two_passes or bool(soft[node] - done - set(loop)) or bool(soft[node] & set(loop))
+                    self.two_passes
+                    or bool(soft[node] - evaluated - set(loop))
+                    or bool(soft[node] & set(loop))
                 )
-            done |= set(loop)
+            evaluated |= set(loop)
         self.groups = order
         read = self._read_between_instants() | {node for loop in self.loops for node in loop}
         read |= {node for start in read for node in _closure_of(start, both)}

@@ -49,10 +49,10 @@ from armblocks.diagram import Diagram
 
 __all__ = ["EndlessEventsError", "Network", "ReferenceRun", "UnsupportedError", "run_reference"]
 
-MOST_ITERATIONS = 100
-JUST_AFTER = 1e-12
+MAX_ITERATIONS = 100
+RIGHT_LIMIT = 1e-12
 """Offset of the first stage of a step, s; its error is this time multiplied by the derivative."""
-SAME = 2.0**-50
+SAME_TIME = 2.0**-50
 """Times within this relative distance belong to the same instant."""
 
 
@@ -105,9 +105,9 @@ class ReferenceRun:
         marks += [(t, "jump", 0) for t in self.network.breakpoints() if t > 0.0]
         merged: list[tuple[float, list[int], bool, bool]] = []
         for t, event, number in sorted(marks):
-            if t > self.stop * (1.0 + SAME):
+            if t > self.stop * (1.0 + SAME_TIME):
                 break
-            if not merged or t > merged[-1][0] * (1.0 + SAME) + 1e-300:
+            if not merged or t > merged[-1][0] * (1.0 + SAME_TIME) + 1e-300:
                 merged.append((t, [], False, False))
             time, clocks, recorded, jumps = merged[-1]
             clocks = [*clocks, number] if event == "tick" else clocks
@@ -172,7 +172,7 @@ class ReferenceRun:
             return derivative
 
         # The right limit: a signal may differ at the instant itself, as the height does at a bounce.
-        a = rate(0.0, min(h, JUST_AFTER) * rate(0.0, 0.0))
+        a = rate(0.0, min(h, RIGHT_LIMIT) * rate(0.0, 0.0))
         b = rate(h / 2, h / 2 * a)
         if not (calm or whole):
             return False
@@ -207,11 +207,11 @@ class ReferenceRun:
             network.tick(t, clocks)
         if t == 0.0:
             # Guards have no sign yet: resets without events give states consistent with the signals.
-            for _ in range(MOST_ITERATIONS):
+            for _ in range(MAX_ITERATIONS):
                 if not network.iterate(0.0, first=True):
                     break
             network.take_signs()
-        for _ in range(MOST_ITERATIONS):
+        for _ in range(MAX_ITERATIONS):
             if not network.iterate(t):
                 break
         else:

@@ -12,18 +12,18 @@ from random_diagrams import Node, Recipe, random_recipe
 
 SEEDS = (0, 2, 3, 4, 5, 7, 8, 6)
 """The diagram of the last seed has infinite signals, also in the reference; all others are compared."""
-ALWAYS = ("reference", "formulas", "equations")
-IN_TURN = tuple(name for name in LAWS if name not in ALWAYS)
+BASIC_LAWS = ("reference", "formulas", "equations")
+OTHER_LAWS = tuple(name for name in LAWS if name not in BASIC_LAWS)
 
 
 @pytest.mark.parametrize(("number", "seed"), list(enumerate(SEEDS)))
 def test_a_random_diagram_obeys_the_laws(number: int, seed: int) -> None:
     """Check all laws that need one run, and two of the others."""
-    turn = (IN_TURN[number % len(IN_TURN)], IN_TURN[(3 * number + 1) % len(IN_TURN)])
+    turn = (OTHER_LAWS[number % len(OTHER_LAWS)], OTHER_LAWS[(3 * number + 1) % len(OTHER_LAWS)])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            contradictions = findings(random_recipe(seed), (*ALWAYS, *dict.fromkeys(turn)))
+            contradictions = findings(random_recipe(seed), (*BASIC_LAWS, *dict.fromkeys(turn)))
         except InconclusiveError:
             return
     contradictions.pop("inconclusive", None)

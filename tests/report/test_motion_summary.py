@@ -72,8 +72,8 @@ def test_positive_and_negative_work_of_a_spring_are_equal() -> None:
 
 
 def test_the_integral_of_a_line_through_zero_is_exact() -> None:
-    done, taken = signed_integrals(np.array([0.0, 3.0]), np.array([-1.0, 2.0]))
-    assert (done, taken) == pytest.approx((2.0, 0.5), rel=1e-15)
+    positive, negative = signed_integrals(np.array([0.0, 3.0]), np.array([-1.0, 2.0]))
+    assert (positive, negative) == pytest.approx((2.0, 0.5), rel=1e-15)
 
 
 def test_the_root_mean_square_of_a_ramp_is_exact() -> None:
@@ -136,9 +136,9 @@ def test_additional_interpolated_rows_change_no_average() -> None:
     values = np.array([0.0, 2.0, -1.0, 4.0, 0.5])
     random = np.random.default_rng(7)
     more = np.unique(np.concatenate([time, random.uniform(0.0, 1.0, 40), random.uniform(3.5, 7.0, 3)]))
-    there = np.interp(more, time, values)
-    assert root_mean_square(more, there) == pytest.approx(root_mean_square(time, values), rel=1e-13)
-    assert signed_integrals(more, there) == pytest.approx(signed_integrals(time, values), rel=1e-13)
+    interpolated = np.interp(more, time, values)
+    assert root_mean_square(more, interpolated) == pytest.approx(root_mean_square(time, values), rel=1e-13)
+    assert signed_integrals(more, interpolated) == pytest.approx(signed_integrals(time, values), rel=1e-13)
     # By hand: the integral of the square over 0..1 is 4/3, over 1..3 it is 2, and so on.
     square = 4 / 3 + 2.0 + (1 - 4 + 16) / 6 + 3.5 * (16 + 2 + 0.25) / 3
     assert root_mean_square(time, values) == pytest.approx(math.sqrt(square / 7.0), rel=1e-14)

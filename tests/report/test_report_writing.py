@@ -34,7 +34,7 @@ from armblocks.report import write_report
 from armblocks.report.figures import file_name, in_shown_unit
 from armblocks.robot import JointLimits, Robot, serial_chain, standard_dh
 
-VOID = {"meta", "br", "img", "link", "rect", "path", "circle", "image"}
+VOID_TAGS = {"meta", "br", "img", "link", "rect", "path", "circle", "image"}
 
 
 class Outline(HTMLParser):
@@ -50,7 +50,7 @@ class Outline(HTMLParser):
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.tags.append(tag)
         self.attributes += [(tag, name, value) for name, value in attrs]
-        if tag not in VOID:
+        if tag not in VOID_TAGS:
             self.open.append(tag)
 
     def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:

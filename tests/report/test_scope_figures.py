@@ -37,9 +37,9 @@ def test_a_figure_has_the_requested_width() -> None:
 def test_entries_of_a_mux_have_the_names_of_their_blocks() -> None:
     builder = ab.DiagramBuilder("mux")
     pair = builder.add("pair", Constant(value=(1.0, 2.0)))
-    both = builder.add("both", Mux(inputs=2), builder.add("wanted", Step()), pair)
+    both = builder.add("both", Mux(inputs=2), builder.add("reference", Step()), pair)
     builder.add("Scope", Scope(), both)
     diagram = builder.build()
     (figure,) = view_figures(diagram, ab.simulate(diagram))
     message = {mark.text for mark in text_marks(figure.picture)}
-    assert {"wanted", "pair[0]", "pair[1]"} <= message
+    assert {"reference", "pair[0]", "pair[1]"} <= message

@@ -41,9 +41,9 @@ def test_decimation_3_and_a_limit_of_2_rows_write_the_last_two_of_every_third_ro
     model = diagram(sink=ToFile(decimation=3, limit=2))
     result = ab.simulate(model)
     (path,) = ab.write_files(tmp_path, model, result)
-    kept = np.asarray(ab.load_table(path))
-    assert np.array_equal(kept[:, 0], result.time[[6, 9]])
-    assert np.array_equal(kept[:, 1:], result["wave/y"][[6, 9]])
+    saved = np.asarray(ab.load_table(path))
+    assert np.array_equal(saved[:, 0], result.time[[6, 9]])
+    assert np.array_equal(saved[:, 1:], result["wave/y"][[6, 9]])
 
 
 def test_a_report_contains_and_lists_the_files(tmp_path: Path) -> None:

@@ -47,8 +47,8 @@ def both(write: Callable[..., Any], *arguments: Any, result: type | None = None,
     function = ctypes.CFUNCTYPE(CTYPES[result], *kinds)(code.address("run"))
     native = function(*(x if a is None else a.ctypes.data for x, a in zip(arguments, arrays)))
     copies = [list(argument) if isinstance(argument, list) else argument for argument in arguments]
-    found = Interpreter(program).call("run", *((c, 0) if isinstance(c, list) else c for c in copies))
-    np.testing.assert_equal(native, found)
+    interpreted = Interpreter(program).call("run", *((c, 0) if isinstance(c, list) else c for c in copies))
+    np.testing.assert_equal(native, interpreted)
     for array, copy, argument in zip(arrays, copies, arguments):
         if array is not None:
             np.testing.assert_array_equal(array, copy)

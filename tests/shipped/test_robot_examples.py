@@ -30,7 +30,7 @@ def test_the_robot_cell_file_equals_the_robot_of_the_script() -> None:
 
 def test_dc_motor_sampled_pid_equals_the_exact_recurrence() -> None:
     """Between two ticks the motor is linear: x(k+1) = exp(A T) x(k) + terms of voltage and load."""
-    found = ab.simulate("dc_motor_sampled_pid", rtol=1e-10, atol=1e-12)
+    simulated = ab.simulate("dc_motor_sampled_pid", rtol=1e-10, atol=1e-12)
     R, L, k, J, b, T = 1.2, 5e-3, 0.25, 8e-3, 1e-3, 0.01
     A = np.array([[-R / L, -k / L, 1 / L, 0], [k / J, -b / J, 0, -1 / J], [0, 0, 0, 0], [0, 0, 0, 0]])
     step = expm(A * T)
@@ -45,23 +45,23 @@ def test_dc_motor_sampled_pid_equals_the_exact_recurrence() -> None:
         integral += 0.0 if wound else T * 4.0 * error
         filtered += T * 50.0 * (0.004 * error - filtered)
         x = (step @ [*x, v, 0.5 if tick >= 200 else 0.0])[:2]
-    np.testing.assert_allclose(found["motor/w"][::5], speeds, rtol=0, atol=1e-7)
-    np.testing.assert_allclose(found["motor/i"][::5], currents, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(simulated["motor/w"][::5], speeds, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(simulated["motor/i"][::5], currents, rtol=0, atol=1e-7)
     # in steady state the current balances friction and load, the voltage resistance and back-EMF
     i = (b * 100.0 + 0.5) / k
-    assert found["motor/w"][-1] == pytest.approx(100.0, abs=0.02)
-    assert found["motor/i"][-1] == pytest.approx(i, abs=0.01)
-    assert found["controller/y"][-1] == pytest.approx(R * i + k * 100.0, abs=0.02)
-    assert found["controller/y"].max() == 48.0
+    assert simulated["motor/w"][-1] == pytest.approx(100.0, abs=0.02)
+    assert simulated["motor/i"][-1] == pytest.approx(i, abs=0.01)
+    assert simulated["controller/y"][-1] == pytest.approx(R * i + k * 100.0, abs=0.02)
+    assert simulated["controller/y"].max() == 48.0
 
 
 def test_puma560_payload_drop_has_the_theoretical_position_error() -> None:
     """In steady state M(q) Kp e is the gravity torque of the payload, M(q) of the arm without payload; after
     the drop e decays."""
-    found = ab.simulate("puma560_payload_drop", rtol=1e-9, atol=1e-12)
-    arm, error, t = ab.load_robot("puma560"), found["error/y"], found.time
+    simulated = ab.simulate("puma560_payload_drop", rtol=1e-9, atol=1e-12)
+    arm, error, t = ab.load_robot("puma560"), simulated["error/y"], simulated.time
     before = int(np.flatnonzero(t == 4.0)[0]) - 1
-    q = found["arm/q"][before]
+    q = simulated["arm/q"][before]
     payload = np.array([3.0, 0.0, 0.0, 0.1, 0.01, 0.01, 0.01, 0.0, 0.0, 0.0])
     zeros = np.zeros(6)
     loaded = np.ravel(ab.dynamics.trace_rne_loaded(arm.robot)(q, zeros, zeros, zeros, payload)[0])
@@ -74,7 +74,7 @@ def test_puma560_payload_drop_has_the_theoretical_position_error() -> None:
     free = np.outer((1.0 + 15.0 * since) * np.exp(-15.0 * since), error[before])
     np.testing.assert_allclose(error[t >= 4.0], free, rtol=0, atol=0.02 * np.abs(expected).max())
     assert np.abs(error[-1]).max() < 1e-9
-    drop = found["arm/qd"][before + 1] - found["arm/qd"][before]
+    drop = simulated["arm/qd"][before + 1] - simulated["arm/qd"][before]
     assert np.abs(drop).max() < 1e-4, "the speeds do not jump"
 
 
@@ -115,9 +115,9 @@ def test_kr180_pick_and_place_has_no_collisions() -> None:
     sample.
     """
     gap, dt = 0.15, 0.01
-    found = ab.simulate("kr180_pick_and_place", sample_time=dt)
+    simulated = ab.simulate("kr180_pick_and_place", sample_time=dt)
     cell = ab.load_robot("kr180_cell").robot
-    poses, t = found["plot/poses"], found.time
+    poses, t = simulated["plot/poses"], simulated.time
     boxes = {}
     for row, link in enumerate(cell.links, start=1):
         if not link.joint.moves:
@@ -153,9 +153,9 @@ def test_kr180_pick_and_place_has_no_collisions() -> None:
 
 def test_kr180_pick_and_place_puts_the_load_on_the_pallet() -> None:
     """The lowest corner of the load is 1 cm above the pallet at grip and release, and never lower."""
-    found = ab.simulate("kr180_pick_and_place", sample_time=0.005)
-    cell, t = ab.load_robot("kr180_cell").robot, found.time
-    tool = found["plot/poses"][:, -1]
+    simulated = ab.simulate("kr180_pick_and_place", sample_time=0.005)
+    cell, t = ab.load_robot("kr180_cell").robot, simulated.time
+    tool = simulated["plot/poses"][:, -1]
     corners = np.array([[x, y, 0.4, 1.0] for x in (-0.25, 0.25) for y in (-0.25, 0.25)])
     places = np.einsum("tij,kj->tki", tool, corners)
     carried = (t >= 2.7 - 1e-9) & (t <= 10.7 + 1e-9)
@@ -165,16 +165,16 @@ def test_kr180_pick_and_place_puts_the_load_on_the_pallet() -> None:
         (box,) = cell.link(name).geometry
         centre = np.array(box.pose)[:2, 3]
         assert (np.abs(places[k, :, :2] - centre) < np.array(box.size[:2]) / 2).all()
-        assert not found["path/qd"][k].any(), "the arm is at rest at grip and release"
+        assert not simulated["path/qd"][k].any(), "the arm is at rest at grip and release"
         np.testing.assert_allclose(tool[k, :3, 2], (0, 0, -1), atol=1e-12)
         # the edges of the load are parallel to those of the pallet
         assert np.abs(tool[k, :2, :2]).max(axis=0) == pytest.approx(1.0, abs=1e-9)
 
 
 def test_kr180_pick_and_place_stays_within_limits_and_includes_the_load_torque() -> None:
-    found = ab.simulate("kr180_pick_and_place")
-    robot, t = ab.load_robot("kr180").robot, found.time
-    q, qd = found["path/q"], found["path/qd"]
+    simulated = ab.simulate("kr180_pick_and_place")
+    robot, t = ab.load_robot("kr180").robot, simulated.time
+    q, qd = simulated["path/q"], simulated["path/qd"]
     assert (q >= robot.qlim[:, 0]).all()
     assert (q <= robot.qlim[:, 1]).all()
     assert (np.abs(qd) <= robot.speed_limits).all()
@@ -182,10 +182,10 @@ def test_kr180_pick_and_place_stays_within_limits_and_includes_the_load_torque()
     load = np.array([60.0, 0.0, 0.0, 0.2, 2.05, 2.05, 2.5, 0.0, 0.0, 0.0])
     for k in (100, 400, 700, 1000, 1200):
         payload = load if 2.7 <= t[k] < 10.7 else np.zeros(10)
-        (tau,) = trace(q[k], qd[k], found["path/qdd"][k], np.zeros(6), payload)
-        np.testing.assert_allclose(found["rne/tau"][k], np.ravel(tau), rtol=1e-9, atol=1e-9)
+        (tau,) = trace(q[k], qd[k], simulated["path/qdd"][k], np.zeros(6), payload)
+        np.testing.assert_allclose(simulated["rne/tau"][k], np.ravel(tau), rtol=1e-9, atol=1e-9)
     # gripped at rest: the shoulder's torque jumps by 60 kg times the arm of 1.6 m
-    grip = found["rne/tau"][270] - found["rne/tau"][269]
+    grip = simulated["rne/tau"][270] - simulated["rne/tau"][269]
     assert grip[1] == pytest.approx(60.0 * 9.81 * 1.6, rel=1e-9)
 
 

@@ -11,7 +11,7 @@ from armblocks.blocks import BLOCKS
 from armblocks.diagram import Diagram, diagram_views
 from armblocks.formats import example_descriptions, list_examples, load_diagram
 
-PROMISED = {
+DOCUMENTED = {
     "bouncing_ball",
     "dc_motor_sampled_pid",
     "falling_pendulum",
@@ -32,7 +32,7 @@ def example(request: pytest.FixtureRequest) -> Diagram:
 
 
 def test_the_documented_examples_are_shipped() -> None:
-    assert set(list_examples()) >= PROMISED
+    assert set(list_examples()) >= DOCUMENTED
 
 
 def test_examples_have_the_name_of_their_file_and_all_blocks_are_placed(example: Diagram) -> None:
@@ -88,8 +88,8 @@ def test_kr180model_agrees_with_a_separate_computation() -> None:
     result = ab.simulate("kr180model")
     for t, expected in PAPER.items():
         (i,) = np.flatnonzero(result.time == t)
-        found = [result[f"T2xyz/{axis}"][i] for axis in "xyz"]
-        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-11)
+        actual = [result[f"T2xyz/{axis}"][i] for axis in "xyz"]
+        np.testing.assert_allclose(actual, expected, rtol=0, atol=1e-11)
     peak = np.degrees(np.abs(result["speed/y"]).max(axis=0))
     np.testing.assert_allclose(peak, [33.73, 0, 16.87, 0], atol=0.005)
     assert result["Joint torques/u"].shape == (1001, 4)
@@ -130,9 +130,9 @@ def test_van_der_pol_with_pid_agrees_with_scipy() -> None:
 
     reference = solve_ivp(equations, (0, 100), [1, 0, 0], method="DOP853", rtol=1e-11, atol=1e-12)
     result = ab.simulate("van_der_pol_pid")
-    found = [result["x1/y"][-1], result["x2/y"][-1]]
+    actual = [result["x1/y"][-1], result["x2/y"][-1]]
     # 100 s on a limit cycle at rtol 1e-6: the phase error is about 1e-5 s.
-    np.testing.assert_allclose(found, reference.y[:2, -1], atol=2e-4)
+    np.testing.assert_allclose(actual, reference.y[:2, -1], atol=2e-4)
 
 
 def test_robertson_kinetics_agrees_with_published_values_and_radau() -> None:
@@ -148,8 +148,8 @@ def test_robertson_kinetics_agrees_with_published_values_and_radau() -> None:
 
     at = result.time[::50]
     reference = solve_ivp(rates, (0, 400), [1, 0, 0], method="Radau", rtol=1e-10, atol=1e-14, t_eval=at)
-    found = np.array([result[name][::50] for name in "ABC"])
-    np.testing.assert_allclose(found, reference.y, rtol=2e-5, atol=1e-12)
+    actual = np.array([result[name][::50] for name in "ABC"])
+    np.testing.assert_allclose(actual, reference.y, rtol=2e-5, atol=1e-12)
     np.testing.assert_allclose(result["total"], 1.0, rtol=1e-13)
 
 

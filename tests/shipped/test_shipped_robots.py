@@ -53,9 +53,9 @@ def test_puma560_has_the_parameters_of_corke(puma560: Robot) -> None:
 
 
 def test_links_with_impossible_published_inertias_are_found() -> None:
-    found = {name: [finding.link for finding in inertia_findings(load_robot(name))] for name in list_robots()}
-    assert found["kr180"] == found["puma560"] == ["link1", "link3"]
-    assert found["twolink"] == found["planar3r"] == []
+    links = {name: [finding.link for finding in inertia_findings(load_robot(name))] for name in list_robots()}
+    assert links["kr180"] == links["puma560"] == ["link1", "link3"]
+    assert links["twolink"] == links["planar3r"] == []
 
 
 def test_twolink_hangs_in_the_vertical_plane() -> None:

@@ -84,8 +84,8 @@ class Reference:
         return [(float(instant), marks[instant]) for instant in sorted(marks)]
 
     def fired(self, g: np.ndarray) -> np.ndarray:
-        now, wanted = np.sign(g), np.array(self.system.guard_directions)
-        return np.where((now * self.signs < 0) & (now * wanted >= 0), now, 0.0)
+        signs_now, directions = np.sign(g), np.array(self.system.guard_directions)
+        return np.where((signs_now * self.signs < 0) & (signs_now * directions >= 0), signs_now, 0.0)
 
     def process_events(self) -> None:
         """Process the events at the present time until no guard fires."""

@@ -34,11 +34,11 @@ def test_unbounded_growth_is_reported_with_its_time() -> None:
     text = str(error.value)
     assert "'block/x'" in text
     assert "grow without bound" in text
-    kept = partial(error)
-    assert kept.time[-1] == pytest.approx(1.0, abs=2e-3)  # the last sample before 1 s
+    partial_result = partial(error)
+    assert partial_result.time[-1] == pytest.approx(1.0, abs=2e-3)  # the last sample before 1 s
     time = float(text.split("rounding of the time at ")[1].split(" s")[0])
     assert time == pytest.approx(1.0, abs=1e-3)
-    np.testing.assert_allclose(kept["block/y"][:-1], 1 / (1 - kept.time[:-1]), rtol=1e-3)
+    np.testing.assert_allclose(partial_result["block/y"][:-1], 1 / (1 - partial_result.time[:-1]), rtol=1e-3)
 
 
 def test_the_state_with_the_largest_error_is_named() -> None:
@@ -92,9 +92,9 @@ def test_without_states_the_first_signal_that_is_not_finite_is_named_with_the_ti
     options = SimulationOptions(stop_time=4.0, sample_time=0.5)
     with pytest.raises(SimulationError, match=r"signal 'after/y' is inf at 1.5 s") as error:
         simulate(compile_system(bad), options)
-    kept = partial(error)
-    assert kept.time.tolist() == [0.0, 0.5, 1.0]
-    assert kept["log/y"].shape == (3, 2)
+    partial_result = partial(error)
+    assert partial_result.time.tolist() == [0.0, 0.5, 1.0]
+    assert partial_result["log/y"].shape == (3, 2)
     later = system(
         "direct",
         signals=signature(("clock/y", ()), ("log/y", (2,)), ("after/y", ())),
@@ -223,9 +223,9 @@ def test_a_run_with_extremely_short_steps_is_ended(solver: str, most: int) -> No
     jumping = compile_system(scalar("friction", lambda t, x, p: -1 + 2 * (x < 0), 1.0))
     with pytest.raises(SimulationError, match=r"the run takes extremely short steps at 1\.\d+ s: ") as error:
         simulate(jumping, SimulationOptions(stop_time=1000.0, solver=solver))
-    kept = partial(error)
-    assert kept.run.steps < most
-    assert kept.time[-1] == pytest.approx(1.0, abs=0.05)
+    partial_result = partial(error)
+    assert partial_result.run.steps < most
+    assert partial_result.time[-1] == pytest.approx(1.0, abs=0.05)
     text = str(error.value)
     assert len(text) < 400
     assert "the input of 'block/x'" in text

@@ -43,14 +43,14 @@ class Case:
 
     def __post_init__(self) -> None:
         random = np.random.default_rng(self.seed)
-        put = object.__setattr__
-        put(self, "sample_time", float(random.choice([0.05, 0.1, 0.13])))
-        put(self, "period", float(random.choice([0.1, 0.3, 0.17])))
+        set_field = object.__setattr__
+        set_field(self, "sample_time", float(random.choice([0.05, 0.1, 0.13])))
+        set_field(self, "period", float(random.choice([0.1, 0.3, 0.17])))
         # Some steps coincide with samples and ticks.
-        put(self, "step", float(random.choice([0.3, 0.6, random.uniform(0.1, 2.0)])))
-        put(self, "delay", float(random.choice([0.3, random.uniform(0.1, 0.8)])))
-        put(self, "frequency", float(random.uniform(2.0, 9.0)))
-        put(self, "phase", float(random.uniform(0.1, 3.0)))
+        set_field(self, "step", float(random.choice([0.3, 0.6, random.uniform(0.1, 2.0)])))
+        set_field(self, "delay", float(random.choice([0.3, random.uniform(0.1, 0.8)])))
+        set_field(self, "frequency", float(random.uniform(2.0, 9.0)))
+        set_field(self, "phase", float(random.uniform(0.1, 3.0)))
 
     sample_time: float = 0.0
     period: float = 0.0
@@ -100,26 +100,26 @@ class Case:
         stop = self.stop_time
         match name:
             case "step" | "loop":
-                found = np.array([self.step])
+                jump_times = np.array([self.step])
             case "delayed":
-                found = np.array([self.step + self.delay])
+                jump_times = np.array([self.step + self.delay])
             case "hold":
-                found = np.arange(1, 100) * self.period
+                jump_times = np.arange(1, 100) * self.period
             case "sign":
-                found = (np.arange(1, 100) * np.pi - self.phase) / self.frequency
+                jump_times = (np.arange(1, 100) * np.pi - self.phase) / self.frequency
             case "product":
-                found = np.sort(np.concatenate([self.times("hold"), self.times("sign")]))
+                jump_times = np.sort(np.concatenate([self.times("hold"), self.times("sign")]))
             case _:
-                found = np.empty(0)
-        return found[(found > 0.0) & (found <= stop * (1.0 + 1e-12))]
+                jump_times = np.empty(0)
+        return jump_times[(jump_times > 0.0) & (jump_times <= stop * (1.0 + 1e-12))]
 
 
 NAMES = ("step", "loop", "delayed", "hold", "sign", "product", "sine")
 
 
 def run(case: Case, **settings: object) -> SimulationResult:
-    given = {"stop_time": case.stop_time, "sample_time": case.sample_time, **settings}
-    return ab.simulate(case.diagram(), **given)  # pyright: ignore[reportArgumentType]
+    options = {"stop_time": case.stop_time, "sample_time": case.sample_time, **settings}
+    return ab.simulate(case.diagram(), **options)  # pyright: ignore[reportArgumentType]
 
 
 @pytest.mark.parametrize("solver", [{}, {"solver": "rk4", "step": 0.013}, {"solver": "rodas5p"}])
@@ -341,7 +341,7 @@ def test_jumps_travel_with_a_pickled_result() -> None:
 def test_a_run_with_too_many_jumps_says_from_when_on_they_are_not_recorded(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(jumps_module, "MOST_NUMBERS", 6000)
+    monkeypatch.setattr(jumps_module, "MAX_NUMBERS", 6000)
     b = DiagramBuilder("many")
     sine = b.add("sine", SineWave(frequency=1.0))
     b.add("hold", ZeroOrderHold(sample_time=1e-3), sine)

@@ -84,15 +84,15 @@ def test_a_view_keeps_the_extremes_and_is_limited_in_size() -> None:
     view = View(table.shape[1], watched=[1, 2, 4])
     for start in range(0, 300_000, 1777):
         view.append(table[:, start : start + 1777])
-    kept = view.rows()
-    assert kept.shape[1] < 1.1 * run_log.VIEW_ROWS
-    assert np.isin(kept[0], table[0]).all()
+    view_rows = view.rows()
+    assert view_rows.shape[1] < 1.1 * run_log.VIEW_ROWS
+    assert np.isin(view_rows[0], table[0]).all()
     for row in (1, 2, 4):
-        assert kept[row].min() == table[row].min() and kept[row].max() == table[row].max()
+        assert view_rows[row].min() == table[row].min() and view_rows[row].max() == table[row].max()
     # The view has the extremes of every interval of the table.
     length = 300_000 * 7 // run_log.VIEW_ROWS
     stretches = table[2, : 300_000 // length * length].reshape(-1, length)
-    assert np.isin(stretches.max(axis=1), kept[2]).all()
+    assert np.isin(stretches.max(axis=1), view_rows[2]).all()
 
 
 def test_a_log_has_the_chosen_signals_and_the_run_report(tmp_path: Path) -> None:

@@ -65,8 +65,8 @@ def test_a_pendulum_reaches_the_published_states() -> None:
     for t, expected in published.items():
         row = int(t)
         assert result.time[row] == t
-        found = np.concatenate([result["pendulum/p"][row], result["pendulum/v"][row]])
-        np.testing.assert_allclose(found, expected, atol=2e-11)
+        state = np.concatenate([result["pendulum/p"][row], result["pendulum/v"][row]])
+        np.testing.assert_allclose(state, expected, atol=2e-11)
     assert np.ptp(result["pendulum/energy"]) < 1e-10
 
 
@@ -218,8 +218,8 @@ def test_ctrl_c_returns_the_computed_samples_marked_as_incomplete() -> None:
     assert 0 < result.time.size < 20001
     np.testing.assert_allclose(result["mass/x"], np.cos(2 * result.time), atol=1e-6)
     whole = simulate(OSCILLATOR, SimulationOptions(stop_time=5.0, solver="rk4", step=1e-4, sample_time=0.5))
-    kept = min(result.time.size, whole.time.size)
-    assert result.states[:kept].tobytes() == whole.states[:kept].tobytes()
+    count = min(result.time.size, whole.time.size)
+    assert result.states[:count].tobytes() == whole.states[:count].tobytes()
 
 
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="POSIX timers")

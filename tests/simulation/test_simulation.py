@@ -94,12 +94,12 @@ def test_a_run_with_pauses_equals_a_run_without_bit_for_bit(
 @pytest.mark.parametrize("name", list(SYSTEMS))
 def test_streamed_samples_equal_the_recorded_samples(name: str) -> None:
     run = Simulation(SYSTEMS[name], options())
-    seen, times, signals = 0, [], []
+    count, times, signals = 0, [], []
     while not run.finished:
         run.advance(run.time + 0.17)
-        fresh = run.samples(seen)
-        assert fresh.begin == seen and fresh.end == run.recorded
-        seen = fresh.end
+        fresh = run.samples(count)
+        assert fresh.begin == count and fresh.end == run.recorded
+        count = fresh.end
         for path in run.compiled.signals_layout.names:
             assert fresh[path].shape[0] == fresh.time.size
         times.append(fresh.time)
@@ -107,7 +107,7 @@ def test_streamed_samples_equal_the_recorded_samples(name: str) -> None:
     result = run.result()
     assert np.concatenate(times).tobytes() == result.time.tobytes()
     assert np.concatenate(signals, axis=1).tobytes() == result.signals.tobytes()
-    assert run.samples(seen).time.size == 0
+    assert run.samples(count).time.size == 0
 
 
 @pytest.mark.parametrize("exactly", [False, True])
@@ -132,8 +132,8 @@ def test_a_run_with_a_changed_parameter_equals_two_runs_joined_by_their_state(
     assert joined.signals[:, recorded:].tobytes() == rest.signals[:, 1:].tobytes()
     first = simulate(system, options(stop=1.23, solver=solver, step=step))
     if exactly:
-        kept = first.time < 1.23
-        assert joined.signals[:, :recorded].tobytes() == first.signals[:, kept].tobytes()
+        before_change = first.time < 1.23
+        assert joined.signals[:, :recorded].tobytes() == first.signals[:, before_change].tobytes()
     assert [change.time for change in joined.parameter_changes] == [state.time]
     assert joined.parameters[names[0]] == 3.0
 

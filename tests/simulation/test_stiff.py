@@ -49,8 +49,8 @@ def test_robertson_to_1e11_seconds(rtol: float, error: float) -> None:
 def test_robertson_with_the_conservation_law_as_an_implicit_equation() -> None:
     options = SimulationOptions(stop_time=1e11, solver="rodas5p", rtol=1e-6, atol=1e-14)
     result = simulate(compile_system(robertson_dae()), options)
-    found = np.array([result[name][-1] for name in "abc"])
-    np.testing.assert_allclose(found, ROBERTSON_END, rtol=1e-5)
+    actual = np.array([result[name][-1] for name in "abc"])
+    np.testing.assert_allclose(actual, ROBERTSON_END, rtol=1e-5)
     total = result["a"] + result["b"] + result["c"]
     np.testing.assert_allclose(total, 1.0, rtol=1e-15)  # solved at every sample, without drift
 
@@ -97,8 +97,8 @@ def test_a_pendulum_of_index_1_reaches_the_exact_state() -> None:
         SimulationOptions(stop_time=10.0, solver="rodas5p", rtol=1e-10, atol=1e-12),
     )
     expected = [-0.27508746257611686, -0.96141920509912506, 4.1755981009517288, -1.1947490545604753]
-    found = [result[name][-1] for name in ("x", "y", "vx", "vy")]
-    np.testing.assert_allclose(found, expected, atol=1e-6)  # 10 s with a tolerance of 1e-10 per step
+    actual = [result[name][-1] for name in ("x", "y", "vx", "vy")]
+    np.testing.assert_allclose(actual, expected, atol=1e-6)  # 10 s with a tolerance of 1e-10 per step
     np.testing.assert_allclose(result["x"] ** 2 + result["y"] ** 2, 1.0, atol=1e-7)
 
 
@@ -124,9 +124,9 @@ def test_an_implicit_equation_that_becomes_singular_is_reported() -> None:
         SimulationError, match="no solution of the implicit equations of the loop through 'root'"
     ) as error:
         simulate(compile_system(ending), SimulationOptions(stop_time=2.0, solver="rodas5p"))
-    kept = error.value.partial
-    assert kept is not None
-    np.testing.assert_allclose(kept["w"], np.sqrt(1.0 - kept.time), atol=1e-6)  # pyright: ignore
+    partial_result = error.value.partial
+    assert partial_result is not None
+    np.testing.assert_allclose(partial_result["w"], np.sqrt(1.0 - partial_result.time), atol=1e-6)  # pyright: ignore
 
 
 @pytest.mark.parametrize("solver", ["rodas5p", "ros23"])

@@ -126,6 +126,6 @@ def test_stability_intervals_agree_with_the_published_ones() -> None:
     """Hairer, Wanner II, IV.2, table 2.1: 2.51 for order 3, 2.785 for RK4, 3.3 for Dormand-Prince."""
     published = {"euler": 2.0, "heun": 2.0, "rk3": 2.51, "rk4": 2.785, "rk45": 3.3}
     for name, value in published.items():
-        found = find_tableau(name)
-        assert isinstance(found, ButcherTableau)
-        assert found.real_stability == pytest.approx(value, abs=0.02)
+        method = find_tableau(name)
+        assert isinstance(method, ButcherTableau)
+        assert method.real_stability == pytest.approx(value, abs=0.02)

@@ -20,7 +20,7 @@ from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, e
 
 from interruptible import start_interruptible
 
-NOT_NEEDED = (
+DISABLED_FEATURES = (
     # The browser's own address bar: Chromium loads two pages for its suggestions into every new window, which
     # takes as much processor time as the page of the studio.
     "WebUIOmniboxPopup",
@@ -52,19 +52,19 @@ FLAGS = [
     "--use-gl=angle",
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
-    f"--disable-features={','.join(NOT_NEEDED)}",
+    f"--disable-features={','.join(DISABLED_FEATURES)}",
 ]
 TOUR_SEEN = "if (location.protocol === 'http:') localStorage.setItem('armblocks-tour-seen', 'yes')"
 """Disables the tour; pages outside the studio (about:blank) have no local storage."""
-NOT_DRAWN = """
+NO_RENDERING = """
 for (const draw of ['drawArrays', 'drawElements', 'drawArraysInstanced', 'drawElementsInstanced'])
     WebGL2RenderingContext.prototype[draw] = () => {}
 """
 """Three-dimensional scenes are set up but not drawn, because software rendering takes longer than all other
 work. Shaders are compiled, and a shader error is reported on the console."""
-PATIENCE_MS = 180_000
+TIMEOUT_MS = 180_000
 """Long enough for a busy machine; nothing waits longer than needed."""
-expect.set_options(timeout=PATIENCE_MS)
+expect.set_options(timeout=TIMEOUT_MS)
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 
 
@@ -93,8 +93,8 @@ class Studio:
         text = ""
         for line in self.process.stdout:
             text += line
-            if found := re.search(r"http://127\.0\.0\.1:\d+/login\?key=\S+", line):
-                self.link = found.group()
+            if match := re.search(r"http://127\.0\.0\.1:\d+/login\?key=\S+", line):
+                self.link = match.group()
                 self.address = self.link.partition("login")[0]
                 return
         self.kill()
@@ -111,7 +111,7 @@ class Studio:
         """Stop the process with Ctrl-C, as a user does."""
         self.process.send_signal(signal.SIGINT)
         try:
-            self.process.wait(timeout=PATIENCE_MS / 1000)
+            self.process.wait(timeout=TIMEOUT_MS / 1000)
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()
@@ -131,7 +131,7 @@ class SharedBrowser:
     def opened(self) -> Browser:
         """Return the browser; start it if it is not running."""
         if self._browser is None:
-            path = next((found for name in BROWSERS if (found := shutil.which(name))), None)
+            path = next((command for name in BROWSERS if (command := shutil.which(name))), None)
             assert path is not None, f"install one of {', '.join(BROWSERS)} (apt-get install chromium)"
             playwright = self._stack.enter_context(sync_playwright())
             self._browser = playwright.chromium.launch(executable_path=path, args=FLAGS)
@@ -221,8 +221,8 @@ def new_context(browser: Browser) -> BrowserContext:
     context = browser.new_context(
         viewport={"width": 1280, "height": 720}, color_scheme="light", reduced_motion="reduce"
     )
-    context.set_default_timeout(PATIENCE_MS)
-    for script in (TOUR_SEEN, NOT_DRAWN):
+    context.set_default_timeout(TIMEOUT_MS)
+    for script in (TOUR_SEEN, NO_RENDERING):
         context.add_init_script(script)
     return context
 

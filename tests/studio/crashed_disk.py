@@ -45,10 +45,10 @@ def going(scenario: Callable[[], Coroutine[Any, Any, None]]) -> None:
     asyncio.run(scenario())
 
 
-def carry_out(files: OpenFiles[OpenedT], found: OpenedT, requests: Iterable[Alteration]) -> None:
+def carry_out(files: OpenFiles[OpenedT], open_file: OpenedT, requests: Iterable[Alteration]) -> None:
     """Perform requests; those that are refused change nothing."""
     for request in requests:
         try:
-            files.perform(found, request)
+            files.perform(open_file, request)
         except ArmblocksError:
             continue

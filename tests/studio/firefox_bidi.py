@@ -20,12 +20,12 @@ from websockets.sync.client import connect
 
 NAMES = ("firefox-esr", "firefox")
 KEYS = {"Control": "\ue009", "Enter": "\ue007", "Delete": "\ue017"}
-PATIENCE_SECONDS = 180.0
+TIMEOUT_SECONDS = 180.0
 
 
 def firefox_path() -> str | None:
     """The path of Firefox, or ``None`` if it is not installed."""
-    return next((found for name in NAMES if (found := shutil.which(name))), None)
+    return next((path for name in NAMES if (path := shutil.which(name))), None)
 
 
 class Firefox:
@@ -50,12 +50,12 @@ class Firefox:
         )
         assert self._process.stderr is not None
         for line in self._process.stderr:
-            if found := re.search(r"WebDriver BiDi listening on (ws://\S+)", line):
+            if match := re.search(r"WebDriver BiDi listening on (ws://\S+)", line):
                 break
         else:
             raise AssertionError("Firefox ended without printing its address")
         self._stack = ExitStack()
-        self._socket = self._stack.enter_context(connect(f"{found.group(1)}/session", max_size=None))
+        self._socket = self._stack.enter_context(connect(f"{match.group(1)}/session", max_size=None))
         self._numbers = count(1)
         self.errors: list[str] = []
         """Errors and uncaught exceptions on the consoles of pages."""
@@ -68,7 +68,7 @@ class Firefox:
         number = next(self._numbers)
         self._socket.send(json.dumps({"id": number, "method": method, "params": params}))
         while True:
-            message = json.loads(self._socket.recv(timeout=PATIENCE_SECONDS))
+            message = json.loads(self._socket.recv(timeout=TIMEOUT_SECONDS))
             if message.get("method") == "log.entryAdded" and message["params"]["level"] == "error":
                 self.errors.append(message["params"]["text"])
             if message.get("id") == number:
@@ -80,15 +80,15 @@ class Firefox:
 
     def value(self, expression: str) -> Any:
         """Return the value of a JavaScript expression: a text, a number or a boolean."""
-        found = self._ask(
+        reply = self._ask(
             "script.evaluate", expression=expression, target={"context": self._page}, awaitPromise=True
         )
-        assert found["type"] == "success", found
-        return found["result"].get("value")
+        assert reply["type"] == "success", reply
+        return reply["result"].get("value")
 
     def wait(self, expression: str) -> None:
         """Wait until a JavaScript expression is true."""
-        end = time.monotonic() + PATIENCE_SECONDS
+        end = time.monotonic() + TIMEOUT_SECONDS
         while not self.value(f"Boolean({expression})"):
             assert time.monotonic() < end, f"not true in time: {expression}; errors: {self.errors}"
             time.sleep(0.1)

@@ -113,13 +113,13 @@ def test_a_thermostat_with_exponential_branches(run: Run) -> None:
     builder.connect(builder.add("rate", bl.Sum(signs="+-"), relay, room), room["u"])
     result = run(builder.build(), 4.0)
     t, expected = result.time, np.empty_like(result.time)
-    begin, value, target = 0.0, 15.0, 30.0
-    while begin < 4.0:
+    since, value, target = 0.0, 15.0, 30.0
+    while since < 4.0:
         edge = 22.0 if target == 30.0 else 18.0
         length = math.log((target - value) / (target - edge))
-        inside = (t >= begin) & (t <= begin + length)
-        expected[inside] = target + (value - target) * np.exp(-(t[inside] - begin))
-        begin, value, target = begin + length, edge, 40.0 - target
+        inside = (t >= since) & (t <= since + length)
+        expected[inside] = target + (value - target) * np.exp(-(t[inside] - since))
+        since, value, target = since + length, edge, 40.0 - target
     np.testing.assert_allclose(result["room"], expected, atol=3e-8)
 
 
@@ -132,12 +132,12 @@ def test_two_rates_with_offsets_around_a_plant(run: Run) -> None:
     builder.connect(builder.add("gain", bl.Gain(gain=-1.5), control), x["u"])
     result = run(builder.build(), 3.0)
     ticks = sorted([(0.07 + 0.25 * j, 0) for j in range(12)] + [(0.02 + 0.1 * j, 1) for j in range(30)])
-    value, sampled, held, begin = 1.0, 0.0, 0.0, 0.0
+    value, sampled, held, since = 1.0, 0.0, 0.0, 0.0
     expected = np.empty_like(result.time)
     pieces = [(0.0, 1.0, 0.0)]
     for time, clock in ticks:
-        value += -1.5 * held * (time - begin)
-        begin = time
+        value += -1.5 * held * (time - since)
+        since = time
         if clock == 0:
             sampled = value
         # both clocks tick at 0.32 + 0.5 j: the sensor is evaluated first, because the control depends on it
@@ -160,14 +160,14 @@ def test_a_relay_with_hysteresis_in_a_double_integrator_loop(run: Run) -> None:
     builder.connect(relay, v["u"])
     result = run(builder.build(), 6.0)
     t, expected = result.time, np.empty_like(result.time)
-    begin, position, speed, push = 0.0, 0.0, 1.0, 1.0
-    while begin < 6.0:
+    since, position, speed, push = 0.0, 0.0, 1.0, 1.0
+    while since < 6.0:
         edge = h if push > 0 else -h
         # position + speed s + push s^2/2 = edge, the last crossing in the direction of the switch
         s = (-speed + push * math.sqrt(speed**2 + 2 * push * (edge - position))) / push
-        inside = (t >= begin) & (t <= begin + s)
-        expected[inside] = position + speed * (t[inside] - begin) + push * (t[inside] - begin) ** 2 / 2
-        begin, position, speed, push = begin + s, edge, speed + push * s, -push
+        inside = (t >= since) & (t <= since + s)
+        expected[inside] = position + speed * (t[inside] - since) + push * (t[inside] - since) ** 2 / 2
+        since, position, speed, push = since + s, edge, speed + push * s, -push
     np.testing.assert_allclose(result["x"], expected, atol=2e-8)
 
 
@@ -191,7 +191,7 @@ def test_a_sampled_pi_with_a_delay_of_one_tick(run: Run) -> None:
     T, kp, ki = 0.2, 0.8, 0.5
     builder = ab.DiagramBuilder("pi")
     plant = builder.add("plant", bl.TransferFunction(numerator=[2.0], denominator=[1.0, 1.0]))
-    error = builder.add("error", bl.Sum(signs="+-"), builder.add("wanted", bl.Constant(value=1.0)), plant)
+    error = builder.add("error", bl.Sum(signs="+-"), builder.add("reference", bl.Constant(value=1.0)), plant)
     control = builder.add("control", bl.DiscretePID(P=kp, I=ki, sample_time=T), error)
     builder.connect(builder.add("late", bl.UnitDelay(sample_time=T), control), plant["u"])
     result = run(builder.build(), 6.0, sample_time=T)

@@ -115,10 +115,10 @@ def test_a_brusselator_on_a_line_as_two_vectors() -> None:
         ("du", u, "1 + u1^2*u2 - 4*u1", 1.0),
         ("dv", v, "3*u1 - u1^2*u2", 3.0),
     ):
-        made = builder.add(f"{name} made", bl.Expression(formula=reaction, inputs=2), u, v)
+        reaction_rate = builder.add(f"{name} made", bl.Expression(formula=reaction, inputs=2), u, v)
         moved = builder.add(f"{name} moved", bl.MatrixGain(gain=D), own)
         ends_ = builder.add(f"{name} ends", bl.Constant(value=border * edge))
-        builder.connect(builder.add(name, bl.Sum(signs="+++"), made, moved, ends_), own["u"])
+        builder.connect(builder.add(name, bl.Sum(signs="+++"), reaction_rate, moved, ends_), own["u"])
     result = ab.simulate(builder.build(), stop_time=10.0, solver="rodas5p", rtol=1e-8, atol=1e-10)
 
     def rate(_: float, y: Array) -> Array:
@@ -302,8 +302,8 @@ def test_the_torque_with_a_payload_agrees_with_lagranges_equations() -> None:
     free = planar_acceleration(q, qd, np.zeros(2), 0.8)
     inverse = [planar_acceleration(q, qd, unit, 0.8) - free for unit in np.eye(2)]
     tau = np.linalg.solve(np.array(inverse).T, qdd - free)
-    got = ab.Arm(planar()).rne(q, qd, qdd, payload=ab.Payload(mass=0.8))
-    np.testing.assert_allclose(got, tau, rtol=1e-12)
+    actual = ab.Arm(planar()).rne(q, qd, qdd, payload=ab.Payload(mass=0.8))
+    np.testing.assert_allclose(actual, tau, rtol=1e-12)
 
 
 def test_the_linearised_arm_agrees_with_differences_of_lagranges_equations() -> None:

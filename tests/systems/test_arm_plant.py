@@ -268,9 +268,9 @@ def test_an_impact_at_a_hard_stop_changes_the_speed_of_the_other_joint(solver: s
     assert result.run.events == 1, "the joint leaves the stop at the time of the impact"
     np.testing.assert_allclose(result["arm/q"][-1], then.y[:2, -1], rtol=0, atol=1e-8)
     np.testing.assert_allclose(result["arm/qd"][-1], then.y[2:, -1], rtol=0, atol=1e-8)
-    lost = 0.5 * qd @ M @ qd - 0.5 * after @ M @ after
+    dissipated = 0.5 * qd @ M @ qd - 0.5 * after @ M @ after
     balance = energy_balance(result)
-    expected = balance[0] - np.where(result.time > first.t[-1], lost, 0.0)
+    expected = balance[0] - np.where(result.time > first.t[-1], dissipated, 0.0)
     np.testing.assert_allclose(balance, expected, rtol=0, atol=1e-8)
 
 

@@ -287,8 +287,8 @@ def test_sampled_blocks_are_updated_once_at_each_trigger(settings: dict[str, obj
         y, before = x, memory
         x, memory, last = x + (fire - last) * fire, fire, fire
         values.append((y, before))
-    for (y, before), begin, end in zip(values, fires, [*fires[1:], 2.05]):
-        inside_interval = (result.time > begin + 1e-6) & (result.time < end - 1e-6)
+    for (y, before), start, end in zip(values, fires, [*fires[1:], 2.05]):
+        inside_interval = (result.time > start + 1e-6) & (result.time < end - 1e-6)
         np.testing.assert_allclose(result["sub/y"][inside_interval], y, atol=1e-9)
         np.testing.assert_allclose(result["sub/before"][inside_interval], before, atol=1e-9)
 
@@ -371,9 +371,9 @@ def test_the_reset_restores_all_initial_states(settings: dict[str, object]) -> N
         lambda builder: builder.add("one", Constant()),
     )
     result = ab.simulate(diagram, stop_time=5.2, sample_time=0.07, **settings)
-    begin = np.select([result.time > 4.5, result.time > 2.5, result.time > 0.5], [4.5, 2.5, 0.5], 0.0)
-    np.testing.assert_allclose(result["sub/y"], 2.0 + result.time - begin, atol=1e-11)
-    np.testing.assert_allclose(result["sub/deeper/y"], 0.5 + result.time - begin, atol=1e-11)
+    start = np.select([result.time > 4.5, result.time > 2.5, result.time > 0.5], [4.5, 2.5, 0.5], 0.0)
+    np.testing.assert_allclose(result["sub/y"], 2.0 + result.time - start, atol=1e-11)
+    np.testing.assert_allclose(result["sub/deeper/y"], 0.5 + result.time - start, atol=1e-11)
 
 
 @SETTINGS
@@ -447,10 +447,10 @@ def test_switch_case_truncates_its_input_to_an_integer(settings: dict[str, objec
 def test_merge_keeps_the_last_value_of_the_subsystem_that_executed_last() -> None:
     builder = DiagramBuilder("merge")
     u = builder.add("u", Clock())
-    for name, begin in (("first", 1.0), ("second", 3.0)):
+    for name, start in (("first", 1.0), ("second", 3.0)):
         inner = DiagramBuilder(name)
         inner.output("y", inner.input("u"))
-        on = builder.add(f"{name} on", Expression(formula=f"t >= {begin} && t < {begin + 1}", inputs=0))
+        on = builder.add(f"{name} on", Expression(formula=f"t >= {start} && t < {start + 1}", inputs=0))
         builder.add(name, EnabledSubsystem(diagram=inner.build()), u, enable=on)
     builder.add("merge", Merge(initial=-5.0), builder["first"], builder["second"])
     result = ab.simulate(builder.build(), stop_time=6.0, sample_time=0.5)

@@ -130,7 +130,7 @@ def test_a_sine_is_delayed(run: Run) -> None:
     close(result["late/y"], expected, 2e-8)
 
 
-BENT: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+CURVES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "sqrt(u)": np.sqrt,
     "sqrt(u + 1e-12)": lambda t: np.sqrt(t + 1e-12),
     "sqrt(abs(u - 0.51))": lambda t: np.sqrt(np.abs(t - 0.51)),
@@ -150,7 +150,7 @@ def test_a_delayed_signal_is_not_extrapolated_beyond_a_kink(run: Run) -> None:
     close(result["root/y"], np.maximum(result.time - 1.0, 0.0) / np.sqrt(2.0), 1e-5)
 
 
-@pytest.mark.parametrize("formula", BENT)
+@pytest.mark.parametrize("formula", CURVES)
 @pytest.mark.parametrize(
     "settings", [{}, {"rtol": 1e-9, "atol": 1e-12}, {"solver": "rk4", "step": 0.1}], ids=str
 )
@@ -158,10 +158,10 @@ def test_the_history_of_a_signal_with_large_curvature_is_accurate(
     formula: str, settings: dict[str, object], tmp_path: Path
 ) -> None:
     builder = DiagramBuilder("d")
-    bent = builder.add("bent", Expression(formula=formula), builder.add("t", Clock()))
-    builder.add("late", TransportDelay(delay=1.0), bent)
+    curve = builder.add("bent", Expression(formula=formula), builder.add("t", Clock()))
+    builder.add("late", TransportDelay(delay=1.0), curve)
     result = native(sample_time=0.0371, **settings)(builder.build(), 3.0)
-    expected = np.where(result.time < 1.0, 0.0, BENT[formula](np.maximum(result.time - 1.0, 0.0)))
+    expected = np.where(result.time < 1.0, 0.0, CURVES[formula](np.maximum(result.time - 1.0, 0.0)))
     close(result["late/y"], expected, 1e-8 if "rtol" in settings else 3e-6)
     assert result.final_state is not None
     result.final_state.save(tmp_path / "state")

@@ -88,19 +88,19 @@ def expected(restarts: list[float], stop: float) -> dict[str, list[float]]:
     values: dict[str, list[float]] = {name: [] for name in VALUES}
     for k in range(round(stop / PERIOD) + 1):
         t = k * PERIOD
-        begin = max([0.0, *(time for time in restarts if time <= t + 1e-9)])
-        first = next(n for n in range(k + 1) if n * PERIOD > begin - 1e-9)
-        fine = np.linspace(begin, t, 4000)
+        restart = max([0.0, *(time for time in restarts if time <= t + 1e-9)])
+        first = next(n for n in range(k + 1) if n * PERIOD > restart - 1e-9)
+        fine = np.linspace(restart, t, 4000)
         u = wave(fine) + 3.0 * (fine >= 1.0 - 1e-9)
         changed = np.flatnonzero((u > 1.0) | (u < 0.0))
-        begins = abs(t - begin) < 1e-9
+        begins = abs(t - restart) < 1e-9
         values["count"].append(k - first)
         values["left"].append(-5.0 if begins else float(wave(np.array(t)) + 3.0 * (t > 1.0 + 1e-9)))
         values["on"].append(float(changed.size > 0 and u[changed[-1]] > 1.0))
         values["above"].append(float(u[-1] >= 0.5))
         values["stuck"].append(float(k - first >= 5))
-        integral = (2.0 / 3.0) * (np.cos(3.0 * begin + 0.5) - np.cos(3.0 * t + 0.5)) - 0.4 * (t - begin)
-        values["area"].append(0.0 if begins else integral + 3.0 * (max(t, 1.0) - max(begin, 1.0)))
+        integral = (2.0 / 3.0) * (np.cos(3.0 * restart + 0.5) - np.cos(3.0 * t + 0.5)) - 0.4 * (t - restart)
+        values["area"].append(0.0 if begins else integral + 3.0 * (max(t, 1.0) - max(restart, 1.0)))
     return values
 
 

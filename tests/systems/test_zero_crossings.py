@@ -392,7 +392,7 @@ def test_the_limits_of_a_drive(run: Run) -> None:
     """Input 15, peak 10, limit 20 (1 - w/100), w = 20 t: 10 until t = 2.5, then falling, -10 after 7.5."""
     builder = DiagramBuilder("d")
     speed = builder.add("w", Gain(gain=20.0), builder.add("t", Clock()))
-    drive = builder.add("drive", MotorDrive(), builder.add("wanted", Constant(value=15.0)), speed)
+    drive = builder.add("drive", MotorDrive(), builder.add("reference", Constant(value=15.0)), speed)
     builder.add("integral", Integrator(), drive)
     result = run(builder.build(), 9.0)
     t = result["t"]

@@ -24,7 +24,7 @@ export async function dropTable(name: string, content: string, position: Dropped
     refuse({ what: 'no diagram is open', where: name, fix: 'open a diagram, and drop the file on its sheet' })
     return
   }
-  const stored = await ask({ kind: 'keep_file', name, content })
+  const stored = await ask({ kind: 'store_file', name, content })
   if (!stored) return
   if (stored.stored) return addTableBlock(stored.path, position)
   useDroppedTable.setState({ waiting: { name, content, at: position } })
@@ -33,7 +33,7 @@ export async function dropTable(name: string, content: string, position: Dropped
 
 /** Replace the file of the same name. */
 export async function replaceTable({ name, content, at: position }: DroppedTable): Promise<void> {
-  const stored = await ask({ kind: 'keep_file', name, content, replace: true })
+  const stored = await ask({ kind: 'store_file', name, content, replace: true })
   if (stored) await addTableBlock(stored.path, position)
 }
 

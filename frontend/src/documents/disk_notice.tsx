@@ -24,7 +24,7 @@ function FileNotice({ state, saveAs }: { state: DocumentState; saveAs: () => voi
             <Button
               size="compact-sm"
               variant="default"
-              onClick={() => void ask({ kind: 'keep_mine', document })}
+              onClick={() => void ask({ kind: 'ignore_file_change', document })}
             >
               Keep mine
             </Button>

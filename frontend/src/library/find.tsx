@@ -1,6 +1,6 @@
 import { useEffect, useState } from 'react'
 import { showDialog, useDialogs } from '../dialogs'
-import type { Found } from '../protocol'
+import type { FoundBlock } from '../protocol'
 import { ask, showBlock, useStudio } from '../store'
 import { PickList } from './pick_list'
 
@@ -11,7 +11,7 @@ export function Find() {
   const opened = useDialogs((s) => s.open === 'find')
   const typed = useDialogs((s) => s.typed)
   const document = useStudio((s) => s.document?.state.document)
-  const [matches, setMatches] = useState<Found[]>([])
+  const [matches, setMatches] = useState<FoundBlock[]>([])
   useEffect(() => {
     setMatches([])
     if (!opened || !document || !typed.trim()) return

@@ -7,7 +7,7 @@ import { MantineProvider } from '@mantine/core'
 import { StrictMode } from 'react'
 import { createRoot } from 'react-dom/client'
 import { ContextMenu } from '../context_menu'
-import type { Channel, ViewOf } from '../protocol'
+import type { Channel, SinkView } from '../protocol'
 import { RunArm } from '../robot/run_arm'
 import { posesFromRows, type RobotScene } from '../robot/scene'
 import { Timeline } from '../run/timeline'
@@ -24,7 +24,7 @@ interface ShowMessage {
   dark: boolean
   /** The key of a result; views of the same result share one time cursor. */
   key: string
-  run: { stopTime: number; channels: Channel[]; views: ViewOf[]; aliases: Record<string, string> } | null
+  run: { stopTime: number; channels: Channel[]; views: SinkView[]; aliases: Record<string, string> } | null
   frame: ArrayBuffer
   scopes: boolean
   arm: { path: string; scene: RobotScene; rest: number[][][]; drawing: string } | null

@@ -1,7 +1,7 @@
 import { create } from 'zustand'
 import { scheduleFrame } from '../frames'
 import type { EventOf } from '../messages'
-import type { ViewOf } from '../protocol'
+import type { SinkView } from '../protocol'
 import { RunSamples } from '../model/run_samples'
 import { samples, showSamples } from '../samples'
 
@@ -25,7 +25,7 @@ export interface StoredRun {
   solver: string
   reason: string
   samples: RunSamples
-  views: ViewOf[]
+  views: SinkView[]
   /** Trial values at the start. */
   trialValues: Record<string, unknown>
   tunings: Tuning[]

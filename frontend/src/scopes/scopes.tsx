@@ -11,7 +11,7 @@ import { useElementSize } from '@mantine/hooks'
 import { useMemo } from 'react'
 import { inNaturalOrder } from '../model/natural_order'
 import { scopeGrid } from '../model/scope_grid'
-import type { ViewOf } from '../protocol'
+import type { SinkView } from '../protocol'
 import { shownTime } from '../run/cursor'
 import { samples } from '../samples'
 import { useStudio } from '../store'
@@ -65,7 +65,7 @@ function Grid({ count, children }: { count: number; children: React.ReactNode })
   )
 }
 
-function ScopeChart({ run, view }: { run: string; view: ViewOf }) {
+function ScopeChart({ run, view }: { run: string; view: SinkView }) {
   const traces = useMemo(
     () =>
       tracesOf(

@@ -32,7 +32,7 @@ from armblocks.extras import from_extra
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-MOST_TICKS = 100_000
+MAX_TICKS = 100_000
 """Maximum number of ticks of one common period."""
 
 
@@ -293,18 +293,18 @@ def ticks_of_a_period(system: HybridSystem) -> tuple[Fraction, list[tuple[Fracti
     clocks.
 
     Sample times have the same ratios as in a run (:mod:`armblocks.equations.clock_ratios`). Raises
-    ``InputError`` if one period has more than ``MOST_TICKS`` ticks.
+    ``InputError`` if one period has more than ``MAX_TICKS`` ticks.
     """
     clocks = exact_clocks(system.clocks)
     periods = [own for own, _ in clocks]
     period = common_period(clocks)
     count = sum(int(period / own) for own in periods)
-    if count > MOST_TICKS:
+    if count > MAX_TICKS:
         listed = ", ".join(f"{float(own):g} s" for own in periods)
         raise InputError(
             f"the clocks ({listed}) have the common period {float(period):g} s with {count} ticks",
             where=system.name,
-            allowed=f"{MOST_TICKS} ticks in the least common multiple of the sample times",
+            allowed=f"{MAX_TICKS} ticks in the least common multiple of the sample times",
             fix="choose sample times that are multiples of one another",
         )
     ticking: dict[Fraction, list[int]] = {}

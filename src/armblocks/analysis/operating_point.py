@@ -14,7 +14,7 @@ from armblocks.errors import SimulationError
 
 Array = NDArray[np.float64]
 
-MOST_ITERATIONS = 60
+MAX_ITERATIONS = 60
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -123,7 +123,7 @@ def solved(evaluated: EvaluatedSystem, point: Point) -> Point:
         return Point(t=point.t, x=point.x, z=point.z, w=values, p=point.p)
 
     residual = evaluated.residual(point)
-    for _ in range(MOST_ITERATIONS):
+    for _ in range(MAX_ITERATIONS):
         jacobian = evaluated.residual_jacobians(at(w)).w
         step = np.linalg.lstsq(jacobian, -residual, rcond=None)[0]
         if np.isfinite(step).all() and np.abs(step).max() <= 1e-14 * max(1.0, float(np.abs(w).max())):

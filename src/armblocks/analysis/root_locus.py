@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-MOST_GAINS = 3000
+MAX_GAINS = 3000
 FINEST = 1e-7
 """Minimum relative distance of neighbouring gains."""
 
@@ -87,7 +87,7 @@ def _adapted(loop: LinearSystem, zeros: Complex) -> tuple[Array, list[Complex]]:
     gains = [0.0, *np.geomspace(last * 1e-6, last, 80).tolist()]
     rows = [_roots(loop, gain) for gain in gains]
     k = 0
-    while k + 1 < len(gains) and len(gains) < MOST_GAINS:
+    while k + 1 < len(gains) and len(gains) < MAX_GAINS:
         apart = gains[k + 1] - gains[k] > FINEST * gains[k + 1]
         if apart and _largest_movement(rows[k], rows[k + 1], reach) > 0.02 * reach:
             between = (gains[k] + gains[k + 1]) / 2.0

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-MOST_SWEEPS = 30
+MAX_SWEEPS = 30
 
 
 def balanced(A: Array, B: Array, C: Array) -> tuple[Array, Array, Array]:
@@ -19,7 +19,7 @@ def balanced(A: Array, B: Array, C: Array) -> tuple[Array, Array, Array]:
     possible (Osborne, J. ACM 7, 1960, 338-345, with inputs and outputs as in TB01ID of SLICOT).
     """
     a, b, c = A.copy(), B.copy(), C.copy()
-    for _ in range(MOST_SWEEPS):
+    for _ in range(MAX_SWEEPS):
         changed = False
         for k in range(a.shape[0]):
             column = math.hypot(_length(np.delete(a[:, k], k)), _length(c[:, k]))

@@ -13,7 +13,7 @@ from armblocks.analysis.state_space import StateSpaceModel
 
 Array = NDArray[np.float64]
 
-MOST_SHOWN = 12
+MAX_SHOWN = 12
 """Maximum number of rows and columns of a matrix that is displayed completely."""
 
 STYLE = """
@@ -80,9 +80,9 @@ def matrix_lines(matrix: Array, rows: tuple[str, ...], columns: tuple[str, ...])
 
 
 def _shown(count: int) -> list[int | None]:
-    if count <= MOST_SHOWN:
+    if count <= MAX_SHOWN:
         return list(range(count))
-    half = MOST_SHOWN // 2
+    half = MAX_SHOWN // 2
     return [*range(half), None, *range(count - half, count)]
 
 

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 SystemT_co = TypeVar("SystemT_co", bound=StateSpaceModel, covariant=True)
 
-MOST_INSTANTS = 20_000
+MAX_INSTANTS = 20_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,7 +100,7 @@ def _instants(system: StateSpaceModel, stop_time: float | None, points: int) -> 
         )
     if system.is_discrete:
         count = max(round(end / system.dt), 1)
-        return system.dt * np.arange(min(count, MOST_INSTANTS) + 1, dtype=np.float64)
+        return system.dt * np.arange(min(count, MAX_INSTANTS) + 1, dtype=np.float64)
     if stop_time is None:
         end = _rounded_up(end)
     # Enough points for the fastest motion that is visible in the whole figure.

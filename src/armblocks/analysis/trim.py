@@ -27,8 +27,8 @@ from armblocks.errors import SimulationError
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-MOST_ITERATIONS = 200
-MOST_MODES = 20
+MAX_ITERATIONS = 200
+MAX_MODES = 20
 """Maximum number of mode changes."""
 ROUNDOFFS = 4.0 * float(np.finfo(np.float64).eps)
 """Relative rounding error of a term of an equation."""
@@ -131,7 +131,7 @@ def _modes_afterwards(search: _Search) -> tuple[Point, int, list[str]]:
         iterations += used
         changing = search.inconsistent_modes(point)
         z = search.consistent_modes(point)
-        if not changing or z.tobytes() in previous_modes or len(previous_modes) == MOST_MODES:
+        if not changing or z.tobytes() in previous_modes or len(previous_modes) == MAX_MODES:
             return point, iterations, changing
         previous_modes.append(point.z.tobytes())
         point = dataclasses.replace(point, z=z)
@@ -287,7 +287,7 @@ class _Search:
             point = dataclasses.replace(point, z=self.consistent_modes(point))
         residuals = self.residuals(point)
         damping, scale = 1e-3, np.zeros(len(self.unknowns))
-        for iteration in range(MOST_ITERATIONS):
+        for iteration in range(MAX_ITERATIONS):
             if float(np.abs(residuals).max(initial=0.0)) <= 1e-6 * self.problem.tolerance:
                 return point, iteration
             jacobian = self.jacobian(point)
@@ -308,7 +308,7 @@ class _Search:
                     break
                 damping *= 10.0
             point, residuals, damping = trial, trial_residuals, max(damping / 30.0, 1e-18)
-        return point, MOST_ITERATIONS
+        return point, MAX_ITERATIONS
 
     def _step(self, point: Point, jacobian: Array, residuals: Array, damping: float, scale: Array) -> Array:
         """One step of the damped normal equations. Unknowns that would leave their bounds stay at them."""

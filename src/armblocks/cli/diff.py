@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from armblocks.diagram.difference import DiagramDifference, PlacedPort, PlacedWire, ValueChange
 
 DIFFERENT = 1
-_LONGEST = 160
+_MAX_TEXT_LENGTH = 160
 """Maximum length of a value's text that is shown in full."""
 
 
@@ -177,11 +177,11 @@ def value_text(value: object) -> str:
     if isinstance(value, tuple):
         rows = cast("tuple[object, ...]", value)
         text = _array_text(rows)
-        if len(text) <= _LONGEST:
+        if len(text) <= _MAX_TEXT_LENGTH:
             return text
         import numpy as np
 
-        return f"{text[:_LONGEST]}… of shape {np.shape(cast('Any', rows))}"
+        return f"{text[:_MAX_TEXT_LENGTH]}… of shape {np.shape(cast('Any', rows))}"
     return _object_text(value)
 
 

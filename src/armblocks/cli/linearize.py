@@ -17,7 +17,7 @@ from armblocks.errors import InputError
 if TYPE_CHECKING:
     from armblocks import LinearSystem, OperatingPoint
 
-MOST_POLES = 12
+MAX_POLES = 12
 """Maximum number of listed poles."""
 
 
@@ -111,7 +111,7 @@ def print_system(system: LinearSystem, console: Console, *, loop: bool, hertz: b
     if system.order:
         _print_poles(system, console, hertz=hertz)
     if system.inputs and system.outputs:
-        zeros = ", ".join(complex_number(zero) for zero in shown_zeros(system).tolist()[:MOST_POLES])
+        zeros = ", ".join(complex_number(zero) for zero in shown_zeros(system).tolist()[:MAX_POLES])
         console.print(f"zeros: {zeros or 'none'}", soft_wrap=True)
     if not system.is_siso:
         return
@@ -134,7 +134,7 @@ def _print_poles(system: LinearSystem, console: Console, *, hertz: bool) -> None
         ("pole", "left"), (f"frequency, {unit}", "right"), ("damping", "right"), ("time constant, s", "right")
     )
     modes = shown_modes(system)
-    for mode in modes[:MOST_POLES]:
+    for mode in modes[:MAX_POLES]:
         rows.add_row(
             complex_number(mode.pole),
             f"{mode.frequency / (2 * math.pi if hertz else 1.0):.5g}",
@@ -143,8 +143,8 @@ def _print_poles(system: LinearSystem, console: Console, *, hertz: bool) -> None
         )
     console.print()
     console.print(rows)
-    if len(modes) > MOST_POLES:
-        console.print(f"and {len(modes) - MOST_POLES} more, faster ones")
+    if len(modes) > MAX_POLES:
+        console.print(f"and {len(modes) - MAX_POLES} more, faster ones")
     console.print()
 
 

@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from armblocks.analysis.operating_point import OperatingPoint
     from armblocks.equations import HybridSystem, Signature
 
-MOST_ROWS = 24
+MAX_ROWS = 24
 """Maximum number of rows of each table."""
 
-MOST_NUMBERS = 8
+MAX_NUMBERS = 8
 
 
 def print_trimmable(system: HybridSystem, start: OperatingPoint, model: str, console: Console) -> None:
@@ -59,13 +59,13 @@ def _print_slots(
         return
     rows = table((kind, "left"), ("size", "left"), ("unit", "left"), ("at the start", "left"))
     slots = list(layout)
-    for slot in slots[:MOST_ROWS]:
+    for slot in slots[:MAX_ROWS]:
         size = "x".join(str(length) for length in slot.shape) or "1"
         numbers = np.ravel(starts[slot.name]).tolist()
-        shown = " ".join(f"{number:.6g}" for number in numbers[:MOST_NUMBERS])
-        rows.add_row(slot.name, size, slot.unit, shown + (" …" if len(numbers) > MOST_NUMBERS else ""))
+        shown = " ".join(f"{number:.6g}" for number in numbers[:MAX_NUMBERS])
+        rows.add_row(slot.name, size, slot.unit, shown + (" …" if len(numbers) > MAX_NUMBERS else ""))
     console.print()
     console.print(f"{kind}s, for {options}:")
     console.print(rows)
-    if len(slots) > MOST_ROWS:
-        console.print(f"and {len(slots) - MOST_ROWS} more")
+    if len(slots) > MAX_ROWS:
+        console.print(f"and {len(slots) - MAX_ROWS} more")

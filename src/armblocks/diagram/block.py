@@ -20,7 +20,7 @@ from armblocks.diagram.worked_example import WorkedExample
 from armblocks.equations import Shape
 from armblocks.errors import UnknownNameError, check_arguments
 
-_LONGEST_FORMULA = 16
+_MAX_FORMULA_LENGTH = 16
 """Maximum number of characters of a formula that a block's face shows instead of the value."""
 Shapes = Mapping[str, Shape]
 """Shapes by port name."""
@@ -155,7 +155,7 @@ class Block(ABC):
     def stated_text(self, name: str) -> str:
         """The text of a parameter on the face: its formula if that is short, else its value."""
         text = dict(self.formulas).get(name, "")
-        return text if 0 < len(text) <= _LONGEST_FORMULA else value_text(self.parameter_value(name))
+        return text if 0 < len(text) <= _MAX_FORMULA_LENGTH else value_text(self.parameter_value(name))
 
     @classmethod
     def type_name(cls) -> str:

@@ -19,7 +19,7 @@ from armblocks.diagram.structure import DiagramBlock, Inport, Outport
 from armblocks.errors import DiagramError
 
 Comment = Literal["out", "through"]
-MOST_LISTED = 20
+MAX_LISTED = 20
 """Maximum number of inputs that one message lists."""
 
 
@@ -111,8 +111,8 @@ def check_connected(levels: Mapping[str, Diagram]) -> None:
     """Raise ``DiagramError`` that lists the inputs that nothing drives, of all diagrams of a hierarchy."""
     unconnected = [str(ref) for ref in open_inputs(levels)]
     if unconnected:
-        shown = ", ".join(unconnected[:MOST_LISTED])
-        rest = len(unconnected) - MOST_LISTED
+        shown = ", ".join(unconnected[:MAX_LISTED])
+        rest = len(unconnected) - MAX_LISTED
         raise DiagramError(
             f"{len(unconnected)} unconnected input{'s' * (len(unconnected) > 1)}: {shown}"
             + (f" and {rest} more" if rest > 0 else ""),

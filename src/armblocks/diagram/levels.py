@@ -6,7 +6,7 @@ from armblocks.diagram.diagram import Diagram
 from armblocks.diagram.structure import DiagramBlock
 from armblocks.errors import DiagramError
 
-DEEPEST = 100
+MAX_LEVELS = 100
 """Maximum nesting depth of subsystems."""
 
 
@@ -34,11 +34,11 @@ def levels_of(diagram: Diagram) -> dict[str, Diagram]:
     pending = [("", diagram, 0)]
     while pending:
         path, level, depth = pending.pop()
-        if depth > DEEPEST:
+        if depth > MAX_LEVELS:
             raise DiagramError(
-                f"subsystems are nested more than {DEEPEST} levels deep",
+                f"subsystems are nested more than {MAX_LEVELS} levels deep",
                 where=f"block '{'/'.join(path.split('/')[:3])}/…'",
-                allowed=f"at most {DEEPEST}",
+                allowed=f"at most {MAX_LEVELS}",
                 fix="reduce the nesting",
             )
         levels[path] = level

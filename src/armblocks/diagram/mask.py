@@ -32,7 +32,7 @@ Scope = Mapping[str, Value]
 
 _NUMBERS = (ParameterKind.NUMBER, ParameterKind.ARRAY, ParameterKind.INTEGER, ParameterKind.BOOLEAN)
 _KINDS = (*_NUMBERS, ParameterKind.CHOICE, ParameterKind.STRING, ParameterKind.ROBOT)
-LONGEST = 100_000
+MAX_FORMULA_LENGTH = 100_000
 """Maximum number of characters of a formula as a parameter value, which may be a table."""
 
 
@@ -171,7 +171,7 @@ def as_symbols(value: Value) -> SX | None:
 
 @lru_cache(maxsize=1024)
 def _parsed(text: str, where: str) -> Formula:
-    return Formula(text, where, longest=LONGEST)
+    return Formula(text, where, max_length=MAX_FORMULA_LENGTH)
 
 
 @lru_cache(maxsize=4096)

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from armblocks.diagram.port import PortRef
 from armblocks.errors import DiagramError
 
-LONGEST_NAME = 200
+MAX_NAME_LENGTH = 200
 """Characters."""
 NOT_SIGNALS = ("time", "run")
 """Names that no signal has: data files have the times of the rows and the description of the run there."""
@@ -16,11 +16,11 @@ NOT_SIGNALS = ("time", "run")
 
 def check_block_name(name: str, where: str, noun: str = "block") -> None:
     """Raise ``DiagramError`` for a name unfit for a path, ``block/port`` or ``block.parameter``."""
-    allowed = f"1 to {LONGEST_NAME} characters, without '/', '.' and control characters"
+    allowed = f"1 to {MAX_NAME_LENGTH} characters, without '/', '.' and control characters"
     shown = repr(name if len(name) <= 60 else name[:57] + "...")
     if not name.strip():
         raise DiagramError(f"a {noun} has an empty name", where=where, allowed=allowed, fix="name it")
-    if len(name) > LONGEST_NAME:
+    if len(name) > MAX_NAME_LENGTH:
         raise DiagramError(
             f"the {noun} name {shown} has {len(name)} characters",
             where=where,

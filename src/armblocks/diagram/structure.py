@@ -25,7 +25,7 @@ from armblocks.diagram.signs import Outline
 from armblocks.equations import Shape
 from armblocks.errors import DiagramError, InputError
 
-MOST_BLOCKS = 100_000
+MAX_BLOCKS = 100_000
 """Maximum number of blocks of a diagram, including subsystems; limits the memory use."""
 
 
@@ -239,11 +239,11 @@ def block_count(diagram: Diagram) -> int:
 
 def check_block_count(count: int, where: str) -> None:
     """Raise ``DiagramError`` for too many blocks, including subsystems."""
-    if count > MOST_BLOCKS:
+    if count > MAX_BLOCKS:
         raise DiagramError(
             f"the diagram has {count} blocks, including subsystems",
             where=where,
-            allowed=f"at most {MOST_BLOCKS}",
+            allowed=f"at most {MAX_BLOCKS}",
             fix="use vectors: one Gain of 1000 elements replaces 1000 blocks",
         )
 

@@ -16,7 +16,7 @@ from armblocks.diagram.components import strongly_connected
 from armblocks.diagram.features import SlotKind
 from armblocks.diagram.ordering import HELD, Evaluation, Network, Node
 
-MOST_UNKNOWNS = 16
+MAX_UNKNOWNS = 16
 """Maximum number of sums per strongly connected component; beyond it, only the necessary cuts are made,
 because the work grows with the cube."""
 _SUMS = {casadi.OP_ADD, casadi.OP_SUB}
@@ -38,7 +38,7 @@ def sums_on_loops(network: Network, evaluation: Evaluation) -> dict[Node, tuple[
         loops = [loop for node, loop in evaluation.loops.items() if node in nodes]
         cuts = [node for node in evaluation.loops if node in nodes]
         sums = [node for node in (evaluation.order[index] for index in component) if _adds(network, node)]
-        if _unknowns(network, sums) > max(MOST_UNKNOWNS, _unknowns(network, cuts)):
+        if _unknowns(network, sums) > max(MAX_UNKNOWNS, _unknowns(network, cuts)):
             continue
         for node in sums:
             through = [loop for loop in loops if any(path.rpartition("/")[0] == node.block for path in loop)]

@@ -13,9 +13,9 @@ from armblocks.pictures.text_width import shorten, text_width
 _WORDS = (13.0, 9.0)
 """Largest and smallest legible font size of a sign, px."""
 _TITLE = 10.0
-_LEAST = 44.0
+_MIN_SIGN_WIDTH = 44.0
 """Minimum width of a sign between the port names, px."""
-_MOST_TEXT = 132.0
+_MAX_SIGN_WIDTH = 132.0
 """Maximum width of a sign, px; longer signs are shortened."""
 
 
@@ -42,17 +42,17 @@ def least_room(sign: FaceSign) -> tuple[float, float]:
     """Width and height (px) that a complete sign needs."""
     match sign:
         case Words():
-            return min(max(text_width(sign.text, 11.0) + 10, _LEAST), _MOST_TEXT), 24.0
+            return min(max(text_width(sign.text, 11.0) + 10, _MIN_SIGN_WIDTH), _MAX_SIGN_WIDTH), 24.0
         case Lines():
-            return min(max(text_width(line, 9.5) for line in sign.texts) + 10, _MOST_TEXT), 40.0
+            return min(max(text_width(line, 9.5) for line in sign.texts) + 10, _MAX_SIGN_WIDTH), 40.0
         case Title():
             widest_part = max(text_width(line, _TITLE) for line in _broken(sign.text, 0.0))
-            width = max(widest_part, text_width(sign.text, _TITLE) / 3, _LEAST)
+            width = max(widest_part, text_width(sign.text, _TITLE) / 3, _MIN_SIGN_WIDTH)
             rows = len(_broken(sign.text, width))
-            return min(width + 10, _MOST_TEXT), 13.0 * rows + 10
+            return min(width + 10, _MAX_SIGN_WIDTH), 13.0 * rows + 10
         case Fraction():
             widest = max(text_width(text, 10.0) for text in (sign.above, sign.below))
-            return min(widest + (26 if sign.limited else 16), _MOST_TEXT), 44.0
+            return min(widest + (26 if sign.limited else 16), _MAX_SIGN_WIDTH), 44.0
         case Graph():
             return 42.0, 40.0
 

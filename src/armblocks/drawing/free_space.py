@@ -26,21 +26,21 @@ from armblocks.drawing.wire_search import (
 )
 
 Extent: TypeAlias = tuple[float, float, float, float]
-Piece: TypeAlias = tuple[Point, Point]
+Segment: TypeAlias = tuple[Point, Point]
 
 RESERVED = 5.0
 """Distance before a port that is reserved for its net, px."""
 _CROSSING = 26.0
 _BRANCH = 20.0
 _NEAR = 9.5
-_NEAR_PRICE = 2.0
-_LABEL_PRICE = 9.0
+_NEAR_COST = 2.0
+_LABEL_COST = 9.0
 _BLOCK_MARGIN = 18.0
-_BLOCK_MARGIN_PRICE = 0.25
+_BLOCK_MARGIN_COST = 0.25
 _APPROACH = 46.0
-_APPROACH_PRICE = 4.0
+_APPROACH_COST = 4.0
 """Distance before a port that other nets avoid, px, and the additional cost per px there."""
-_MIDDLE_PRICE = 1 / 16
+_MIDDLE_COST = 1 / 16
 _ACCEPTED_DETOUR = 64.0
 """Detour that is accepted without a search in a wider window, px: about a bend and a crossing."""
 _ON_EDGE = 1e-6
@@ -95,15 +95,17 @@ def meet(a: Extent, b: Extent) -> bool:
     return a[0] <= b[2] and b[0] <= a[2] and a[1] <= b[3] and b[1] <= a[3]
 
 
-def extents(pieces: Floats, *, at_ports: bool = False) -> list[Extent]:
+def extents(segments: Floats, *, at_ports: bool = False) -> list[Extent]:
     """The areas in which segments influence other nets; ``at_ports``: the segments are reserved for ports."""
-    x0, y0, x1, y1 = _wider(pieces, _APPROACH if at_ports else _NEAR).T.tolist()
+    x0, y0, x1, y1 = _wider(segments, _APPROACH if at_ports else _NEAR).T.tolist()
     return list(zip(x0, y0, x1, y1))
 
 
-def sorted_ends(pieces: Floats) -> Floats:
+def sorted_ends(segments: Floats) -> Floats:
     """Segments (n, 4) from the upper left to the lower right end."""
-    return np.hstack([np.minimum(pieces[:, :2], pieces[:, 2:]), np.maximum(pieces[:, :2], pieces[:, 2:])])
+    return np.hstack(
+        [np.minimum(segments[:, :2], segments[:, 2:]), np.maximum(segments[:, :2], segments[:, 2:])]
+    )
 
 
 class FreeSpace:
@@ -115,7 +117,7 @@ class FreeSpace:
         low = np.minimum(self._blocks[:, :2], self._names[:, :2]) - _BLOCK_MARGIN
         high = np.maximum(self._blocks[:, 2:], self._names[:, 2:]) + _BLOCK_MARGIN
         self._extents = np.hstack([low, high])
-        self._pieces = np.empty((0, 4))
+        self._segments = np.empty((0, 4))
         self._owners = np.empty(0, dtype=np.int64)
         self._count = 0
 
@@ -126,34 +128,34 @@ class FreeSpace:
 
     def reserve(self, ends: Sequence[tuple[Floats, int]]) -> None:
         """Remove all lines, and reserve the space before the ports of every net."""
-        self._pieces = np.vstack([np.empty((0, 4)), *(pieces for pieces, _ in ends)])
-        owners = [number for pieces, number in ends for _ in range(len(pieces))]
+        self._segments = np.vstack([np.empty((0, 4)), *(segments for segments, _ in ends)])
+        owners = [number for segments, number in ends for _ in range(len(segments))]
         self._owners = np.array(owners, dtype=np.int64)
-        self._approaches = self._count = len(self._pieces)
+        self._approaches = self._count = len(self._segments)
 
-    def lay(self, pieces: Floats, number: int) -> None:
+    def lay(self, segments: Floats, number: int) -> None:
         """Add the segments (n, 4) of a net, see :func:`sorted_ends`."""
-        begin, end = self._count, self._count + len(pieces)
-        while end > len(self._pieces):  # double the capacity
-            self._pieces = np.vstack([self._pieces, np.empty_like(self._pieces)])
+        begin, end = self._count, self._count + len(segments)
+        while end > len(self._segments):  # double the capacity
+            self._segments = np.vstack([self._segments, np.empty_like(self._segments)])
             self._owners = np.hstack([self._owners, np.empty_like(self._owners)])
-        self._pieces[begin:end] = pieces
+        self._segments[begin:end] = segments
         self._owners[begin:end] = number
         self._count = end
 
     def around(self, extent: Extent, number: int) -> Surroundings:
         """The blocks in an area, and the lines in it of all nets but one (``number``)."""
-        pieces = self._pieces[: self._count]
-        foreign = _inside(pieces, extent, _NEAR) & (self._owners[: self._count] != number)
+        segments = self._segments[: self._count]
+        foreign = _inside(segments, extent, _NEAR) & (self._owners[: self._count] != number)
         blocks = _inside(self._extents, extent, 0.0)
-        ahead = _inside(pieces[: self._approaches], extent, _APPROACH)
+        ahead = _inside(segments[: self._approaches], extent, _APPROACH)
         ahead &= self._owners[: self._approaches] != number
         return Surroundings(
             extent,
             self._blocks[blocks],
             self._names[blocks],
-            pieces[foreign],
-            pieces[: self._approaches][ahead],
+            segments[foreign],
+            segments[: self._approaches][ahead],
         )
 
 
@@ -190,15 +192,15 @@ def _sorted_line(line: Sequence[float]) -> Floats:
 class Surroundings:
     """The blocks and the lines of other nets in an area, and the search for routes of one net in it."""
 
-    def __init__(self, extent: Extent, blocks: Floats, names: Floats, pieces: Floats, ends: Floats) -> None:
+    def __init__(self, extent: Extent, blocks: Floats, names: Floats, segments: Floats, ends: Floats) -> None:
         self._extent = extent
         self._blocks = blocks
         self._names = names
-        self._pieces = pieces
-        level = pieces[:, 1] == pieces[:, 3]
-        self._level, self._upright = pieces[level], pieces[~level]
+        self._segments = segments
+        level = segments[:, 1] == segments[:, 3]
+        self._level, self._upright = segments[level], segments[~level]
         self._ends = ends
-        self._corners = np.vstack([pieces[:, [0, 1, 0, 1]], pieces[:, [2, 3, 2, 3]]])
+        self._corners = np.vstack([segments[:, [0, 1, 0, 1]], segments[:, [2, 3, 2, 3]]])
 
     def is_legal_stub(self, line: Sequence[float], level: Level, port: Point, out: tuple[int, int]) -> bool:
         """Whether a stub at a port is legal; the block of the port is ignored, and lines may cross the other
@@ -216,33 +218,33 @@ class Surroundings:
         self, line: Sequence[float], level: Level, ports: Sequence[tuple[Point, tuple[int, int]]]
     ) -> bool:
         """Whether a segment crosses other lines only at right angles and away from their corners."""
-        piece = _sorted_line(line)
+        segment = _sorted_line(line)
         blocks = self._blocks
         for port, out in ports:
             blocks = blocks[~_owns(blocks, port, out)]
         along = self._level if line[1] == line[3] else self._upright
         return not (
-            _meets(_wider(blocks, level.clearance), piece)
-            or _meets(_wider(along, level.gap), piece)
-            or _meets(_wider(self._corners, level.gap), piece)
+            _meets(_wider(blocks, level.clearance), segment)
+            or _meets(_wider(along, level.gap), segment)
+            or _meets(_wider(self._corners, level.gap), segment)
         )
 
     def is_free(
         self, line: Sequence[float], level: Level, ports: Sequence[tuple[Point, tuple[int, int]]]
     ) -> bool:
         """Whether a straight line is legal and intersects nothing, so that no other route is better."""
-        piece = _sorted_line(line)
-        if _meets(_wider(self._names, 3.0), piece) or _meets(_wider(self._pieces, _NEAR), piece):
+        segment = _sorted_line(line)
+        if _meets(_wider(self._names, 3.0), segment) or _meets(_wider(self._segments, _NEAR), segment):
             return False
         return self.is_legal(line, level, ports)
 
     def may_bend(self, point: Point, level: Level) -> bool:
         """Whether a corner or a dot at this point is legal."""
-        return not _meets(_wider(self._pieces, level.gap), np.array([*point, *point]))
+        return not _meets(_wider(self._segments, level.gap), np.array([*point, *point]))
 
     def path(self, source: End, start: Point, goal: Point, target: End, level: Level) -> list[Point]:
         """The corners of the cheapest route between the stubs of the source and the target."""
-        own: list[Piece] = [((source.x, source.y), start), (goal, (target.x, target.y))]
+        own: list[Segment] = [((source.x, source.y), start), (goal, (target.x, target.y))]
         grid = self._grid(own, [], level, (start, goal) if source.dx else None)
         begins = np.full(grid.turn.shape, np.inf)
         begins[grid.node(start)] = 0.0
@@ -253,7 +255,7 @@ class Surroundings:
 
     def branch(
         self,
-        tree: Sequence[Piece],
+        tree: Sequence[Segment],
         closed: Sequence[Point],
         dots: Sequence[Point],
         goal: Point,
@@ -274,7 +276,7 @@ class Surroundings:
             xs, ys = np.array(points).reshape(-1, 2).T
             return np.abs(grid.xs[columns][:, None] - xs) + np.abs(grid.ys[rows][:, None] - ys)
 
-        away = distances([point for piece in tree for point in piece])
+        away = distances([point for segment in tree for point in segment])
         free = np.all(distances(closed) >= level.stub, axis=1) & np.all(distances(dots) > 0.0, axis=1)
         free &= np.all((away == 0.0) | (away >= level.gap), axis=1)
         if not np.any(free):
@@ -287,35 +289,39 @@ class Surroundings:
     # -- the grid --------------------------------------------------------------------------------------------
 
     def _grid(
-        self, stubs: Sequence[Piece], tree: Sequence[Piece], level: Level, middle: tuple[Point, Point] | None
+        self,
+        stubs: Sequence[Segment],
+        tree: Sequence[Segment],
+        level: Level,
+        middle: tuple[Point, Point] | None,
     ) -> Grid:
         """The grid of an area. Routes of the net avoid its own ``stubs`` and start on its ``tree``."""
         xs, ys = self._lines([*stubs, *tree], level, middle)
         own = np.array([_sorted_line((*a, *b)) for a, b in (*stubs, *tree)]).reshape(-1, 4)
         solid = np.array([_sorted_line((*a, *b)) for a, b in stubs]).reshape(-1, 4)
         flat = own[:, 1] == own[:, 3]
-        prices, turned = [0, 2, 1, 3], [1, 3, 0, 2]
+        unchanged, turned = [0, 2, 1, 3], [1, 3, 0, 2]
         right, down = (
             self._edges(order, lines, across, own[along], solid, level)
-            for order, lines, across, along in ((prices, xs, ys, flat), (turned, ys, xs, ~flat))
+            for order, lines, across, along in ((unchanged, xs, ys, flat), (turned, ys, xs, ~flat))
         )
         if middle is not None:
             (ax, _), (bx, _) = middle
             half = max(abs(bx - ax) / 2, 1.0)
             off = np.minimum(np.abs(xs - (ax + bx) / 2) / half, 1.0)
-            down += np.diff(ys)[:, None] * (off * _MIDDLE_PRICE)
-        near = _wider(self._pieces, level.gap)
+            down += np.diff(ys)[:, None] * (off * _MIDDLE_COST)
+        near = _wider(self._segments, level.gap)
         rows = (ys[:, None] > near[:, 1]) & (ys[:, None] < near[:, 3])
         columns = (xs > near[:, 0, None]) & (xs < near[:, 2, None])
         turn = rows.astype(np.float64) @ columns.astype(np.float64) == 0.0
         return Grid(xs, ys, right, down, turn)
 
     def _lines(
-        self, own: Sequence[Piece], level: Level, middle: tuple[Point, Point] | None
+        self, own: Sequence[Segment], level: Level, middle: tuple[Point, Point] | None
     ) -> tuple[Floats, Floats]:
         x0, y0, x1, y1 = self._extent
-        exact_x = [x for piece in own for x, _ in piece]
-        exact_y = [y for piece in own for _, y in piece]
+        exact_x = [x for segment in own for x, _ in segment]
+        exact_y = [y for segment in own for _, y in segment]
         lanes = np.array(level.block_lanes)[:, None]
         tops = np.minimum(self._blocks[:, 1], self._names[:, 1])
         bottoms = np.maximum(self._blocks[:, 3], self._names[:, 3])
@@ -324,8 +330,8 @@ class Surroundings:
         candidates_y = [tops - lanes, bottoms + below]
         if level is LEVELS[-1]:
             candidates_y += [self._blocks[:, 1] - lanes, self._blocks[:, 3] + lanes]
-        for pieces, candidates, k in ((self._upright, candidates_x, 0), (self._level, candidates_y, 1)):
-            candidates += [pieces[:, k] - level.wire_lane, pieces[:, k] + level.wire_lane]
+        for segments, candidates, k in ((self._upright, candidates_x, 0), (self._level, candidates_y, 1)):
+            candidates += [segments[:, k] - level.wire_lane, segments[:, k] + level.wire_lane]
         if middle is not None:
             candidates_x.append(np.array([round((middle[0][0] + middle[1][0]) / 2)]))
         lanes_x = np.concatenate([part.ravel() for part in candidates_x])
@@ -350,15 +356,15 @@ class Surroundings:
             (_thicker(own, level.gap, low), BLOCKED, 0.0),
             (_thicker(solid, _ON_EDGE, begin), BLOCKED, 0.0),
             (_thicker(across, _ON_EDGE, begin, 0.0), _CROSSING, 0.0),
-            (_wider(self._blocks, _BLOCK_MARGIN), 0.0, _BLOCK_MARGIN_PRICE),
-            (_wider(self._names, 3.0), 0.0, _LABEL_PRICE),
-            (_wider(along, _NEAR), 0.0, _NEAR_PRICE),
-            (_thicker(_thicker(ends, _APPROACH, begin), 6.0, low), 0.0, _APPROACH_PRICE),
+            (_wider(self._blocks, _BLOCK_MARGIN), 0.0, _BLOCK_MARGIN_COST),
+            (_wider(self._names, 3.0), 0.0, _LABEL_COST),
+            (_wider(along, _NEAR), 0.0, _NEAR_COST),
+            (_thicker(_thicker(ends, _APPROACH, begin), 6.0, low), 0.0, _APPROACH_COST),
         )
         weights = np.repeat([area[1:] for area in areas], [len(area[0]) for area in areas], axis=0)
         rectangles = np.vstack([area[0] for area in areas])[:, order]
-        fixed, price = painted(rectangles, weights, line, levels)
-        return np.diff(line)[:, None] * (1.0 + price) + fixed
+        fixed, per_px = painted(rectangles, weights, line, levels)
+        return np.diff(line)[:, None] * (1.0 + per_px) + fixed
 
 
 def _thicker(areas: Floats, margin: float, axis: int, other: float | None = None) -> Floats:

@@ -27,9 +27,11 @@ _CONDITIONAL = (
 _SYMBOL = 15.0
 """Height of the symbols of control inputs, px."""
 _MASK_SIZE = 10.5
+"""Font size of the text of a mask, px."""
 _MASK_LINE = 84.0
-_MOST_MASK = 140.0
-"""Text of a mask: font size (px), length from which a line is broken, and maximum length of a line."""
+"""Width at which a line of the text of a mask is broken, px."""
+_MAX_MASK_WIDTH = 140.0
+"""Maximum width of the text of a mask, px."""
 Stroke = list[tuple[float, float]]
 _RISING: Stroke = [(0, 1), (0.5, 1), (0.5, 0), (1, 0)]
 _FALLING: Stroke = [(0, 0), (0.5, 0), (0.5, 1), (1, 1)]
@@ -89,7 +91,7 @@ def mask_width(block: Block) -> float:
     if not (isinstance(inner, Diagram) and inner.mask):
         return 44.0
     widest = max(text_width(line, _MASK_SIZE) for line in mask_text(inner))
-    return min(max(widest + 12, 44.0), _MOST_MASK)
+    return min(max(widest + 12, 44.0), _MAX_MASK_WIDTH)
 
 
 def mask_text(diagram: Diagram) -> tuple[str, ...]:

@@ -22,7 +22,7 @@ class LaidNet:
 
     net: Net
     routed: RoutedNet
-    pieces: Floats
+    segments: Floats
     examined: Extent
 
 
@@ -52,8 +52,8 @@ class NetRouter:
         for k in sorted(set(range(len(net.targets))) - set(paths), key=nearness):
             paths[k] = self._route(net.targets[k])
         routed = RoutedNet(tuple(paths[k] for k in range(len(net.targets))), tuple(sorted(self._dots)))
-        pieces = sorted_ends(np.array([(*a, *b) for a, b in self._tree]).reshape(-1, 4))
-        return LaidNet(net, routed, pieces, self._examined)
+        segments = sorted_ends(np.array([(*a, *b) for a, b in self._tree]).reshape(-1, 4))
+        return LaidNet(net, routed, segments, self._examined)
 
     def _route(self, target: WireEnd) -> tuple[Point, ...]:
         for level in LEVELS:
@@ -73,7 +73,13 @@ class NetRouter:
             if self._space.around(extent, self._number).is_free(line, level, ports):
                 return (source.x, source.y), end
         start, goal = _ahead(source, level.stub), _behind(target, level.stub)
-        points = [start, goal, (source.x, source.y), end, *(point for piece in self._tree for point in piece)]
+        points = [
+            start,
+            goal,
+            (source.x, source.y),
+            end,
+            *(point for segment in self._tree for point in segment),
+        ]
         extent = _around(_hull(points), level.window)
         self._examine(extent)
         surroundings = self._space.around(extent, self._number)
@@ -121,7 +127,9 @@ class NetRouter:
     def _leaving(self, path: tuple[Point, ...]) -> tuple[Point, ...]:
         """The part of a path after it last touches the tree."""
         for k in range(len(path) - 2, -1, -1):
-            touched = [point for piece in self._tree for point in _contacts((path[k], path[k + 1]), piece)]
+            touched = [
+                point for segment in self._tree for point in _contacts((path[k], path[k + 1]), segment)
+            ]
             if touched:
                 last = min(touched, key=lambda point: _distance(point, path[k + 1]))
                 return corners([last, *path[k + 1 :]])
@@ -152,8 +160,8 @@ def _is_along(a: Point, b: Point, end: WireEnd) -> bool:
 
 
 def _touches_itself(path: Sequence[Point]) -> bool:
-    pieces = list(pairwise(path))
-    return any(_contacts(pieces[i], pieces[j]) for j in range(len(pieces)) for i in range(j - 1))
+    segments = list(pairwise(path))
+    return any(_contacts(segments[i], segments[j]) for j in range(len(segments)) for i in range(j - 1))
 
 
 def _contacts(one: tuple[Point, Point], other: tuple[Point, Point]) -> list[Point]:

@@ -75,11 +75,11 @@ class Routing:
             ):
                 rerouted = NetRouter(space, net, self._ranked[key].number).routed()
                 if old is None or rerouted.routed != old.routed:
-                    changed_areas += extents(rerouted.pieces)
-                    changed_areas += extents(old.pieces) if old is not None else ()
+                    changed_areas += extents(rerouted.segments)
+                    changed_areas += extents(old.segments) if old is not None else ()
                 old = rerouted
             laid[key] = old
-            space.lay(old.pieces, self._ranked[key].number)
+            space.lay(old.segments, self._ranked[key].number)
         self._obstacles, self._space, self._laid = dict(obstacles), space, laid
         self._levelled_by_key = {key: self._levelled_by_key[key] for key in nets}
         return {key: laid[key].routed for key in nets}
@@ -126,7 +126,7 @@ class Routing:
         for key, old in self._ranked.items():
             if ranked.get(key) is not old:
                 changed += extents(old.ends, at_ports=True)
-                changed += extents(self._laid[key].pieces)
+                changed += extents(self._laid[key].segments)
         self._ranked = ranked
         return changed
 

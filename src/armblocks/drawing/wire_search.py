@@ -24,7 +24,7 @@ BEND = 34.0
 """Cost of a bend, as the equivalent detour in px."""
 BLOCKED = 1e6
 """Cost of a blocked edge. A route that costs more than half of this value is not legal."""
-_MOST_BENDS = 14
+_MAX_BENDS = 14
 
 
 def grid_lines(exact: Sequence[float], candidates: Sequence[float], apart: float) -> Floats:
@@ -97,7 +97,7 @@ class Grid:
         arriving, index = (rows, goal[::-1]) if flat else (columns, goal)
         improved = rows.sweep(rightwards.T), columns.sweep(downwards)
         best, bends = min(most, BLOCKED / 2), -1
-        for k in range(_MOST_BENDS):
+        for k in range(_MAX_BENDS):
             if (cost := float(arriving.costs[k][index])) < best:
                 best, bends = cost, k
             if best <= min(rows.bound, columns.bound) + BEND:

@@ -16,7 +16,7 @@ from armblocks.errors import RobotError
 from armblocks.robot.tree import KinematicTree
 from armblocks.spatial.vectors import Scalar
 
-MOST_JOINTS_BY_MATRIX = 18
+MAX_JOINTS_BY_MATRIX = 18
 """Up to this number of joints the factored inertia matrix takes fewer operations than the articulated-body
 algorithm, for chains of revolute joints with general axes (6 joints: 2,200 against 4,345; 16 joints: 12,165
 against 14,555)."""
@@ -36,7 +36,7 @@ def forward_dynamics(
     """Accelerations of the joints, in the order of q; ``tau`` is the joint torque minus friction."""
     joints = joint_motions(tree, q)
     n = tree.n
-    if n > MOST_JOINTS_BY_MATRIX:
+    if n > MAX_JOINTS_BY_MATRIX:
         return aba(tree, joints, qd, tau, tree.gravity, on_bodies)
     bias = rnea(tree, joints, qd, [0.0] * n, tree.gravity, on_bodies)
     order = [body.joint for body in tree.bodies]

@@ -17,7 +17,7 @@ from armblocks.spatial.vectors import ZERO, Scalar, Vector, add, cross, scale, s
 Column = tuple[Vector, Vector]
 """Linear and angular velocity of the tool per unit speed of one joint."""
 
-MOST_COLUMNS_BY_MINORS = 8
+MAX_COLUMNS_BY_MINORS = 8
 """Up to this number of joints all 6x6 minors are computed; for more joints the Gram matrix is cheaper."""
 
 
@@ -84,7 +84,7 @@ def yoshikawa(columns: Sequence[Column]) -> SX:
     """
     entries = [list(v + w) for v, w in columns]
     n = len(entries)
-    if n > MOST_COLUMNS_BY_MINORS:
+    if n > MAX_COLUMNS_BY_MINORS:
         rows = list(zip(*entries))
         gram = [[_dot(a, b) for b in rows] for a in rows]
         return SX(sqrt(fmax(_minors(gram)[0], 0.0)))

@@ -12,11 +12,11 @@ from collections.abc import Callable, Mapping
 from typing import cast
 
 from armblocks.errors import FormatError
-from armblocks.formats.json_document import DEEPEST, KeyPath, path_text
+from armblocks.formats.json_document import MAX_DEPTH, KeyPath, path_text
 
 
 def canonical_bytes(
-    value: object, *, one_line: Callable[[KeyPath], bool] = lambda path: False, deepest: int = DEEPEST
+    value: object, *, one_line: Callable[[KeyPath], bool] = lambda path: False, deepest: int = MAX_DEPTH
 ) -> bytes:
     """The canonical text of a document of dicts, lists, texts, numbers, booleans and ``None``.
 

@@ -12,8 +12,8 @@ from armblocks.diagram import BlockLibrary, Diagram, check_block_name
 from armblocks.errors import UnknownNameError, check_type
 from armblocks.files import read_bounded, write_atomically
 from armblocks.formats.diagram_json import (
-    DEEPEST,
-    MOST_BYTES,
+    MAX_BYTES,
+    MAX_DEPTH,
     diagram_from_bytes,
     diagram_to_bytes,
     library_to_bytes,
@@ -34,7 +34,7 @@ def example_descriptions() -> Mapping[str, str]:
 
 
 def _description(path: Path) -> str:
-    document = read_document(read_bounded(path, MOST_BYTES), str(path), MOST_BYTES, DEEPEST)
+    document = read_document(read_bounded(path, MAX_BYTES), str(path), MAX_BYTES, MAX_DEPTH)
     members = document.members()
     return members["description"].text() if "description" in members else ""
 
@@ -85,7 +85,7 @@ def read_diagram(
     ``UnknownNameError`` for unknown types, parameters, blocks, ports and robots, ``DiagramError`` for a
     diagram that cannot be built. All name the file, and the line if known.
     """
-    data = read_bounded(fspath(path), MOST_BYTES)
+    data = read_bounded(fspath(path), MAX_BYTES)
     return diagram_from_bytes(
         data, fspath(path), library, resolve_robot, folder=Path(path).parent, trust=trust, draft=draft
     )

@@ -50,8 +50,8 @@ from armblocks.formats.robot_references import ResolveRobot, RobotReader, RobotW
 from armblocks.formats.subsystem_libraries import Libraries, ReadEntry, ReadFile, read_library_file
 
 FORMAT_VERSION = 1
-MOST_BYTES = 16 * 2**20
-DEEPEST = 320
+MAX_BYTES = 16 * 2**20
+MAX_DEPTH = 320
 """Maximum nesting of objects and arrays: a hundred subsystems, and the content of the innermost."""
 
 _DOCUMENT_KEYS = ("format", *INNER_KEYS, "parameters", "robots")
@@ -82,7 +82,7 @@ def diagram_from_bytes(
     blocks, ports and robots, and ``DiagramError`` for a diagram that cannot be built. All name the file, and
     the line if known.
     """
-    root = read_document(data, name, MOST_BYTES, DEEPEST)
+    root = read_document(data, name, MAX_BYTES, MAX_DEPTH)
     members, _ = split_members(root, _DOCUMENT_KEYS)
     _check_version(root, members)
     files = read_data or FilesAnywhere(trust)
@@ -112,7 +112,7 @@ def diagram_to_bytes(
         document["parameters"] = writer.values(diagram)
     if writer.robots.table:
         document["robots"] = writer.robots.table
-    return canonical_bytes(document, one_line=_is_placement, deepest=DEEPEST)
+    return canonical_bytes(document, one_line=_is_placement, deepest=MAX_DEPTH)
 
 
 def read_library(
@@ -137,7 +137,7 @@ def library_to_bytes(
     }
     if writer.robots.table:
         document["robots"] = writer.robots.table
-    return canonical_bytes(document, one_line=_is_placement, deepest=DEEPEST)
+    return canonical_bytes(document, one_line=_is_placement, deepest=MAX_DEPTH)
 
 
 def _entry_reader(library: BlockLibrary, resolve_robot: ResolveRobot, files: DataFiles) -> ReadEntry:

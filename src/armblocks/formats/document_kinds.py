@@ -6,7 +6,7 @@ from enum import Enum
 
 from armblocks.errors import UnknownNameError
 from armblocks.files import read_bounded
-from armblocks.formats.diagram_json import DEEPEST, MOST_BYTES
+from armblocks.formats.diagram_json import MAX_BYTES, MAX_DEPTH
 from armblocks.formats.json_document import read_document
 from armblocks.formats.robot_files import is_path
 from armblocks.formats.shipped import list_examples, list_libraries, list_robots
@@ -35,7 +35,7 @@ def kind_of_document(name_or_path: str) -> DocumentKind:
         if name_or_path not in shipped:
             raise UnknownNameError("shipped robot, diagram or library", name_or_path, shipped)
         return shipped[name_or_path]
-    return kind_of_data(read_bounded(name_or_path, MOST_BYTES), name_or_path)
+    return kind_of_data(read_bounded(name_or_path, MAX_BYTES), name_or_path)
 
 
 def kind_of_data(data: bytes, name: str) -> DocumentKind:
@@ -45,7 +45,7 @@ def kind_of_data(data: bytes, name: str) -> DocumentKind:
     """
     if not name.lower().endswith(".json"):
         return DocumentKind.ROBOT
-    members = read_document(data, name, MOST_BYTES, DEEPEST).members()
+    members = read_document(data, name, MAX_BYTES, MAX_DEPTH).members()
     if "library" in members:
         return DocumentKind.LIBRARY
     return DocumentKind.DIAGRAM if "blocks" in members or "links" not in members else DocumentKind.ROBOT

@@ -16,9 +16,9 @@ from typing import cast
 
 from armblocks.errors import FormatError
 
-DEEPEST = 64
+MAX_DEPTH = 64
 """Default maximum nesting of objects and arrays."""
-LONGEST_INTEGER = 18
+MAX_INTEGER_DIGITS = 18
 """Maximum number of digits of an integer, so that it fits into 64 bits."""
 
 KeyPath = tuple[str | int, ...]
@@ -109,7 +109,7 @@ class Node:
         return self.error(f"the value is {describe(self.value)}", allowed=allowed)
 
 
-def read_document(data: bytes, name: str, most_bytes: int, deepest: int = DEEPEST) -> Node:
+def read_document(data: bytes, name: str, most_bytes: int, deepest: int = MAX_DEPTH) -> Node:
     """The root of a JSON document. ``name`` is the name of the file in messages.
 
     ``most_bytes`` and ``deepest`` limit its size and the nesting of objects and arrays.
@@ -259,9 +259,9 @@ def _finite(text: str) -> float:
 
 
 def _bounded_integer(text: str) -> int:
-    if len(text) > LONGEST_INTEGER + 1:
+    if len(text) > MAX_INTEGER_DIGITS + 1:
         raise _RefusedError(
-            f"the integer {_short(text)} is too long", text, f"at most {LONGEST_INTEGER} digits"
+            f"the integer {_short(text)} is too long", text, f"at most {MAX_INTEGER_DIGITS} digits"
         )
     return int(text)
 

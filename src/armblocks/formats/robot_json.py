@@ -35,7 +35,7 @@ from armblocks.robot.robot import STANDARD_GRAVITY
 from armblocks.spatial import Matrix3, Transform, Vector3
 
 FORMAT_VERSION = 1
-MOST_BYTES = 16 * 2**20
+MAX_BYTES = 16 * 2**20
 
 _ROBOT_KEYS = (
     "format",
@@ -58,7 +58,7 @@ _JOINTS = {kind.__name__.lower(): kind for kind in JOINT_TYPES}
 
 def read_robot(data: bytes, name: str) -> Robot:
     """The robot of a JSON document. Raises ``FormatError`` with file, line and path."""
-    return robot_from(read_document(data, name, MOST_BYTES))
+    return robot_from(read_document(data, name, MAX_BYTES))
 
 
 def robot_from(node: Node) -> Robot:

@@ -39,7 +39,7 @@ from armblocks.robot import FrictionModel, Robot
 ResolveRobot = Callable[[str], Robot]
 """A function that returns the robot of a shipped name or a path: ``load_robot``."""
 
-MOST_INLINE = 10_000
+MAX_INLINE_NUMBERS = 10_000
 """Maximum size of a table whose numbers are written into the diagram file."""
 
 OWN = "#"
@@ -160,11 +160,11 @@ class RobotWriter:
             chosen = {"time": table.time, "columns": list(table.columns)}
             return {"file": path, **{key: value for key, value in chosen.items() if value}}
         rows = np.asarray(table)
-        if rows.size > MOST_INLINE:
+        if rows.size > MAX_INLINE_NUMBERS:
             raise FormatError(
                 f"a table of {rows.shape[0]} rows is not from a file",
                 where=table.source,
-                allowed=f"tables of up to {MOST_INLINE} numbers, or a file with the same table",
+                allowed=f"tables of up to {MAX_INLINE_NUMBERS} numbers, or a file with the same table",
                 fix="write the rows to a .csv or .npz file and use the result of load_table",
             )
         return rows.tolist()

@@ -27,10 +27,10 @@ from armblocks.formats.json_document import Node, read_document
 from armblocks.formats.robot_references import relative_to_folder
 from armblocks.formats.shipped import SUFFIX, list_libraries, shipped_folder
 
-MOST_BYTES = 16 * 2**20
-DEEPEST = 320
+MAX_BYTES = 16 * 2**20
+MAX_DEPTH = 320
 """Maximum nesting of objects and arrays, as in diagrams."""
-DEEPEST_CHAIN = 40
+MAX_LIBRARY_DEPTH = 40
 """Maximum nesting of library blocks."""
 
 ReadFile = Callable[[Path], bytes]
@@ -49,7 +49,7 @@ class ReadEntry(Protocol):
 
 def read_library_file(path: Path) -> bytes:
     """The bytes of a library file in any folder."""
-    return read_bounded(path, MOST_BYTES)
+    return read_bounded(path, MAX_BYTES)
 
 
 def library_path(reference: str, folder: Path | None) -> Path:
@@ -144,12 +144,12 @@ class Libraries:
                 allowed="library blocks that do not contain themselves",
                 fix="remove one of these blocks from the other",
             )
-        if len(self._chain) >= DEEPEST_CHAIN:
+        if len(self._chain) >= MAX_LIBRARY_DEPTH:
             raise FormatError(
-                f"library blocks are nested more than {DEEPEST_CHAIN} levels deep: "
+                f"library blocks are nested more than {MAX_LIBRARY_DEPTH} levels deep: "
                 f"{' -> '.join(shown[:3])} -> …",
                 where=str(path),
-                allowed=f"at most {DEEPEST_CHAIN}",
+                allowed=f"at most {MAX_LIBRARY_DEPTH}",
                 fix="reduce the nesting",
             )
         root = self._root(path)
@@ -169,7 +169,7 @@ class Libraries:
     def _root(self, path: Path) -> Node:
         """The document of a library file."""
         if path not in self._roots:
-            root = read_document(self._read_file(path), str(path), MOST_BYTES, DEEPEST)
+            root = read_document(self._read_file(path), str(path), MAX_BYTES, MAX_DEPTH)
             if "library" not in root.members():
                 raise root.error(
                     "the key 'library' is missing",

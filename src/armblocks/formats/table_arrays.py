@@ -15,7 +15,7 @@ from armblocks.errors import FormatError, InputError
 from armblocks.extras import from_extra
 from armblocks.formats.table_columns import (
     LARGEST_EXACT,
-    MOST_NUMBERS,
+    MAX_NUMBERS,
     Column,
     ColumnFile,
     repeated_notes,
@@ -107,10 +107,10 @@ def _parquet_column(name: str, values: Any) -> Column:
 
 
 def _check_size(numbers: int) -> None:
-    if numbers > MOST_NUMBERS:
+    if numbers > MAX_NUMBERS:
         raise FormatError(
             f"the file has {numbers} numbers",
-            allowed=f"at most {MOST_NUMBERS}",
+            allowed=f"at most {MAX_NUMBERS}",
             where="a file of arrays",
             fix="split or shorten it",
         )

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from armblocks.diagram import TimeTable
 from armblocks.errors import FormatError, InputError, UnknownNameError
 
-MOST_NUMBERS = 1 << 26
+MAX_NUMBERS = 1 << 26
 """Maximum number of entries of a file."""
 LARGEST_EXACT = 2.0**53
 """Integers up to this absolute value are exact as floating-point numbers."""

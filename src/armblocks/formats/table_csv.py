@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from armblocks.errors import FormatError
 from armblocks.formats.table_columns import (
-    MOST_NUMBERS,
+    MAX_NUMBERS,
     Column,
     ColumnFile,
     repeated_notes,
@@ -27,7 +27,7 @@ from armblocks.formats.table_columns import (
     with_units,
 )
 
-MOST_MIXED_BYTES = 64 * 2**20
+MAX_MIXED_BYTES = 64 * 2**20
 """Maximum size of a file that does not consist of numbers only."""
 _SAMPLE = 40
 """Number of rows from which the delimiter is found."""
@@ -60,10 +60,10 @@ def read_csv(data: bytes) -> ColumnFile:
         notes.append(f"Columns are separated by {_SEPARATORS[delimiter]}.")
     columns = _fast(text, delimiter, first, names, notes)
     if columns is None:
-        if len(data) > MOST_MIXED_BYTES:
+        if len(data) > MAX_MIXED_BYTES:
             raise FormatError(
                 f"the file has {len(data)} bytes and contains text or gaps",
-                allowed=f"at most {MOST_MIXED_BYTES} bytes, or numbers only",
+                allowed=f"at most {MAX_MIXED_BYTES} bytes, or numbers only",
                 where="a CSV file",
                 fix="remove columns and rows that are not numbers",
             )
@@ -227,7 +227,7 @@ def _fast(
         return None
     if not numbers.size or (names is not None and numbers.shape[1] != len(names)):
         return None
-    if numbers.size > MOST_NUMBERS:
+    if numbers.size > MAX_NUMBERS:
         raise _too_many(numbers.size)
     if decimal:
         notes.append(decimal)
@@ -250,7 +250,7 @@ def _body_lines(text: str) -> Iterator[tuple[int, int]]:
 def _too_many(count: int) -> FormatError:
     return FormatError(
         f"the file has {count} numbers",
-        allowed=f"at most {MOST_NUMBERS}",
+        allowed=f"at most {MAX_NUMBERS}",
         where="a CSV file",
         fix="split or shorten it",
     )

@@ -13,7 +13,7 @@ from armblocks.formats.table_arrays import read_mat, read_npz, read_parquet
 from armblocks.formats.table_columns import ColumnFile, table_of
 from armblocks.formats.table_csv import read_csv
 
-MOST_BYTES = 1 << 28
+MAX_BYTES = 1 << 28
 """Maximum size of a file, 256 MiB: a million rows of thirty columns."""
 
 
@@ -43,7 +43,7 @@ def is_strict(file: Path) -> bool:
 def load_columns(file: Path) -> ColumnFile:
     """All columns of a file, with the reasons why some have no numbers. Raises ``FormatError``."""
     check_suffix(file)
-    return columns_of(read_bounded(file, MOST_BYTES), file)
+    return columns_of(read_bounded(file, MAX_BYTES), file)
 
 
 def check_suffix(file: Path) -> None:

@@ -21,7 +21,7 @@ from armblocks.matlab.function_kinds import (
     whole,
 )
 
-MOST_ELEMENTS = 100_000
+MAX_ELEMENTS = 100_000
 """Maximum number of elements of an array."""
 
 
@@ -93,8 +93,8 @@ def number_of_elements(number: float) -> int:
     """The number as a count of elements. Raises :class:`MismatchError` for other numbers."""
     if not (number >= 0 and number == number // 1):
         raise MismatchError(f"{number:g} is not a number of elements")
-    if number > MOST_ELEMENTS:
-        raise MismatchError(f"an array would have {number:g} elements; the most are {MOST_ELEMENTS}")
+    if number > MAX_ELEMENTS:
+        raise MismatchError(f"an array would have {number:g} elements; the most are {MAX_ELEMENTS}")
     return int(number)
 
 

@@ -11,7 +11,7 @@ from typing import Protocol, TypeGuard, cast, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.matlab.array_functions import MOST_ELEMENTS
+from armblocks.matlab.array_functions import MAX_ELEMENTS
 from armblocks.matlab.source import Location
 from armblocks.rounded_functions import power
 
@@ -22,7 +22,7 @@ The results of comparisons and logical operators are arrays of Booleans, as they
 indices. :func:`array_of` makes numbers of them.
 """
 
-MOST_WORK = 20_000_000
+MAX_COMPUTED_ELEMENTS = 20_000_000
 """Maximum number of elements that one script may compute, which limits time and memory."""
 ROUNDED_WORK = 1000
 """Cost of a sine or a power relative to a sum."""
@@ -37,7 +37,7 @@ POWERS_OF_MATRICES = "numbers, or a square matrix with a whole exponent from -64
 class Budget:
     """Limits the number of elements that a script computes."""
 
-    left: int = MOST_WORK
+    left: int = MAX_COMPUTED_ELEMENTS
 
     def spend(self, location: Location, count: int) -> None:
         """Subtract ``count`` elements; raises an error if the limit is exceeded."""
@@ -45,7 +45,7 @@ class Budget:
         if self.left < 0:
             raise location.error(
                 "the script exceeds the computation limit of robot scripts",
-                allowed=f"{MOST_WORK} elements in all",
+                allowed=f"{MAX_COMPUTED_ELEMENTS} elements in all",
             )
 
 
@@ -95,7 +95,7 @@ def number_of(location: Location, value: object, what: str) -> float:
     raise location.error(f"{what} is {kind_of(value)}", allowed="one number")
 
 
-def count_of(location: Location, value: object, what: str, maximum: int = MOST_ELEMENTS) -> int:
+def count_of(location: Location, value: object, what: str, maximum: int = MAX_ELEMENTS) -> int:
     """A value that must be a whole number from 0 to ``maximum``."""
     number = number_of(location, value, what)
     if not (0 <= number <= maximum) or number != int(number):
@@ -119,9 +119,9 @@ def array_of(location: Location, value: object, what: str) -> Array:
 
 def check_size(location: Location, rows: int, columns: int) -> None:
     """Raise an error for a matrix with too many elements."""
-    if rows * columns > MOST_ELEMENTS:
+    if rows * columns > MAX_ELEMENTS:
         raise location.error(
-            f"a matrix would have {rows}x{columns} elements", allowed=f"at most {MOST_ELEMENTS} elements"
+            f"a matrix would have {rows}x{columns} elements", allowed=f"at most {MAX_ELEMENTS} elements"
         )
 
 
@@ -311,7 +311,7 @@ def with_element(location: Location, array: Array, indices: Sequence[object], nu
     """A copy of ``array`` with one element set; it grows with zeros where needed."""
     if len(indices) == 1:
         column = array.shape[1] == 1 and array.shape[0] > 1
-        flat = index_of(location, indices[0], MOST_ELEMENTS)
+        flat = index_of(location, indices[0], MAX_ELEMENTS)
         if min(array.shape, default=0) > 1:
             if flat >= array.size:
                 raise location.error(f"the matrix has no element {flat + 1}", allowed=f"1 to {array.size}")
@@ -319,7 +319,7 @@ def with_element(location: Location, array: Array, indices: Sequence[object], nu
         else:
             i, j = (flat, 0) if column else (0, flat)
     elif len(indices) == 2:
-        i, j = (index_of(location, index, MOST_ELEMENTS) for index in indices)
+        i, j = (index_of(location, index, MAX_ELEMENTS) for index in indices)
     else:
         raise location.error(f"{len(indices)} indices are given", allowed="1 or 2")
     rows, columns = max(array.shape[0], i + 1), max(array.shape[1], j + 1)

@@ -15,7 +15,7 @@ from armblocks.matlab.source import Position, formula_source
 from armblocks.matlab.symbols import Oriented, Symbol, Symbols
 from armblocks.matlab.syntax import Chain, Expression, Name, Parentheses, Postfix, levels, parts_of
 
-LONGEST = 4000
+MAX_FORMULA_LENGTH = 4000
 """Maximum number of characters of a formula; longer ones should be diagrams."""
 
 _SIDES: Mapping[str, float] = {">": -1e-300, "<=": -1e-300, ">=": 1e-300, "<": 1e-300}
@@ -28,12 +28,12 @@ class Formula:
     Raises ``InputError`` with the position and the allowed syntax where the text is not a formula.
     """
 
-    def __init__(self, text: str, where: str, *, longest: int = LONGEST) -> None:
-        if len(text) > longest:
+    def __init__(self, text: str, where: str, *, max_length: int = MAX_FORMULA_LENGTH) -> None:
+        if len(text) > max_length:
             raise InputError(
                 f"the formula has {len(text)} characters",
                 where=where,
-                allowed=f"at most {longest}",
+                allowed=f"at most {max_length}",
                 fix="split it, or draw it as blocks",
             )
         self._source = formula_source(text, where)

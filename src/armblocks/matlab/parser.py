@@ -36,9 +36,9 @@ from armblocks.matlab.syntax import (
     levels,
 )
 
-DEEPEST = 60
+MAX_BRACKET_DEPTH = 60
 """Maximum nesting of brackets."""
-DEEPEST_TREE = 200
+MAX_TREE_DEPTH = 200
 """Maximum nesting of an expression, which has a level for every change of precedence."""
 
 KEYWORDS = frozenset(
@@ -133,14 +133,14 @@ class Parser:
             tree = self._operators(Level.OR_ELSE)
         except RecursionError:
             raise self._too_deep(start) from None
-        if self.depth == 0 and next(islice(levels(tree), DEEPEST_TREE, None), None):
+        if self.depth == 0 and next(islice(levels(tree), MAX_TREE_DEPTH, None), None):
             raise self._too_deep(start)
         return tree
 
     def _too_deep(self, at: Position) -> ArmblocksError:
         return self.source.location(at).error(
             "the expression is nested too deeply",
-            allowed=f"{DEEPEST_TREE} levels of operators",
+            allowed=f"{MAX_TREE_DEPTH} levels of operators",
             fix="split it",
         )
 
@@ -310,10 +310,10 @@ class Parser:
 
     def _enter(self) -> None:
         self.depth += 1
-        if self.depth > DEEPEST:
+        if self.depth > MAX_BRACKET_DEPTH:
             raise self.source.location(self.token.at).error(
                 "brackets are nested too deeply",
-                allowed=f"{DEEPEST} brackets inside each other",
+                allowed=f"{MAX_BRACKET_DEPTH} brackets inside each other",
                 fix="split the expression",
             )
 

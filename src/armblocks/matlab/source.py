@@ -17,7 +17,7 @@ FORMULAS = (
     "sqrt, max"
 )
 
-LONGEST_QUOTE = 100
+MAX_QUOTE_LENGTH = 100
 """Characters of a line that a message repeats."""
 POINTER = "\u00bb"
 """Marks the column in a quoted line. Unlike ``^``, it is no operator; old code pages have it, too."""
@@ -86,8 +86,8 @@ def _quoted(text: str, column: int) -> str:
     """The line with a pointer before the column; of a long line, the part around it."""
     if not text.strip():
         return ""
-    start, end = max(0, column - 1 - 2 * LONGEST_QUOTE // 3), column - 1
-    before, after = text[start:end], text[end : start + LONGEST_QUOTE]
+    start, end = max(0, column - 1 - 2 * MAX_QUOTE_LENGTH // 3), column - 1
+    before, after = text[start:end], text[end : start + MAX_QUOTE_LENGTH]
     head = "… " if start and before.strip() else ""
-    tail = " …" if start + LONGEST_QUOTE < len(text.rstrip()) else ""
+    tail = " …" if start + MAX_QUOTE_LENGTH < len(text.rstrip()) else ""
     return f"{head}{before.lstrip()}{POINTER}{after.rstrip()}{tail}"

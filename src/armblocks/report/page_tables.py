@@ -13,7 +13,7 @@ from armblocks.pictures.svg import escape
 from armblocks.report.motion import Motion
 from armblocks.report.motion_summary import LimitFinding, LimitKind, MotionSummary, shown_unit_of
 
-MOST_NUMBERS = 64
+MAX_NUMBERS = 64
 """Longest array whose numbers are listed; of longer arrays only the range is given."""
 
 
@@ -152,7 +152,7 @@ def value_cell(value: NDArray[np.float64]) -> str:
     """A scalar with nine digits, a vector as a row, a matrix as rows; for many numbers their range."""
     if value.ndim == 0:
         return table_number(float(value), 9)
-    if value.size > MOST_NUMBERS:
+    if value.size > MAX_NUMBERS:
         low, high = (table_number(float(end), 7) for end in (value.min(), value.max()))
         return f"{axis_number(value.size)} numbers, {low} … {high}"
     lines = value.reshape(-1, value.shape[-1]) if value.ndim > 1 else value[None]

@@ -25,7 +25,7 @@ from armblocks.simulation.export import check_format
 from armblocks.simulation.result import SimulationResult
 
 FIGURE_FORMATS = ("svg", "png")
-MOST_SHEETS = 60
+MAX_SHEETS = 60
 """Maximum number of subsystems that the page draws; ``armblocks diagram --sheet`` draws any subsystem."""
 
 
@@ -126,7 +126,7 @@ def _summary(motion: Motion) -> MotionSummary:
 def _sheets(diagram: Diagram, result: SimulationResult) -> tuple[Sheet, ...]:
     return tuple(
         Sheet(path=path, same=same, picture=diagram_picture(diagram, result, sheet=path))
-        for path, same in islice(sheets(diagram).items(), MOST_SHEETS)
+        for path, same in islice(sheets(diagram).items(), MAX_SHEETS)
     )
 
 

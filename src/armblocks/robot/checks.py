@@ -12,7 +12,7 @@ from armblocks.robot.joints import Joint
 from armblocks.robot.link import Link, Motor
 from armblocks.spatial import Transform, Vector3
 
-MOST_LINKS = 1000
+MAX_LINKS = 1000
 """Maximum number of links."""
 
 
@@ -43,9 +43,9 @@ def _check_tree(robot: str, links: Sequence[Link]) -> None:
     """Check the number of links, their names and parents: every chain of parents ends at the base."""
     if not links:
         raise RobotError("it has no links", where=robot, allowed="1 link or more", fix="add a link")
-    if len(links) > MOST_LINKS:
+    if len(links) > MAX_LINKS:
         raise RobotError(
-            f"it has {len(links)} links", where=robot, allowed=f"at most {MOST_LINKS}", fix="split the robot"
+            f"it has {len(links)} links", where=robot, allowed=f"at most {MAX_LINKS}", fix="split the robot"
         )
     parents: dict[str, str | None] = {}
     for link in links:

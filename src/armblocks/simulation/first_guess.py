@@ -16,7 +16,7 @@ ITERATIONS = 50
 SINGULAR, FARTHEST = 1e12, 1e6
 """The Jacobian counts as singular above this condition number, and above this Newton step over ``1 +
 |w|``."""
-MOST_UNKNOWNS = 50
+MAX_UNKNOWNS = 50
 """Maximum number of unknowns; difference quotients for more of them would take longer than a run."""
 
 
@@ -27,7 +27,7 @@ def first_guess(compiled: CompiledSystem, start: RunPoint, p: Array) -> Array:
     solution is found, the guess is unchanged and the run reports the singular loop.
     """
     guess = start.w
-    if not 0 < guess.size <= MOST_UNKNOWNS or _step(compiled, start, guess, p) is not None:
+    if not 0 < guess.size <= MAX_UNKNOWNS or _step(compiled, start, guess, p) is not None:
         return guess
     for shift in SHIFTS:
         found = _solution(compiled, start, guess + shift, p)

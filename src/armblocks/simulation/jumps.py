@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
 Places = NDArray[np.intp]
 
-MOST_NUMBERS = 20_000_000
+MAX_NUMBERS = 20_000_000
 """Maximum number of doubles for the states and signals on both sides of the recorded instants, 160 MB."""
 SMALLEST_JUMP = 1e-9
 """A change is a jump if it exceeds this fraction of the largest absolute value of the signal so far. Rounding
@@ -32,7 +32,7 @@ and the location of events cause smaller changes."""
 
 def most_sides(compiled: CompiledSystem) -> int:
     """Maximum number of recorded sides of instants."""
-    return max(64, MOST_NUMBERS // (row_width(compiled.sizes) + compiled.signals_layout.size))
+    return max(64, MAX_NUMBERS // (row_width(compiled.sizes) + compiled.signals_layout.size))
 
 
 @dataclass(frozen=True, kw_only=True)

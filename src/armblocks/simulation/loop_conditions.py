@@ -19,7 +19,7 @@ HALF_OF_THE_DIGITS = 1e8
 """Condition above which fewer than half of a double's 16 digits are correct."""
 ITERATIONS = 12
 """Iterations of the power method; its two bounds then differ by a few per cent for most matrices."""
-MOST_NAMES = 3
+MAX_NAMES = 3
 
 
 def warnings_of_loops(system: CompiledSystem, parts: Sequence[Rows]) -> list[str]:
@@ -66,5 +66,5 @@ def loop_conditions(matrices: Array) -> Array:
 
 
 def _listed(names: Sequence[str]) -> str:
-    shown = ", ".join(f"'{name}'" for name in names[:MOST_NAMES])
-    return shown if len(names) <= MOST_NAMES else f"{shown} and {len(names) - MOST_NAMES} more signals"
+    shown = ", ".join(f"'{name}'" for name in names[:MAX_NAMES])
+    return shown if len(names) <= MAX_NAMES else f"{shown} and {len(names) - MAX_NAMES} more signals"

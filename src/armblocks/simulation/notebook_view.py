@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 TRACES = ("#1f83c0", "#e06a12", "#0f9d74", "#c06d9f", "#b98300", "#5aa9dd", "#8a8f98", "#a39a10")
-MOST_PANELS = 30
-MOST_TRACES = 8
+MAX_PANELS = 30
+MAX_TRACES = 8
 WIDTH, HEIGHT = 264, 132
 LEFT, RIGHT, TOP, BOTTOM = 54, 10, 8, 20
 
@@ -65,8 +65,8 @@ def result_html(result: RunData) -> str:
 
 def panels_html(time: Array, quantities: Sequence[tuple[Slot, Array]]) -> str:
     """A panel for each quantity, ``(N, *shape)`` over ``time`` (N,) s; angles in degrees."""
-    panels = "".join(_panel(time, values, slot) for slot, values in quantities[:MOST_PANELS])
-    rest = ", ".join(escape(slot.name) for slot, _ in quantities[MOST_PANELS:])
+    panels = "".join(_panel(time, values, slot) for slot, values in quantities[:MAX_PANELS])
+    rest = ", ".join(escape(slot.name) for slot, _ in quantities[MAX_PANELS:])
     more = f"<p>Not drawn: {rest}</p>" if rest else ""
     return f'<div class="ab-panels">{panels}</div>{more}'
 
@@ -100,12 +100,12 @@ def _legend(slot: Slot, drawn: list[int]) -> str:
 
 
 def _drawn_components(columns: Array) -> list[int]:
-    """The components to draw: all of them, or only those that change, at most the first ``MOST_TRACES``."""
+    """The components to draw: all of them, or only those that change, at most the first ``MAX_TRACES``."""
     count = columns.shape[1]
-    if count <= MOST_TRACES or columns.shape[0] == 0:
-        return list(range(min(count, MOST_TRACES)))
+    if count <= MAX_TRACES or columns.shape[0] == 0:
+        return list(range(min(count, MAX_TRACES)))
     moving = [k for k in range(count) if columns[:, k].max() > columns[:, k].min()]
-    return (moving or list(range(count)))[:MOST_TRACES]
+    return (moving or list(range(count)))[:MAX_TRACES]
 
 
 def _svg(time: Array, columns: Array, low: float, high: float, label: str) -> str:

@@ -22,9 +22,9 @@ Array = NDArray[np.float64]
 
 DEFAULT_INTERVALS = 1000
 """Number of recorded intervals if no sample time is given: for example 10 s in intervals of 10 ms."""
-MOST_STEPS = 1e11
+MAX_STEPS = 1e11
 """Maximum number of fixed steps, or of ticks of a clock, in a run."""
-MOST_NUMBERS = 500_000_000
+MAX_NUMBERS = 500_000_000
 """Maximum number of recorded doubles of one run in memory, 4 GB."""
 SMALLEST_RTOL = 1e-13
 """Smallest relative tolerance. Below it rounding errors dominate those of the method."""
@@ -195,12 +195,12 @@ def _check_resolution(name: str, step: float, stop: float, where: str) -> None:
 
 
 def _check_step_count(name: str, step: float, stop: float, where: str) -> None:
-    """Raise ``InputError`` for a step or period that occurs more than ``MOST_STEPS`` times in a run."""
-    if stop > MOST_STEPS * step:
+    """Raise ``InputError`` for a step or period that occurs more than ``MAX_STEPS`` times in a run."""
+    if stop > MAX_STEPS * step:
         raise InputError(
             f"{name} is {step:g} s, and the stop time {stop:g} s: {stop / step:.0e} steps",
             where=where,
-            allowed=f"at most {MOST_STEPS:.0e}, which take hours",
+            allowed=f"at most {MAX_STEPS:.0e}, which take hours",
             fix="check that it is in seconds; choose a longer one, or an earlier stop time",
         )
 
@@ -255,12 +255,12 @@ def _sample_time(
     else:
         sample_time = stop / DEFAULT_INTERVALS if stop > 0.0 else 1.0
     width = 1 + system.states.size + system.signals_layout.size
-    if not logged and stop / sample_time * width > MOST_NUMBERS:
+    if not logged and stop / sample_time * width > MAX_NUMBERS:
         samples = f"{stop / sample_time:.3g} samples of {width} numbers"
         raise InputError(
             f"a sample time of {sample_time:g} s over {stop:g} s records {samples}",
             where=system.name,
-            allowed=f"at most {MOST_NUMBERS // width} samples, which take 4 GB",
+            allowed=f"at most {MAX_NUMBERS // width} samples, which take 4 GB",
             fix="choose a larger sample_time, which has no effect on the accuracy of the steps, "
             "or log the run to a file",
         )

@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 VIEW_ROWS = 20_000
 """Approximate number of rows of the view: several for each pixel of a figure."""
-MOST_VIEW_ROWS = 4 * VIEW_ROWS
+MAX_VIEW_ROWS = 4 * VIEW_ROWS
 WINDOW_NUMBERS = 2_000_000
 """Number of doubles of the window, 16 MB."""
 
@@ -68,7 +68,7 @@ class View:
         joined = np.concatenate(self._pending, axis=1)
         self._selected.append(self._extremes(joined) if len(self._pending) > 1 else joined)
         self._pending, self._rows_in_interval = [], 0
-        if sum(part.shape[1] for part in self._selected) > MOST_VIEW_ROWS:
+        if sum(part.shape[1] for part in self._selected) > MAX_VIEW_ROWS:
             # More rows than expected, because of jumps: double the intervals.
             self._interval *= 2
             pairs = [self._selected[k : k + 2] for k in range(0, len(self._selected), 2)]

@@ -39,10 +39,10 @@ def test_a_journal_cut_at_any_byte_keeps_the_complete_records(tmp_path: Path) ->
     counts: set[int] = set()
     for end in range(first, len(data)):
         path.write_bytes(data[:end])
-        found, whole = read_journal(path)
+        content, whole = read_journal(path)
         assert whole <= end
-        assert found == known[: len(found)]
-        counts.add(len(found))
+        assert content == known[: len(content)]
+        counts.add(len(content))
     assert counts == set(range(1, len(known)))
 
 
@@ -117,6 +117,6 @@ def test_a_journal_locked_by_another_studio_is_refused(tmp_path: Path) -> None:
 def test_a_journal_above_the_size_limit_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "a.journal"
     written(path)
-    monkeypatch.setattr(journal_module, "MOST_BYTES", 10)
+    monkeypatch.setattr(journal_module, "MAX_BYTES", 10)
     with pytest.raises(FormatError, match="the journal is too large"):
         read_journal(path)

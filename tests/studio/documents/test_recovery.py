@@ -134,17 +134,17 @@ def test_a_journal_cut_anywhere_recovers_the_complete_edits_before_the_cut(
                 copy.unlink()  # also removes the lock of the previous recovery
                 copy.write_bytes(whole[: min(cut, len(whole))])
                 waiting = other.documents()
-                done = record - 2 if cut >= ends[record] else record - 3
-                if done < 0:
+                applied = record - 2 if cut >= ends[record] else record - 3
+                if applied < 0:
                     assert [entry.missing != "" for entry in waiting.recoverable.offers()] == [True]
                     continue
-                assert [entry.edits for entry in waiting.recoverable.offers()] == [done] * (done > 0)
-                if done > 0:
+                assert [entry.edits for entry in waiting.recoverable.offers()] == [applied] * (applied > 0)
+                if applied > 0:
                     recovered = await waiting.recover(
                         document_messages.Recover(document=open_file.key, action="open")
                     )
                     assert recovered is not None
-                    assert content(recovered) == states[done]
+                    assert content(recovered) == states[applied]
 
     going(scenario)
 

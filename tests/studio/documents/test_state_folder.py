@@ -46,7 +46,7 @@ def test_recent_files_are_unique_and_latest_first(studio_state: StateFolder) -> 
     for name in ("a.json", "b.json", "a.json", *(f"{k}.json" for k in range(20))):
         studio_state.use(name)
     assert studio_state.recent()[:2] == ["19.json", "18.json"]
-    assert len(studio_state.recent()) == state_folder.MOST_RECENT
+    assert len(studio_state.recent()) == state_folder.MAX_RECENT_FILES
 
 
 def test_a_missing_home_folder_raises_an_error_with_a_remedy(

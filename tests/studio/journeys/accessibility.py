@@ -25,10 +25,10 @@ def axe(page: Page, inside: str = "html", *, tags: list[str] | None = None) -> N
     """
     if not page.evaluate("'axe' in window"):
         page.evaluate(SCRIPT.read_text(encoding="utf-8"))
-    found = page.evaluate(RUN, [inside, tags])
+    violations = page.evaluate(RUN, [inside, tags])
     serious = [
         (rule["id"], rule["nodes"][0]["html"][:200])
-        for rule in found
+        for rule in violations
         if rule["impact"] in ("serious", "critical")
     ]
     assert serious == []

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from playwright.sync_api import Locator, Page, expect
 
-from conftest import PATIENCE_MS
+from conftest import TIMEOUT_MS
 
 DIALOG = "[role=dialog]"
 """The open dialog: searching a role inside it is faster than in the whole page."""
@@ -44,16 +44,16 @@ def edge(page: Page, wire: str) -> Locator:
     return page.locator(f'.react-flow__edge[data-id="{wire}"]')
 
 
-def middle(found: Locator) -> tuple[float, float]:
+def middle(element: Locator) -> tuple[float, float]:
     """The centre of an element after it is drawn; wires are drawn after their blocks."""
     box = None
 
     def drawn() -> bool:
         nonlocal box
-        box = found.bounding_box()
+        box = element.bounding_box()
         return box is not None
 
-    wait_until(found.page, drawn)
+    wait_until(element.page, drawn)
     assert box is not None
     return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
@@ -141,7 +141,7 @@ def wire(page: Page, source: str, target: str) -> None:
 def wait_until(page: Page, true: Callable[[], bool]) -> None:
     """Wait for a condition that no locator expresses: a state of the test, or a relation of two numbers."""
     step = 50
-    for _ in range(PATIENCE_MS // step):
+    for _ in range(TIMEOUT_MS // step):
         if true():
             return
         page.wait_for_timeout(step)  # the events of the browser are handled meanwhile
@@ -152,9 +152,9 @@ def select_block(page: Page, name: str) -> None:
     """Click a block until it is selected: a click is lost while the sheet is fitted into its panel."""
 
     def is_selected() -> bool:
-        found = block(page, name)
-        found.click()
-        return bool(found.evaluate("element => element.closest('.react-flow__node').matches('.selected')"))
+        element = block(page, name)
+        element.click()
+        return bool(element.evaluate("element => element.closest('.react-flow__node').matches('.selected')"))
 
     wait_until(page, is_selected)
 
@@ -192,9 +192,9 @@ def open_fresh_example(page: Page) -> None:
     keep_view(page)
 
 
-def expect_focus_inside(found: Locator) -> None:
+def expect_focus_inside(element: Locator) -> None:
     """Wait until a dialog has the focus, which it takes shortly after it is displayed."""
-    expect(found.locator(":focus")).to_have_count(1)
+    expect(element.locator(":focus")).to_have_count(1)
 
 
 def expect_no_frames(page: Page) -> None:
@@ -208,8 +208,8 @@ def expect_no_faults(page: Page) -> None:
     try:
         expect(faults).to_have_count(0)
     except AssertionError as error:
-        found = faults.evaluate_all("(marks) => marks.map((mark) => mark.ariaLabel ?? mark.title)")
-        raise AssertionError(f"faults are shown: {found}") from error
+        texts = faults.evaluate_all("(marks) => marks.map((mark) => mark.ariaLabel ?? mark.title)")
+        raise AssertionError(f"faults are shown: {texts}") from error
 
 
 def play_slowly(page: Page) -> None:

@@ -27,7 +27,7 @@ class Crash:
     """A page whose diagram has a sine wave from before the crash and a gain added during the outage."""
     robot: Page
     """A page whose robot has link1 of 0.75 m from before the crash and link2 of 0.25 m from the outage."""
-    lost: bytes
+    overwritten: bytes
     """Content that another program wrote after the crash into a file with unsaved edits in the studio.
     The page of that diagram was closed before the crash."""
 
@@ -55,14 +55,14 @@ def crash(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterato
     lengthen(robot, "link1", "0.75")
     expect(robot.locator(".robot-editor").get_by_label("changed", exact=True)).to_be_visible()
     old.kill()
-    lost = edit_from_outside(old.folder / "lost.json")
+    overwritten = edit_from_outside(old.folder / "lost.json")
     for page in (drawing, robot):
         expect(silence(page)).to_be_visible()
     axe(drawing)
     add(drawing, "gain")  # queued in the page
     lengthen(robot, "link2", "0.25")  # queued in the page, and preserved across its reload
     studio = Studio(old.folder, "van_der_pol_pid")
-    yield Crash(studio=studio, before=old, drawing=drawing, robot=robot, lost=lost)
+    yield Crash(studio=studio, before=old, drawing=drawing, robot=robot, overwritten=overwritten)
     context.close()
     studio.stop()
     assert [line for line in faults if "ERR_CONNECTION_" not in line] == []
@@ -137,7 +137,7 @@ def test_a_new_page_after_the_crash_offers_the_unsaved_diagram(crash: Crash) -> 
     offer.get_by_role("button", name="Keep both").click()
     expect(offer).to_be_hidden()
     expect(fresh.locator(".title")).to_have_text(re.compile("^lost recovered 20"))
-    assert (folder / "lost.json").read_bytes() == crash.lost
-    (kept,) = folder.glob("lost recovered *.json")
-    assert names(kept) == ["Constant", "Gain"]
+    assert (folder / "lost.json").read_bytes() == crash.overwritten
+    (recovered,) = folder.glob("lost recovered *.json")
+    assert names(recovered) == ["Constant", "Gain"]
     fresh.close()

@@ -130,8 +130,8 @@ def test_a_conflicting_edit_is_reported_and_both_pages_show_the_same_diagram(
     add(other, "sum")
     expect(block(page, "Sum")).to_be_visible()
     places = "nodes => nodes.map(node => [node.dataset.id, node.style.transform]).sort()"
-    here, there = (shown.locator(".react-flow__node") for shown in (page, other))
-    wait_until(page, lambda: here.evaluate_all(places) == there.evaluate_all(places))
+    own_nodes, other_nodes = (shown.locator(".react-flow__node") for shown in (page, other))
+    wait_until(page, lambda: own_nodes.evaluate_all(places) == other_nodes.evaluate_all(places))
     block(page, "Sum").click()
     page.keyboard.press("Delete")
     expect(block(other, "Sum")).to_have_count(0)

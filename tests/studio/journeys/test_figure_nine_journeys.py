@@ -94,10 +94,10 @@ def save_and_compare(page: Page, path: Path) -> None:
     page.get_by_role("combobox", name="File").fill(path.name)
     page.get_by_role("button", name="Save", exact=True).press("Enter")
     expect(page.locator(".title")).to_have_text(path.stem)
-    made, shipped = ab.simulate(ab.load_diagram(path)), ab.simulate("kr180model")
-    np.testing.assert_array_equal(made.time, shipped.time)
+    built, shipped = ab.simulate(ab.load_diagram(path)), ab.simulate("kr180model")
+    np.testing.assert_array_equal(built.time, shipped.time)
     for signal in ("rne/tau", "T2xyz/x", "T2xyz/y", "T2xyz/z"):
-        np.testing.assert_allclose(made[signal], shipped[signal], rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(built[signal], shipped[signal], rtol=1e-12, atol=1e-12)
 
 
 def test_figure_9_is_built_with_the_mouse(page: Page, folder: Path) -> None:

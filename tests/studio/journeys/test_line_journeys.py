@@ -16,7 +16,7 @@ from playwright.sync_api import Browser, Locator, Page, expect
 from conftest import Studio, new_context
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="SIGSTOP needs POSIX")
-GONE_MS = 1000 * float(os.environ.get("ARMBLOCKS_LINE_GONE", "0"))
+OUTAGE_MS = 1000 * float(os.environ.get("ARMBLOCKS_LINE_GONE", "0"))
 """Duration of the outage after the page reports it, s; in the long version 10, and the page reconnects."""
 
 
@@ -47,7 +47,7 @@ class Session:
 
     def go_on(self) -> None:
         expect(silence(self.page)).to_be_visible()
-        self.page.wait_for_timeout(GONE_MS)
+        self.page.wait_for_timeout(OUTAGE_MS)
         self.studio.process.send_signal(signal.SIGCONT)
         expect(silence(self.page)).to_be_hidden()
 

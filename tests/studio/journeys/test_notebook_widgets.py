@@ -15,7 +15,7 @@ from playwright.sync_api import Browser, ConsoleMessage, FrameLocator, Page, Rou
 
 import armblocks as ab
 from armblocks.errors import InputError, MissingLibraryError
-from conftest import NOT_DRAWN, PATIENCE_MS
+from conftest import NO_RENDERING, TIMEOUT_MS
 
 ORIGIN = "http://notebook.test/"
 SHOW = """async ([esm, states]) => {
@@ -47,7 +47,7 @@ SYNCED = ("title", "height", "time", "_page", "_shown", "_frame")
 def notebook(browser: Browser) -> Iterator[Page]:
     """An empty page that may send no request after the first and report no error."""
     page = browser.new_page(viewport={"width": 1280, "height": 1100}, color_scheme="light")
-    page.set_default_timeout(PATIENCE_MS)
+    page.set_default_timeout(TIMEOUT_MS)
     faults: list[str] = []
 
     def answer(route: Route) -> None:
@@ -91,7 +91,7 @@ def shown(point: np.ndarray) -> str:
 
 
 def test_the_widgets_of_a_result_share_their_time_cursor(notebook: Page) -> None:
-    notebook.add_init_script(NOT_DRAWN)
+    notebook.add_init_script(NO_RENDERING)
     diagram = ab.load_diagram("kr180model")
     result = ab.simulate(diagram)
     tool = result["plot/poses"][:, -1, :3, 3]
@@ -142,7 +142,7 @@ def test_a_robot_widget_shows_the_given_configuration(notebook: Page) -> None:
     expect(arm.get_by_role("slider", name="Time")).to_have_count(0)
     canvas = arm.locator(".robot canvas")
     expect(canvas).to_be_visible()
-    # Journeys of the studio do not draw the arm (NOT_DRAWN); this test does, with many shades.
+    # Journeys of the studio do not draw the arm (NO_RENDERING); this test does, with many shades.
     wait_until(notebook, lambda: colours(canvas.screenshot()) > 500)
 
 

@@ -63,14 +63,14 @@ def test_a_user_drawn_route_follows_its_block_and_can_be_reset(sheet: Page) -> N
     expect(sheet.get_by_role("button", name="Undo bend 1 wire (Ctrl+Z)")).to_be_enabled()
     line = edge(sheet, wire).locator("path.line").first
     expect(line).not_to_have_attribute("d", before or "")
-    led = way(sheet, wire)
+    routed = way(sheet, wire)
     block(sheet, "PID").click()
     sheet.keyboard.press("ArrowDown")
     expect(sheet.get_by_role("button", name="Undo move PID (Ctrl+Z)")).to_be_enabled()
-    expect(line).not_to_have_attribute("d", led or "")
+    expect(line).not_to_have_attribute("d", routed or "")
     assert way(sheet, wire) != before
     sheet.keyboard.press("Control+z")
-    expect(line).to_have_attribute("d", led or "")
+    expect(line).to_have_attribute("d", routed or "")
     edge(sheet, wire).locator(".piece").nth(2).click(force=True)
     accent = sheet.evaluate("getComputedStyle(document.documentElement).getPropertyValue('--accent')")
     shown = f"getComputedStyle(document.querySelector('{SELECTED_LINE}')).stroke"
@@ -361,8 +361,8 @@ def test_search_opens_the_sheet_of_a_block_and_the_explorer_marks_it(sheet: Page
     expect(block(sheet, "Subsystem")).to_be_visible()
     sheet.keyboard.press("Control+f")
     sheet.get_by_role("textbox", name="Find").fill("PID")
-    found = sheet.get_by_role("listbox", name="Found").get_by_role("option")
-    expect(found.first).to_contain_text("in Subsystem")
+    matches = sheet.get_by_role("listbox", name="Found").get_by_role("option")
+    expect(matches.first).to_contain_text("in Subsystem")
     sheet.get_by_role("textbox", name="Find").press("Enter")
     expect(block(sheet, "PID")).to_have_class(re.compile("selected"))
     expect(sheet.locator(".breadcrumbs")).to_contain_text("Subsystem")

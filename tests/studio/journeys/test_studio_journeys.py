@@ -108,9 +108,9 @@ def test_a_diagram_is_built_with_the_mouse_run_and_saved(page: Page, folder: Pat
     page.get_by_role("combobox", name="File").fill("made/by hand.json")
     page.get_by_role("button", name="Save", exact=True).click()
     expect(page.locator(".title")).to_have_text("by hand")
-    made = ab.load_diagram(folder / "made" / "by hand.json")
-    assert made.blocks["Gain"].parameter_value("gain") == 6.283185307179586
-    assert [str(wire) for wire in made.connections][1] == "Sine Wave/y -> Gain/u"
+    saved = ab.load_diagram(folder / "made" / "by hand.json")
+    assert saved.blocks["Gain"].parameter_value("gain") == 6.283185307179586
+    assert [str(wire) for wire in saved.connections][1] == "Sine Wave/y -> Gain/u"
 
 
 def test_a_diagram_is_built_with_the_keyboard_alone_and_undone_completely(page: Page) -> None:

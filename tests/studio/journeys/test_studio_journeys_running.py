@@ -135,9 +135,9 @@ def test_two_runs_are_compared(opened: Opened) -> None:
     row = page.locator(".signals label", has_text="lag")
     message = row.locator(".apart")
     expect(message).to_contain_text("✗")
-    found = re.findall(r"[\d.]+", message.inner_text())
-    np.testing.assert_allclose(float(found[0]), apart.max(), rtol=5e-3)
-    np.testing.assert_allclose(float(found[1]), one.time[apart.argmax()], rtol=5e-3)
+    numbers = re.findall(r"[\d.]+", message.inner_text())
+    np.testing.assert_allclose(float(numbers[0]), apart.max(), rtol=5e-3)
+    np.testing.assert_allclose(float(numbers[1]), one.time[apart.argmax()], rtol=5e-3)
     expect(page.locator(".signals label", has_text="gain").locator(".apart")).to_contain_text("✓ 0")
     page.get_by_role("textbox", name="Tolerance").fill("1")
     expect(message).to_contain_text("✓")
@@ -197,8 +197,8 @@ def test_scope_exports_contain_all_samples_and_jumps(opened: Opened) -> None:
     rows = list(csv.reader(io.StringIO(saved(page, "scope", "Samples as CSV").decode())))
     assert rows[0] == ["time [s]", "gain", "lag"]
     result = ab.simulate(lag_model("exported")).with_jumps()
-    wanted = np.column_stack([result.time, result["gain/y"], result["lag/y"]])
-    np.testing.assert_array_equal(np.array(rows[1:], dtype=float), wanted)
+    expected = np.column_stack([result.time, result["gain/y"], result["lag/y"]])
+    np.testing.assert_array_equal(np.array(rows[1:], dtype=float), expected)
     picture = ElementTree.fromstring(saved(page, "scope", "Picture as SVG"))
     assert {"scope", "gain", "lag", "Time, s"} <= {text.text for text in picture.iter() if text.text}
     assert saved(page, "scope", "Picture as PNG").startswith(b"\x89PNG")

@@ -9,8 +9,8 @@ from pathlib import Path
 import armblocks as ab
 
 WEB = Path(ab.__file__).parent / "studio" / "web"
-MOST_KB = 400
-EVERY_PAGES_FONTS = re.compile(r"(inter-latin-wght|jetbrains-mono-latin-400)-normal-.*\.woff2")
+MAX_KB = 400
+COMMON_FONTS = re.compile(r"(inter-latin-wght|jetbrains-mono-latin-400)-normal-.*\.woff2")
 """Font files that every page needs: browsers fetch only the files with characters on the page."""
 
 
@@ -18,12 +18,12 @@ def test_the_first_download_is_below_400_kb() -> None:
     page = (WEB / "index.html").read_text(encoding="utf-8")
     files = sorted((WEB / "assets").iterdir())
     named = [file for file in files if file.name in page]
-    fonts = [file for file in files if EVERY_PAGES_FONTS.fullmatch(file.name)]
+    fonts = [file for file in files if COMMON_FONTS.fullmatch(file.name)]
     assert {file.suffix for file in named} == {".js", ".css"}
     assert len(fonts) == 2
     sizes = {file.name: len(gzip.compress(file.read_bytes(), 9)) for file in (*named, *fonts)}
     whole = sum(sizes.values()) + len(gzip.compress(page.encode(), 9))
-    assert whole < 1000 * MOST_KB, f"{whole / 1000:.0f} kB: {sizes}"
+    assert whole < 1000 * MAX_KB, f"{whole / 1000:.0f} kB: {sizes}"
 
 
 def test_3d_code_and_dialogs_are_loaded_on_demand() -> None:

@@ -10,9 +10,9 @@ import pytest
 SOURCE = Path(__file__).parents[3] / "frontend" / "src"
 COMMANDS = ("commands.ts", "command_palette.tsx")
 """Source files that contain the list itself: their key names are data."""
-WRITTEN = {"escape": "esc", "delete": "del", " ": "space"}
-LISTENING = re.compile(r"event\.key\b|moved\.key\b|onKeyDown|keydown")
-HEARD = re.compile(
+SHORT_NAMES = {"escape": "esc", "delete": "del", " ": "space"}
+KEY_HANDLER = re.compile(r"event\.key\b|moved\.key\b|onKeyDown|keydown")
+KEY_COMPARISON = re.compile(
     r"""\b(?:event\.key|pressed|key)\s(?:===|!==)\s'([^']+)'   # event.key === 'Enter'
     | [{,]\s*(Arrow\w+|Enter|Escape|Home|End|Delete|Tab):      # { ArrowUp: -1, Enter: 1 }[event.key]
     """,
@@ -27,20 +27,27 @@ def listed() -> list[tuple[list[str], list[str]]]:
     assert len(places) == text.count("    title: '")
     ways = re.compile(r"^ *\['(.+?)', '", re.MULTILINE)
     return [
-        (re.findall(r"'(.+?)'", sources), [way for found in ways.findall(keys) for way in found.split(", ")])
+        (
+            re.findall(r"'(.+?)'", sources),
+            [way for line in ways.findall(keys) for way in line.split(", ")],
+        )
         for sources, keys in places
     ]
 
 
 def listeners() -> dict[str, set[str]]:
     """The keys that each source file compares with the pressed key."""
-    found: dict[str, set[str]] = {}
+    keys_in_file: dict[str, set[str]] = {}
     for path in sorted(SOURCE.rglob("*.ts*")):
         text = path.read_text(encoding="utf-8")
-        keys = {one or other for one, other in HEARD.findall(text)} if LISTENING.search(text) else set[str]()
+        keys = (
+            {one or other for one, other in KEY_COMPARISON.findall(text)}
+            if KEY_HANDLER.search(text)
+            else set[str]()
+        )
         if keys:
-            found[path.relative_to(SOURCE).as_posix()] = keys
-    return found
+            keys_in_file[path.relative_to(SOURCE).as_posix()] = keys
+    return keys_in_file
 
 
 def names(key: str, ways: list[str]) -> bool:
@@ -48,7 +55,7 @@ def names(key: str, ways: list[str]) -> bool:
     if key.startswith("Arrow"):
         arrow = {"Up": "↑", "Down": "↓", "Left": "←", "Right": "→"}[key.removeprefix("Arrow")]
         return "arrows" in ways or arrow in ways
-    written = WRITTEN.get(key.lower(), key.lower())
+    written = SHORT_NAMES.get(key.lower(), key.lower())
     return any(way.lower() == written or way.lower().endswith(f"+{written}") for way in ways)
 
 

@@ -23,10 +23,10 @@ Array = Any
 def test_a_decoded_frame_equals_the_encoded_samples() -> None:
     rng = np.random.default_rng(1)
     time, signals = np.arange(5.0), rng.normal(size=(3, 5))
-    header, found_time, found = read_frame(sample_frame("ä", 7, time, signals))
+    header, decoded_time, decoded = read_frame(sample_frame("ä", 7, time, signals))
     assert header == {"run": "ä", "first": 7, "count": 5}
-    np.testing.assert_array_equal(found_time, time)
-    np.testing.assert_array_equal(found, signals)
+    np.testing.assert_array_equal(decoded_time, time)
+    np.testing.assert_array_equal(decoded, signals)
 
 
 @given(st.integers(1, 60), st.integers(2, 9), st.integers(0, 2**32 - 1))
@@ -37,11 +37,11 @@ def test_thinning_keeps_all_extremes_and_time_increases(count: int, stride: int,
     assert few.shape == (2, few_time.size)
     assert few_time.size <= 2 * -(-count // stride)
     assert np.all(np.diff(few_time) > 0)
-    for begin in range(0, count, stride):
-        part = slice(begin, begin + stride)
-        here = (few_time >= time[part][0]) & (few_time <= time[part][-1])
-        np.testing.assert_array_equal(few[:, here].min(axis=1), signals[:, part].min(axis=1))
-        np.testing.assert_array_equal(few[:, here].max(axis=1), signals[:, part].max(axis=1))
+    for start in range(0, count, stride):
+        part = slice(start, start + stride)
+        inside = (few_time >= time[part][0]) & (few_time <= time[part][-1])
+        np.testing.assert_array_equal(few[:, inside].min(axis=1), signals[:, part].min(axis=1))
+        np.testing.assert_array_equal(few[:, inside].max(axis=1), signals[:, part].max(axis=1))
 
 
 class Pipe:
@@ -61,7 +61,7 @@ class Pipe:
 def test_a_long_run_sends_extremes_and_a_short_run_all_samples(
     most: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(run_worker, "MOST_NUMBERS", most)
+    monkeypatch.setattr(run_worker, "MAX_NUMBERS", most)
     diagram = load_diagram("van_der_pol_pid", BLOCKS)
     pipe = Pipe()
     source = diagram_to_bytes(diagram, load_robot).decode()

@@ -69,7 +69,7 @@ def requests(document: str, robot: str) -> list[dict[str, Any]]:
     """At least one valid request of every kind."""
     place = {"x": 0.0, "y": 0.0, "width": None, "height": None, "flipped": False, "rotation": 0}
     block = {"name": "new", "type": "Gain", "parameters": {"gain": "2*pi"}, "place": place}
-    kept = base64.b64encode(ROWS).decode()
+    encoded = base64.b64encode(ROWS).decode()
     choice = {"file": "a.csv", "time": "time", "columns": ["x"]}
     played = {"name": "played", "type": "FromFile", "parameters": {"data": choice}, "place": place}
     called = {"name": "f", "type": "PythonFunction", "parameters": {"function": "law.py:law"}, "place": place}
@@ -115,7 +115,7 @@ def requests(document: str, robot: str) -> list[dict[str, Any]]:
             "origin": "",
             "in_front": True,
         },
-        {"kind": "look", "document": document, "inside": []},
+        {"kind": "show_sheet", "document": document, "inside": []},
         {
             "kind": "route",
             "document": document,
@@ -130,7 +130,7 @@ def requests(document: str, robot: str) -> list[dict[str, Any]]:
         {"kind": "redo", **common},
         {"kind": "save", "document": document, "path": "saved.json", "overwrite": True},
         {"kind": "reload", **common},
-        {"kind": "keep_mine", "document": document},
+        {"kind": "ignore_file_change", "document": document},
         {"kind": "ping"},
         {"kind": "files"},
         {"kind": "outline", "document": document},
@@ -164,9 +164,9 @@ def requests(document: str, robot: str) -> list[dict[str, Any]]:
         {"kind": "data_files", "holds": "table"},
         {"kind": "preview_table", **choice},
         {
-            "kind": "keep_file",
+            "kind": "store_file",
             "name": "kept.csv",
-            "content": kept,
+            "content": encoded,
             "replace": True,
         },
         {"kind": "read_source", "file": "law.py"},
@@ -192,12 +192,12 @@ def spoilt(request: dict[str, Any]) -> Iterator[dict[str, Any]]:
         if path == ("kind",):
             continue
         for hostile in HOSTILE:
-            made = copy.deepcopy(request)
-            holder: Any = made
+            variant = copy.deepcopy(request)
+            holder: Any = variant
             for name in path[:-1]:
                 holder = holder[name]
             holder[path[-1]] = hostile
-            yield made
+            yield variant
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ from armblocks.studio.protocol.outbox import Outbox
 from armblocks.studio.protocol.page import Page
 from armblocks.studio.server.hub import Hub
 
-PATIENCE_SECONDS = 180.0
+TIMEOUT_SECONDS = 180.0
 
 
 class Listener:
@@ -36,7 +36,7 @@ class Listener:
         self.news.set()
 
     async def until(self, kind: str, **members: Any) -> dict[str, Any]:
-        async with asyncio.timeout(PATIENCE_SECONDS):
+        async with asyncio.timeout(TIMEOUT_SECONDS):
             while True:
                 self.news.clear()
                 for event in map(json.loads, (message for message in self.heard if isinstance(message, str))):
@@ -100,7 +100,7 @@ def test_a_page_suspended_during_a_run_delays_nobody_and_gets_all_messages_later
 def test_the_connection_of_an_unresponsive_page_is_closed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(outbox_module, "MOST_BYTES", 1_000_000)
+    monkeypatch.setattr(outbox_module, "MAX_BYTES", 1_000_000)
 
     async def going(hub: Hub, lively: Listener, frozen: Listener) -> None:
         document = await lively.ask(hub, 1, "open_shipped", document_kind="diagram", name="kr180model")

@@ -18,7 +18,7 @@ import armblocks as ab
 from armblocks.errors import ArmblocksWarning, FormatError
 from armblocks.formats import DocumentKind, kind_of_data, load_robot, read_robots, write_robot
 from armblocks.studio.documents.project_folder import ProjectFolder
-from armblocks.studio.protocol.messages.documents import MOST_DROPPED
+from armblocks.studio.protocol.messages.documents import MAX_DROPPED_BYTES
 from armblocks.studio.robots.readings import readings, singularity
 from armblocks.studio.server.hub import Hub, Page
 
@@ -132,8 +132,8 @@ def test_dropped_files_are_bounded_and_errors_name_the_file(tmp_path: Path) -> N
         for name in ("arm.exe", "noname", "run.py"):
             assert "is not a file type" in await client.refused("drop", name=name, content="")
         assert "the content is not base64" in await client.refused("drop", name="a.m", content="§")
-        huge = packed(b" " * (MOST_DROPPED + 1))
-        assert f"{MOST_DROPPED + 1} bytes" in await client.refused("drop", name="a.json", content=huge)
+        huge = packed(b" " * (MAX_DROPPED_BYTES + 1))
+        assert f"{MAX_DROPPED_BYTES + 1} bytes" in await client.refused("drop", name="a.json", content=huge)
         code = b"L{1} = link([0 1 0 0 0]);\nsystem('rm -rf /')\n"
         assert "evil.m:2" in await client.refused("drop", name="evil.m", content=packed(code))
         assert "defines no robot" in await client.refused("drop", name="a.m", content=packed(b"x = 1;"))
@@ -226,15 +226,15 @@ def test_read_outs_equal_the_values_of_the_arm(tmp_path: Path) -> None:
 
     async def scenario(client: Client) -> None:
         key = await client.ask("open_shipped", document_kind="robot", name="puma560")
-        found = await client.ask("readings", document=key, q=q, qd=qd, qdd=qdd)
-        assert found["pose"] == arm.fkine(q).tolist()
-        assert found["jacobian"] == arm.jacob0(q).tolist()
-        assert found["torque"] == arm.rne(q, qd, qdd).tolist()
-        assert found["gravload"] == arm.gravload(q).tolist()
-        assert found["manipulability"] == float(arm.manipulability(q))
-        roll, pitch, yaw = found["rpy"]
-        assert_allclose(math.cos(pitch) * math.cos(yaw), found["pose"][0][0], atol=1e-12)
-        assert_allclose(math.cos(pitch) * math.sin(roll), found["pose"][2][1], atol=1e-12)
+        shown_values = await client.ask("readings", document=key, q=q, qd=qd, qdd=qdd)
+        assert shown_values["pose"] == arm.fkine(q).tolist()
+        assert shown_values["jacobian"] == arm.jacob0(q).tolist()
+        assert shown_values["torque"] == arm.rne(q, qd, qdd).tolist()
+        assert shown_values["gravload"] == arm.gravload(q).tolist()
+        assert shown_values["manipulability"] == float(arm.manipulability(q))
+        roll, pitch, yaw = shown_values["rpy"]
+        assert_allclose(math.cos(pitch) * math.cos(yaw), shown_values["pose"][0][0], atol=1e-12)
+        assert_allclose(math.cos(pitch) * math.sin(roll), shown_values["pose"][2][1], atol=1e-12)
         assert "5 numbers were given for q" in await client.refused(
             "readings", document=key, q=q[:5], qd=qd, qdd=qdd
         )

@@ -62,7 +62,7 @@ def test_angles_are_read_in_the_column_unit_or_in_their_own_unit(text: str, unit
 
 def test_the_tables_of_the_paper_can_be_typed_in() -> None:
     """From a new robot to the arm of the paper, cell by cell, with the texts of its script."""
-    wanted = load_robot("kr180")
+    expected = load_robot("kr180")
     robot = KIND.new()
     for _ in range(2):
         robot = edited(robot, "add_joint", after=robot.links[-1].name)
@@ -80,12 +80,12 @@ def test_the_tables_of_the_paper_can_be_typed_in() -> None:
             robot = typed(robot, link, column, cell)
     for column, text in (
         ("name", "KR180"),
-        ("manufacturer", wanted.manufacturer),
-        ("comment", wanted.comment),
+        ("manufacturer", expected.manufacturer),
+        ("comment", expected.comment),
     ):
         robot = typed(robot, "", column, text)
-    assert robot == replace(wanted, links=robot.links)
-    for mine, theirs in zip(robot.links, wanted.links):
+    assert robot == replace(expected, links=robot.links)
+    for mine, theirs in zip(robot.links, expected.links):
         assert mine == theirs
 
 
@@ -205,8 +205,8 @@ def test_non_physical_values_are_marked_at_their_cells() -> None:
     assert robot_content(mended).findings == []
     with pytest.warns(UserWarning, match="friction accelerates"):
         bad = typed(robot, "link2", "Tc-", "0.1")
-    found = robot_content(bad).findings
-    assert [(f.link, f.columns) for f in found if "Friction" in f.what] == [("link2", ["Tc-"])]
+    findings_shown = robot_content(bad).findings
+    assert [(f.link, f.columns) for f in findings_shown if "Friction" in f.what] == [("link2", ["Tc-"])]
     bare = replace(KIND.new(), links=(standard_dh("link1", a=1.0),))
     assert "The last joint has no inertia" in robot_content(bare).findings[0].what
 
@@ -295,6 +295,6 @@ def test_changes_of_one_gesture_are_one_undo_step() -> None:
 
 def test_the_tables_show_plausibility_warnings() -> None:
     upward = replace(load_robot("planar3r"), gravity=(0.0, 0.0, 9.81))
-    (found,) = robot_content(upward).findings
-    assert found.link == upward.name
-    assert "bodies fall upwards" in found.what
+    (finding,) = robot_content(upward).findings
+    assert finding.link == upward.name
+    assert "bodies fall upwards" in finding.what

@@ -30,7 +30,7 @@ def cell(
     return document_messages.Change(document="", key=key, gesture=gesture, edit=edit, **more)
 
 
-JOURNAL_OF_0_2: list[tuple[dict[str, Any], document_messages.Alteration]] = [
+OLD_JOURNAL: list[tuple[dict[str, Any], document_messages.Alteration]] = [
     (
         {"kind": "robot_change", "gesture": "g", "edit": {"kind": "rename", "link": "a", "name": "b"}},
         document_messages.Change(document="", gesture="g", edit=RenameLink(link="a", name="b")),
@@ -51,26 +51,26 @@ JOURNAL_OF_0_2: list[tuple[dict[str, Any], document_messages.Alteration]] = [
 ]
 
 
-@pytest.mark.parametrize(("written", "meant"), JOURNAL_OF_0_2)
+@pytest.mark.parametrize(("written", "expected"), OLD_JOURNAL)
 def test_journaled_requests_of_version_0_2_0_are_converted(
-    written: dict[str, Any], meant: document_messages.Alteration
+    written: dict[str, Any], expected: document_messages.Alteration
 ) -> None:
-    assert type(meant).model_validate({**converted(written), "document": ""}) == meant
+    assert type(expected).model_validate({**converted(written), "document": ""}) == expected
 
 
 def requests(seed: int, count: int) -> list[Any]:
     """Letters typed into cells, several to a cell, with undo and redo between them."""
     random_ = random.Random(seed)
-    made: list[Any] = []
-    while len(made) < count:
-        gesture = f"{seed} {len(made)}" if random_.random() < 0.7 else ""
+    result: list[Any] = []
+    while len(result) < count:
+        gesture = f"{seed} {len(result)}" if random_.random() < 0.7 else ""
         link, column = f"link{random_.randrange(1, 8)}", random_.choice(["a", "d", "mass", "alpha", "Ixx"])
         for _ in range(random_.randrange(1, 5)):
-            made.append(cell(f"{seed} {len(made)}", link, column, f"{random_.random():.3f}", gesture))
+            result.append(cell(f"{seed} {len(result)}", link, column, f"{random_.random():.3f}", gesture))
         for kind in (document_messages.Undo, document_messages.Redo):
             for _ in range(random_.randrange(3)):
-                made.append(kind(document="", key=f"{seed} {len(made)}"))
-    return made
+                result.append(kind(document="", key=f"{seed} {len(result)}"))
+    return result
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -184,16 +184,16 @@ def test_a_robot_edit_repeated_after_a_crash_is_applied_once(disk: Disk, tmp_pat
 def test_a_page_finds_its_robot_after_a_server_restart(disk: Disk) -> None:
     async def scenario() -> None:
         first = disk.robots()
-        made = first.new()
-        await first.save(made, "arm.json", overwrite=False)
+        opened = first.new()
+        await first.save(opened, "arm.json", overwrite=False)
         first.end()
         robots = disk.robots()
         open_file = robots.attach("0123456789abcdef", "arm.json")
-        assert (open_file.key, open_file.robot) == ("0123456789abcdef", made.robot)
+        assert (open_file.key, open_file.robot) == ("0123456789abcdef", opened.robot)
         assert robots.attach("f" * 16, "arm.json") is open_file
         assert robots["f" * 16] is open_file
         assert robots.attach("e" * 16, origin="kr180").robot == load_robot("kr180")
-        assert robots.attach("d" * 16).robot == made.robot
+        assert robots.attach("d" * 16).robot == opened.robot
 
     going(scenario)
 

@@ -37,27 +37,27 @@ def test_a_run_continued_after_going_back_equals_the_original_run(name: str) -> 
     history.return_to_sample(before - 1)
     assert before - 20 < history.recorded < before, "one step back is at most one step of the solver"
     history.return_to_sample(before // 2)
-    kept = history.recorded
-    assert 0.8 * before // 2 < kept <= before // 2
+    remaining = history.recorded
+    assert 0.8 * before // 2 < remaining <= before // 2
     history.run.advance()
-    rest = history.samples(kept)
-    assert rest.begin == kept
-    np.testing.assert_array_equal(rest.time, whole.time[kept:])
-    np.testing.assert_array_equal(rest.signals, whole.signals[:, kept:])
+    rest = history.samples(remaining)
+    assert rest.begin == remaining
+    np.testing.assert_array_equal(rest.time, whole.time[remaining:])
+    np.testing.assert_array_equal(rest.signals, whole.signals[:, remaining:])
 
 
 def test_every_instant_is_reachable_with_a_bounded_number_of_checkpoints(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("armblocks.studio.runs.history.MOST_BYTES", 20_000)
+    monkeypatch.setattr("armblocks.studio.runs.history.MAX_BYTES", 20_000)
     history = RunHistory(CompiledDiagram(load_diagram("falling_pendulum", BLOCKS)))
     for _ in range(200):
         history.step()
     marks = history._snapshots  # pyright: ignore[reportPrivateUsage]
     assert len(marks) < 100
-    for wanted in (150, 77, 3):
-        history.return_to_sample(wanted)
-        assert wanted - 5 < history.recorded <= wanted
+    for row in (150, 77, 3):
+        history.return_to_sample(row)
+        assert row - 5 < history.recorded <= row
 
 
 def test_tuned_values_apply_from_the_instant_of_return() -> None:
@@ -79,11 +79,11 @@ def test_tuned_values_apply_from_the_instant_of_return() -> None:
 
 
 def test_tunable_parameters_are_listed_with_their_bounds() -> None:
-    found = {tunable.path: tunable for tunable in tunables(load_diagram("van_der_pol_pid", BLOCKS))}
-    assert "PID.P" in found
+    by_path = {tunable.path: tunable for tunable in tunables(load_diagram("van_der_pol_pid", BLOCKS))}
+    assert "PID.P" in by_path
     block = load_diagram("van_der_pol_pid", BLOCKS).block("PID")
-    assert found["PID.P"].value == block.parameter_value("P")
-    assert all(tunable.doc for tunable in found.values())
+    assert by_path["PID.P"].value == block.parameter_value("P")
+    assert all(tunable.doc for tunable in by_path.values())
 
 
 class Listener:

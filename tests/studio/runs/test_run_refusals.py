@@ -29,11 +29,11 @@ def widths() -> Diagram:
     return builder.draft()
 
 
-@pytest.mark.parametrize("made", [open_input, widths])
+@pytest.mark.parametrize("build", [open_input, widths])
 def test_a_worker_and_a_file_give_the_same_error_for_an_invalid_model(
-    made: Callable[[], Diagram], tmp_path: Path
+    build: Callable[[], Diagram], tmp_path: Path
 ) -> None:
-    source = diagram_to_bytes(made(), load_robot)
+    source = diagram_to_bytes(build(), load_robot)
     with pytest.raises(ArmblocksError) as of_file:
         diagram_from_bytes(source, "model", BLOCKS, load_robot)
     with pytest.raises(ArmblocksError) as of_run:

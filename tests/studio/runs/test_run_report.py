@@ -7,7 +7,7 @@ import pytest
 from armblocks.errors import SimulationError
 from armblocks.studio.runs import report as run_report
 
-WAY_OUT = "shorten the run, or use 'armblocks run'"
+REMEDY = "shorten the run, or use 'armblocks run'"
 
 
 @pytest.mark.parametrize(
@@ -17,4 +17,4 @@ WAY_OUT = "shorten the run, or use 'armblocks run'"
 def test_a_failed_report_raises_an_error_with_reason_and_remedy(sent: bytes, what: str) -> None:
     with pytest.raises(SimulationError) as failed:
         run_report._page(sent)
-    assert (failed.value.what, failed.value.where, failed.value.fix) == (what, "report", WAY_OUT)
+    assert (failed.value.what, failed.value.where, failed.value.fix) == (what, "report", REMEDY)

@@ -27,7 +27,7 @@ from armblocks.studio.runs.history import RunHistory
 from armblocks.studio.server.hub import Hub
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals and limits of POSIX")
-PATIENCE_SECONDS = 60.0
+TIMEOUT_SECONDS = 60.0
 """Time limit far above any normal waiting time, s, so that a hang fails the test."""
 
 
@@ -59,7 +59,7 @@ class Client:
 
     async def until(self, run: str, *states: str) -> dict[str, Any]:
         """Wait for the first message that reports one of these states of a run."""
-        async with asyncio.timeout(PATIENCE_SECONDS):
+        async with asyncio.timeout(TIMEOUT_SECONDS):
             while True:
                 self.news.clear()
                 for event in self.events:
@@ -85,9 +85,9 @@ def run_scenario(folder: Path, scenario: Callable[[Client], Awaitable[None]]) ->
     asyncio.run(going())
 
 
-def in_worker(monkeypatch: pytest.MonkeyPatch, begin: Callable[[Connection], None]) -> None:
+def in_worker(monkeypatch: pytest.MonkeyPatch, start_worker: Callable[[Connection], None]) -> None:
     """Replace the start of the next workers; they then continue as usual."""
-    monkeypatch.setattr(workers, "_work", begin)
+    monkeypatch.setattr(workers, "_work", start_worker)
 
 
 # The following functions run in workers.
@@ -120,17 +120,17 @@ def hang_in_native_code(pipe: Connection) -> None:
 
 def use_up_memory(pipe: Connection) -> None:
     def more(_: RunHistory) -> None:
-        kept: list[bytes] = []
+        blocks_of_memory: list[bytes] = []
         while True:
-            kept.append(bytes(64 * 2**20))
+            blocks_of_memory.append(bytes(64 * 2**20))
 
-    run_worker.MOST_MEMORY = 4 * 2**30
+    run_worker.MAX_MEMORY_BYTES = 4 * 2**30
     RunHistory.add_snapshot = more
     run_worker.work(pipe)
 
 
 def use_up_the_processor(pipe: Connection) -> None:
-    run_worker.MOST_CPU_SECONDS = 1
+    run_worker.MAX_CPU_SECONDS = 1
     hang_in_python(pipe)
 
 
@@ -224,7 +224,7 @@ def test_a_paused_run_is_ended_at_the_time_limit(tmp_path: Path) -> None:
         last = await client.until(run, "failed")
         assert (
             last["fault"]["what"]
-            == f"the run exceeds its time limit of {run_process.MOST_SECONDS:g} s; it was ended"
+            == f"the run exceeds its time limit of {run_process.MAX_SECONDS:g} s; it was ended"
         )
 
     run_scenario(tmp_path, scenario)

@@ -29,9 +29,9 @@ def with_workers(going: Callable[[Workers], Awaitable[None]]) -> None:
 
 async def waiting_worker(pool: Workers) -> Worker:
     """The prepared worker for the next run."""
-    made = pool._next  # pyright: ignore[reportPrivateUsage]
-    assert made is not None
-    return await made
+    waiting = pool._next  # pyright: ignore[reportPrivateUsage]
+    assert waiting is not None
+    return await waiting
 
 
 def test_the_next_worker_is_started_while_one_is_in_use() -> None:
@@ -54,10 +54,10 @@ def test_a_worker_that_died_while_waiting_is_not_used() -> None:
         assert dead.process.pid is not None
         os.kill(dead.process.pid, signal.SIGTERM)
         await asyncio.to_thread(dead.process.join)
-        given = await pool.take()
-        assert given is not dead
-        assert given.process.is_alive()
-        given.end()
+        replacement = await pool.take()
+        assert replacement is not dead
+        assert replacement.process.is_alive()
+        replacement.end()
 
     with_workers(going)
 

@@ -91,15 +91,15 @@ def cookie(keys: Keys) -> dict[str, str]:
 
 def routes(app: Guard) -> list[tuple[str, str]]:
     """All routes of the application, so that the tests include new routes."""
-    found: list[tuple[str, str]] = []
+    entries: list[tuple[str, str]] = []
     for route in app._app.routes:  # pyright: ignore
         if isinstance(route, WebSocketRoute):
-            found.append(("websocket", route.path))
+            entries.append(("websocket", route.path))
         elif isinstance(route, Route):
-            found += [("http", route.path.replace("{document}", "x"))]
+            entries += [("http", route.path.replace("{document}", "x"))]
         elif isinstance(route, Mount):
-            found.append(("http", route.path + "/index.html"))
-    return found
+            entries.append(("http", route.path + "/index.html"))
+    return entries
 
 
 def test_every_route_except_login_and_health_needs_a_session(app: Guard) -> None:

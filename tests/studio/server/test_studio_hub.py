@@ -19,12 +19,12 @@ from armblocks.studio.runs import worker as run_worker
 from armblocks.studio.server.hub import Hub
 from armblocks.studio.server.launch import serve
 
-PATIENCE_SECONDS = 180
+TIMEOUT_SECONDS = 180
 
 
 async def until(true: Callable[[], bool]) -> None:
     """Let the hub run until a condition is true."""
-    async with asyncio.timeout(PATIENCE_SECONDS):
+    async with asyncio.timeout(TIMEOUT_SECONDS):
         while not true():
             await asyncio.sleep(0.005)
 
@@ -102,11 +102,11 @@ def test_a_group_needs_blocks_and_a_free_name(tmp_path: Path) -> None:
         with pytest.raises(ArmblocksError, match="a block is already named 'PID'"):
             await ask("change", document=key, key="2", edit=group)
         await ask("change", document=key, key="3", edit={**group, "name": "part"})
-        await ask("look", document=key, inside=["part"])
+        await ask("show_sheet", document=key, inside=["part"])
         inner = {"kind": "remove", "blocks": ["error"]}
         await ask("change", document=key, key="4", inside=["part"], edit=inner)
         with pytest.raises(ArmblocksError, match="there is no subsystem named 'error'"):
-            await ask("look", document=key, inside=["error"])
+            await ask("show_sheet", document=key, inside=["error"])
         await ask("undo", document=key)
         await ask("undo", document=key)  # the subsystem is removed, so the page shows the top sheet
 
@@ -139,11 +139,11 @@ def test_a_failed_start_raises_an_error_with_the_reason(tmp_path: Path) -> None:
         built_page(tmp_path)
     import socket
 
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        listener.listen()
         with pytest.raises(InputError, match=r"port \d+ cannot be used"):
-            serve(tmp_path, "", port=taken.getsockname()[1], open_browser=False, announce=print)
+            serve(tmp_path, "", port=listener.getsockname()[1], open_browser=False, announce=print)
 
 
 def test_a_run_without_memory_fails_with_an_error_message(monkeypatch: pytest.MonkeyPatch) -> None:

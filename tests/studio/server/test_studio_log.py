@@ -18,7 +18,7 @@ from websockets.sync.client import connect
 
 from armblocks.studio.server.guard import Keys
 from armblocks.studio.server.terminal_log import log_settings
-from conftest import PATIENCE_MS, Studio
+from conftest import TIMEOUT_MS, Studio
 from interruptible import killed_at_the_end
 
 CONTENT = "what-nobody-else-should-read"
@@ -33,7 +33,7 @@ def status(address: str, headers: dict[str, str]) -> tuple[int, str]:
     """Return status and cookie of a response."""
     requested = urllib.request.Request(address, headers=headers)
     try:
-        with urllib.request.build_opener(NoRedirect).open(requested, timeout=PATIENCE_MS / 1000) as answer:
+        with urllib.request.build_opener(NoRedirect).open(requested, timeout=TIMEOUT_MS / 1000) as answer:
             return answer.status, answer.headers.get("set-cookie", "")
     except urllib.error.HTTPError as refused:
         with refused:
@@ -92,7 +92,7 @@ def _output_after_the_login(studio: Studio) -> tuple[str, tuple[str, ...]]:
     output = studio.process.stdout
     studio.process.terminate()
     rest = output.read()
-    studio.process.wait(timeout=PATIENCE_MS / 1000)
+    studio.process.wait(timeout=TIMEOUT_MS / 1000)
     return rest, (key, session, CONTENT)
 
 

@@ -31,12 +31,12 @@ from armblocks.studio.sheet.document import Document
 from armblocks.studio.sheet.lines import SheetLines, changed_lines
 from armblocks.studio.sheet.shown import sheet, sheet_change
 
-HERE = Place(x=0, y=0)
+ORIGIN = Place(x=0, y=0)
 
 
 def drawing() -> Document:
     document = Document(Diagram(name="d", blocks={}), load_robot)
-    blocks = [NewBlock(name=f"b{k}", type="Gain", place=HERE) for k in range(4)]
+    blocks = [NewBlock(name=f"b{k}", type="Gain", place=ORIGIN) for k in range(4)]
     document.edit(AddBlocks(blocks=blocks))
     return document
 
@@ -49,7 +49,7 @@ def gain(block: str, value: float) -> SetParameters:
     return SetParameters(block=block, values={"gain": value})
 
 
-CLASHES: list[tuple[DiagramEdit, DiagramEdit]] = [
+CONFLICTING: list[tuple[DiagramEdit, DiagramEdit]] = [
     (gain("b0", 2.0), gain("b0", 3.0)),
     (gain("b0", 2.0), RemoveBlocks(blocks=["b0"])),
     (gain("b0", 2.0), Rename(block="b0", name="other")),
@@ -61,17 +61,17 @@ CLASHES: list[tuple[DiagramEdit, DiagramEdit]] = [
     (Connect(wire=Wire(source="b0/y", target="b2/u")), RemoveBlocks(blocks=["b0"])),
     (gain("b0", 2.0), GroupBlocks(blocks=["b0", "b1"], name="S")),
 ]
-PEACE: list[tuple[DiagramEdit, DiagramEdit]] = [
+COMPATIBLE: list[tuple[DiagramEdit, DiagramEdit]] = [
     (gain("b0", 2.0), gain("b1", 3.0)),
     (gain("b0", 2.0), MoveBlocks(places={"b0": Place(x=9, y=0)})),
     (RemoveBlocks(blocks=["b0"]), gain("b1", 2.0)),
     (Connect(wire=Wire(source="b0/y", target="b2/u")), Connect(wire=Wire(source="b0/y", target="b3/u"))),
     (gain("b0", 2.0), gain("b0", 2.0)),
-    (gain("b0", 2.0), AddBlocks(blocks=[NewBlock(name="new", type="Gain", place=HERE)])),
+    (gain("b0", 2.0), AddBlocks(blocks=[NewBlock(name="new", type="Gain", place=ORIGIN)])),
 ]
 
 
-@pytest.mark.parametrize(("theirs", "mine"), CLASHES)
+@pytest.mark.parametrize(("theirs", "mine"), CONFLICTING)
 def test_an_edit_that_conflicts_with_another_page_is_refused(theirs: DiagramEdit, mine: DiagramEdit) -> None:
     document = drawing()
     base = document.version
@@ -88,7 +88,7 @@ def test_an_edit_that_conflicts_with_another_page_is_refused(theirs: DiagramEdit
     document.perform(change("me", document.version, mine))  # accepted after seeing the change
 
 
-@pytest.mark.parametrize(("theirs", "mine"), PEACE)
+@pytest.mark.parametrize(("theirs", "mine"), COMPATIBLE)
 def test_edits_of_different_aspects_are_both_applied(theirs: DiagramEdit, mine: DiagramEdit) -> None:
     document, other_order = drawing(), drawing()
     base = document.version
@@ -171,7 +171,7 @@ def random_edit(random_: random.Random, page: Page) -> DiagramEdit:
             gain(block, random_.random()),
             MoveBlocks(places={block: Place(x=random_.random(), y=0)}),
             RemoveBlocks(blocks=[block]),
-            AddBlocks(blocks=[NewBlock(name=f"b{random_.randrange(6)}", type="Gain", place=HERE)]),
+            AddBlocks(blocks=[NewBlock(name=f"b{random_.randrange(6)}", type="Gain", place=ORIGIN)]),
             Connect(wire=Wire(source=f"{block}/y", target=f"{other}/u"), replace=True),
         ]
     )
@@ -184,7 +184,7 @@ def test_random_edits_of_two_pages_overwrite_no_unseen_change_and_converge(seed:
     random_ = random.Random(seed)
     document, lines = drawing(), SheetLines()
     pages = [Page("one", document), Page("two", document)]
-    done: list[tuple[int, str, set[tuple[str, ...]]]] = []
+    applied: list[tuple[int, str, set[tuple[str, ...]]]] = []
     for _ in range(200):
         page = random_.choice(pages)
         if page.coming and random_.random() < 0.6:
@@ -197,10 +197,10 @@ def test_random_edits_of_two_pages_overwrite_no_unseen_change_and_converge(seed:
             assert document.diagram is before
             continue
         touched = changed_aspects(before, document.diagram)
-        for version, author, theirs in done:
+        for version, author, theirs in applied:
             if author != page.name and version > page.version:
                 assert not clash(touched, theirs), "an edit that the page had not seen was overwritten"
-        done.append((document.version, page.name, touched))
+        applied.append((document.version, page.name, touched))
         changed = changed_lines(lines.of(before), lines.of(document.diagram))
         for listener in pages:
             listener.coming.append((document.version, sheet_change(before, document.diagram, changed)))

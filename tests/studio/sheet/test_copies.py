@@ -35,13 +35,13 @@ def copy(diagram: Diagram, *names: str, notes: tuple[str, ...] = ()) -> str:
 
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_pasting_all_blocks_into_an_empty_diagram_reproduces_the_diagram(name: str) -> None:
-    there = placed(load_diagram(name, BLOCKS))
-    document = Document(Diagram(name=there.name, blocks={}, mask=there.mask), load_robot)
-    document.edit(PasteBlocks(text=copy(there, *there.blocks, notes=tuple(there.notes))))
-    here = document.diagram
-    bare = dataclasses.replace(there, settings=here.settings, description="")
-    assert not diagram_difference(bare, here)
-    assert (here.layout, here.bends, here.notes) == (there.layout, there.bends, there.notes)
+    original = placed(load_diagram(name, BLOCKS))
+    document = Document(Diagram(name=original.name, blocks={}, mask=original.mask), load_robot)
+    document.edit(PasteBlocks(text=copy(original, *original.blocks, notes=tuple(original.notes))))
+    pasted = document.diagram
+    bare = dataclasses.replace(original, settings=pasted.settings, description="")
+    assert not diagram_difference(bare, pasted)
+    assert (pasted.layout, pasted.bends, pasted.notes) == (original.layout, original.bends, original.notes)
     document.undo()
     assert document.diagram.blocks == {}
 
@@ -50,8 +50,8 @@ def test_duplicates_keep_library_links_and_bends() -> None:
     document = Document(placed(load_diagram("puma560_servos", BLOCKS)), load_robot)
     wire = next(wire for wire in document.diagram.connections if wire.target.block == "servo 2")
     source, target = wire.source.block, wire.target.block
-    led = Wire(source=str(wire.source), target=str(wire.target), bends=(200.0, 50.0, 300.0))
-    document.edit(BendWires(wires=[led]))
+    routed = Wire(source=str(wire.source), target=str(wire.target), bends=(200.0, 50.0, 300.0))
+    document.edit(BendWires(wires=[routed]))
     names = {source: "a", target: "b"}
     document.edit(PasteBlocks(text=copy(document.diagram, *names), names=names, shift=(30.0, 10.0)))
     after = document.diagram

@@ -15,7 +15,7 @@ from page_requests import Events, run_scenario
 from armblocks.errors import ArmblocksError
 from armblocks.studio.server.hub import Hub
 
-PATIENCE_SECONDS = 180
+TIMEOUT_SECONDS = 180
 Ask = Callable[..., Awaitable[Any]]
 ROWS = "time [ms],x,y [deg],word\n0,1,10,a\n5,2,20,b\n20,4,30,c\n"
 
@@ -48,7 +48,7 @@ def called(name: str, function: str, kind: str = "PythonFunction") -> dict[str, 
 
 async def findings(message: Events, since: int) -> list[dict[str, Any]]:
     """The findings of the next check after a number of messages."""
-    async with asyncio.timeout(PATIENCE_SECONDS):
+    async with asyncio.timeout(TIMEOUT_SECONDS):
         while True:
             for event in message[since:]:
                 if event["kind"] == "checked":
@@ -57,7 +57,7 @@ async def findings(message: Events, since: int) -> list[dict[str, Any]]:
 
 
 async def end_of_run(message: Events, since: int) -> dict[str, Any]:
-    async with asyncio.timeout(PATIENCE_SECONDS):
+    async with asyncio.timeout(TIMEOUT_SECONDS):
         while True:
             for event in message[since:]:
                 if event["kind"] == "run_progress" and event["state"] in ("done", "failed"):
@@ -92,8 +92,10 @@ def test_a_file_is_previewed_and_its_columns_are_chosen(tmp_path: Path) -> None:
         document = await ask("new", document_kind="diagram")
         since = len(message)
         await ask("change", document=document, key="0", edit=played("all", file="data/drive.csv"))
-        (found,) = await findings(message, since)  # as on the command line: all columns contain one with text
-        assert "the column 'word' has no numbers: line 2 contains 'a'" in found["what"]
+        (finding,) = await findings(
+            message, since
+        )  # as on the command line: all columns contain one with text
+        assert "the column 'word' has no numbers: line 2 contains 'a'" in finding["what"]
         await ask("undo", document=document)
         edit = played("drive", file="data/drive.csv", time="time [ms]", columns=["x"])
         since = len(message)
@@ -125,8 +127,11 @@ def test_a_table_that_cannot_be_read_is_a_finding_at_its_block(tmp_path: Path) -
         (tmp_path / "a.csv").write_text("time,x\n0,1\n0,2\n0,3\n")
         since = len(message)
         document = (await ask("open", path="m.json"))[0]
-        (found,) = await findings(message, since)
-        assert (found["block"], "row 3 of the table is 0, as in the two rows before" in found["what"]) == (
+        (finding,) = await findings(message, since)
+        assert (
+            finding["block"],
+            "row 3 of the table is 0, as in the two rows before" in finding["what"],
+        ) == (
             "a",
             True,
         )
@@ -149,15 +154,15 @@ def test_a_dropped_table_is_stored_and_replaced_only_on_request(tmp_path: Path) 
         def content(text: str) -> str:
             return base64.b64encode(text.encode()).decode()
 
-        assert await ask("keep_file", name="a.csv", content=content(ROWS)) == {
+        assert await ask("store_file", name="a.csv", content=content(ROWS)) == {
             "path": "a.csv",
             "stored": True,
         }
-        assert (await ask("keep_file", name="a.csv", content=content(ROWS)))["stored"]  # the same content
+        assert (await ask("store_file", name="a.csv", content=content(ROWS)))["stored"]  # the same content
         other = content("time,x\n0,1\n1,2\n")
-        assert not (await ask("keep_file", name="a.csv", content=other))["stored"]
+        assert not (await ask("store_file", name="a.csv", content=other))["stored"]
         assert (tmp_path / "a.csv").read_text() == ROWS
-        assert (await ask("keep_file", name="a.csv", content=other, replace=True))["stored"]
+        assert (await ask("store_file", name="a.csv", content=other, replace=True))["stored"]
         assert (tmp_path / "a.csv").read_text() == "time,x\n0,1\n1,2\n"
         refused = {
             "../b.csv": "b.csv",
@@ -165,13 +170,13 @@ def test_a_dropped_table_is_stored_and_replaced_only_on_request(tmp_path: Path) 
             "b.json": "the studio does not open",
             ".b.csv": "cannot be a file name",
         }
-        assert (await ask("keep_file", name="../b.csv", content=other))["path"] == "b.csv"
+        assert (await ask("store_file", name="../b.csv", content=other))["path"] == "b.csv"
         for name in list(refused)[1:]:
             with pytest.raises(ArmblocksError, match=refused[name]):
-                await ask("keep_file", name=name, content=other)
+                await ask("store_file", name=name, content=other)
         matlab = base64.b64encode(b"MATLAB 7.3 MAT-file, Platform" + bytes(200)).decode()
         with pytest.raises(ArmblocksError, match=r"a MAT file of version 7\.3"):
-            await ask("keep_file", name="c.mat", content=matlab)
+            await ask("store_file", name="c.mat", content=matlab)
         assert sorted(path.name for path in tmp_path.iterdir()) == ["a.csv", "b.csv"]
 
     run_scenario(tmp_path, scenario, runs=True)
@@ -198,8 +203,8 @@ def test_code_runs_only_after_its_content_was_trusted(tmp_path: Path) -> None:
         document = await ask("new", document_kind="diagram")
         since = len(message)
         await ask("change", document=document, key="1", edit=called("f", "law.py:law"))
-        (found,) = await findings(message, since)
-        assert (found["block"], "the code of law.py is not trusted" in found["what"]) == ("f", True)
+        (finding,) = await findings(message, since)
+        assert (finding["block"], "the code of law.py is not trusted" in finding["what"]) == ("f", True)
         since = len(message)
         await ask("run", document=document, speed=None, tuned={})
         assert "not trusted" in (await end_of_run(message, since))["fault"]["what"]
@@ -224,9 +229,9 @@ def test_code_runs_only_after_its_content_was_trusted(tmp_path: Path) -> None:
         assert not (tmp_path / "ran").exists()
         since = len(message)
         await ask("trust_source", file="law.py", digest=source["digest"], trusted=True)
-        (found,) = await findings(message, since)
-        assert found["block"] == "f"
-        assert "law.py, line 6: ZeroDivisionError" in found["what"]
+        (finding,) = await findings(message, since)
+        assert finding["block"] == "f"
+        assert "law.py, line 6: ZeroDivisionError" in finding["what"]
 
     run_scenario(tmp_path, scenario, runs=True)
 

@@ -17,17 +17,17 @@ def test_a_copy_for_a_bus_marks_its_switch() -> None:
     three = builder.add("three", BusCreator(names="a"), builder.add("x", Constant(value=(1.0, 2.0, 3.0))))
     two = builder.add("two", BusCreator(names="a"), builder.add("y", Constant(value=(1.0, 2.0))))
     builder.add("switch", Switch(), three, builder.add("which", Constant()), two)
-    found = marked(builder.draft())
-    assert list(found) == ["switch"]
-    assert "'u1' has shape (3,) and 'u3' has shape (2,)" in found["switch"]
+    markings = marked(builder.draft())
+    assert list(markings) == ["switch"]
+    assert "'u1' has shape (3,) and 'u3' has shape (2,)" in markings["switch"]
 
 
 def test_a_vector_at_a_control_input_marks_its_subsystem() -> None:
     builder = DiagramBuilder("shapes")
     c = builder.add("c", Constant(value=(1.0, 2.0)))
     builder.add("enabled", EnabledSubsystem(), c, enable=c)
-    found = marked(builder.draft())
-    assert found == {"enabled": "'c/y' gives shape (2,) but 'enabled/enable' takes shape ()"}
+    markings = marked(builder.draft())
+    assert markings == {"enabled": "'c/y' gives shape (2,) but 'enabled/enable' takes shape ()"}
 
 
 def test_signals_of_a_subsystem_have_shapes_on_its_sheet_and_outside() -> None:

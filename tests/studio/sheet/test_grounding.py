@@ -18,7 +18,7 @@ from armblocks.studio.protocol.messages.sheet_edits import CommentBlocks, Ground
 from armblocks.studio.sheet.document import Document
 from armblocks.studio.sheet.placing import placed
 
-WITHOUT = ("Merge", "BusSelector", "BusAssignment")
+NOT_GROUNDED = ("Merge", "BusSelector", "BusAssignment")
 """Block types whose inputs zeros cannot drive; the other inputs of a Bus Assignment are grounded."""
 
 
@@ -38,7 +38,7 @@ def test_every_block_type_can_be_grounded(kind: str) -> None:
     after = document.diagram
     left = {ref.port for ref in open_inputs({"": after})}
     allowed = {port.name for port in block.input_ports()} if kind == "Merge" else {"bus"}
-    assert left <= (allowed if kind in WITHOUT else set())
+    assert left <= (allowed if kind in NOT_GROUNDED else set())
     assert {ref.block for ref in {wire.source for wire in after.connections}} >= (
         {"it"} if block.output_ports() else set()
     )

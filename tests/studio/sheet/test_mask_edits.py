@@ -209,20 +209,20 @@ terms = st.recursive(
 @settings(deadline=None, max_examples=80, derandomize=True)
 @given(terms, st.permutations(["a", "b", "k", "x1"]))
 def test_renaming_changes_only_whole_names(text: str, order: list[str]) -> None:
-    there = dict(zip(["a", "b", "k", "x1"], order, strict=True))
-    back = {new: old for old, new in there.items()}
-    renamed = renamed_in(text, there)
+    renaming = dict(zip(["a", "b", "k", "x1"], order, strict=True))
+    back = {new: old for old, new in renaming.items()}
+    renamed = renamed_in(text, renaming)
     assert renamed_in(renamed, back) == text
-    assert Formula(renamed, "").names == {there.get(name, name) for name in Formula(text, "").names}
+    assert Formula(renamed, "").names == {renaming.get(name, name) for name in Formula(text, "").names}
 
 
 def test_a_page_can_read_and_set_a_mask(tmp_path: Path) -> None:
     async def scenario(hub: Any, ask: Any, events: Events) -> None:
         key = await ask("open_shipped", document_kind="diagram", name="puma560_servos")
-        found = await ask("ask_mask", document=key, block="servo 1")
-        assert [rule["name"] for rule in found["parameters"]] == ["w", "G", "Jm", "B", "limit", "q0"]
+        mask_edit = await ask("ask_mask", document=key, block="servo 1")
+        assert [rule["name"] for rule in mask_edit["parameters"]] == ["w", "G", "Jm", "B", "limit", "q0"]
         await ask("change", document=key, edit={"kind": "break_link", "block": "servo 1"})
-        mask = {**found, "block": "servo 1", "name": "Servo"}
+        mask = {**mask_edit, "block": "servo 1", "name": "Servo"}
         await ask("change", document=key, edit=mask)
         change = [event for event in events if event["kind"] == "changed"][-1]["change"]
         assert ">Servo<" in change["sheet"]["blocks"]["servo 1"]["face"]

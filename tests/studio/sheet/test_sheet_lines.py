@@ -34,8 +34,8 @@ def test_lines_do_not_avoid_a_block_that_may_be_inserted_into_them() -> None:
     others = [wire for wire in sheet.connections if wire.source.block != "one"]
 
     def path(passed: str | None) -> list[tuple[float, float]]:
-        found = lines.dragged(sheet, over, others, sheet.bends, passed)
-        return found["x2/y"].paths["x1/u"]
+        changed = lines.dragged(sheet, over, others, sheet.bends, passed)
+        return changed["x2/y"].paths["x1/u"]
 
     assert path("one") == lines.of(sheet)["x2/y"].paths["x1/u"]
     assert path(None) != path("one")

@@ -231,8 +231,8 @@ def test_refused_edits_give_the_reason() -> None:
     assert "a block is already named 'gain'" in refused(second)
     assert "is already driven by 'sine/y'" in refused(Connect(wire=Wire(source="sine/y", target="gain/u")))
     assert "'gain' is not a port" in refused(Connect(wire=Wire(source="gain", target="gain/u")))
-    gone = Wire(source="gain/y", target="gain/u")
-    assert "the wire gain/y -> gain/u does not exist" in refused(RemoveBlocks(wires=[gone]))
+    missing = Wire(source="gain/y", target="gain/u")
+    assert "the wire gain/y -> gain/u does not exist" in refused(RemoveBlocks(wires=[missing]))
     many = [NewBlock(name=f"b{k}", type="Gain", place=place) for k in range(20_000)]
     assert "the sheet would have 20002 blocks" in refused(AddBlocks(blocks=many))
     wrong = SetParameters(block="gain", values={"gain": "import os"})
@@ -376,8 +376,10 @@ def test_blocks_are_found_on_all_sheets_by_name_type_and_value() -> None:
     diagram = document.diagram
     first, *_ = find(diagram, "pid")
     assert (first.inside, first.name) == (["inner"], "PID")
-    assert {found.name for found in find(diagram, "integrator")} == {"x1", "x2"}
-    assert ("damping", "gain = 0.5") in {(found.name, found.match) for found in find(diagram, "gain 0.5")}
+    assert {block_found.name for block_found in find(diagram, "integrator")} == {"x1", "x2"}
+    assert ("damping", "gain = 0.5") in {
+        (block_found.name, block_found.match) for block_found in find(diagram, "gain 0.5")
+    }
     assert find(diagram, "no such thing") == find(diagram, " ") == []
     tree = outline(diagram)
     assert [(sub.name, sub.blocks) for sub in tree.subsystems] == [("inner", len(diagram_inside(diagram)))]

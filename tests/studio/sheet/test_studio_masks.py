@@ -75,7 +75,7 @@ def test_a_page_opens_a_masked_subsystem_and_evaluates_formulas(tmp_path: Path) 
         key = await ask("open_shipped", document_kind="diagram", name="puma560_servos")
         where = {"document": key, "inside": [], "block": "servo 1", "type": "Subsystem"}
         assert await ask("typed", **where, parameter="w", text="w/2 + 1") == 11.0
-        await ask("look", document=key, inside=["servo 1"])
+        await ask("show_sheet", document=key, inside=["servo 1"])
         opened = [event for event in events if event["kind"] == "opened"][-1]
         assert opened["content"]["sheet"]["linked"] == ["servo 1"]
         assert opened["content"]["sheet"]["link"] == "joint_servos#JointServo"

@@ -18,7 +18,7 @@ from armblocks.studio.sheet.edits import EDITS
 
 BEGINNINGS = ("puma560_servos", "van_der_pol_pid", "kr180model", "puma560_payload_drop")
 SEEDS = 28
-LEAST = 3
+MIN_EDITS = 3
 """Minimum number of applied edits of each kind, so that the test covers all kinds."""
 
 
@@ -31,7 +31,7 @@ def test_the_generators_cover_every_kind_of_edit() -> None:
 
 
 def test_random_edits_are_undone_redone_and_recovered_from_the_journal(tmp_path: Path) -> None:
-    done: Counter[type] = Counter()
+    applied: Counter[type] = Counter()
     inner = 0
 
     async def scenario() -> None:
@@ -40,9 +40,9 @@ def test_random_edits_are_undone_redone_and_recovered_from_the_journal(tmp_path:
             (tmp_path / str(seed) / "project").mkdir(parents=True)
             disk, chance = Disk(tmp_path / str(seed)), random.Random(seed)
             documents = disk.documents()
-            found = documents.open_shipped(BEGINNINGS[seed % len(BEGINNINGS)])
-            document = found.document
-            begin = content(document)
+            open_file = documents.open_shipped(BEGINNINGS[seed % len(BEGINNINGS)])
+            document = open_file.document
+            original = content(document)
             forms = [document.diagram]
             for number in range(40):
                 path, edit = random_edit(document, chance)
@@ -50,23 +50,23 @@ def test_random_edits_are_undone_redone_and_recovered_from_the_journal(tmp_path:
                     document="", key=f"{seed} {number}", inside=path, edit=edit
                 )
                 try:
-                    documents.perform(found, request)
+                    documents.perform(open_file, request)
                 except ArmblocksError:
                     assert document.diagram is forms[-1]
                     continue
                 assert document.undo_title == EDITS.title(edit)
-                done[type(edit)] += 1
+                applied[type(edit)] += 1
                 inner += bool(path)
                 forms.append(document.diagram)
             end = content(document)
-            again = disk.as_after_a_crash(tmp_path / f"{seed} crashed").documents().attach(found.key)
+            again = disk.as_after_a_crash(tmp_path / f"{seed} crashed").documents().attach(open_file.key)
             for one in (document, again.document):
                 assert content(one) == end
                 for expected in reversed(forms[:-1]):
                     one.undo()
                     assert one.diagram == expected
                 assert one.undo_title == ""
-                assert content(one) == begin
+                assert content(one) == original
                 for expected in forms[1:]:
                     one.redo()
                     assert one.diagram == expected
@@ -75,7 +75,7 @@ def test_random_edits_are_undone_redone_and_recovered_from_the_journal(tmp_path:
 
     going(scenario)
     for kind in MAKERS:
-        assert done[kind] >= LEAST, (kind, done)
+        assert applied[kind] >= MIN_EDITS, (kind, applied)
     assert inner > SEEDS
 
 

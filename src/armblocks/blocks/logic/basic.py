@@ -36,7 +36,7 @@ from armblocks.diagram.signs import FaceSign, Words, graph, value_text
 from armblocks.equations import Shape
 from armblocks.errors import InputError
 
-_MOST_CONDITIONS = 12
+_MAX_CONDITIONS = 12
 _RELATIONS = {"==": "=", "~=": "≠", "<": "<", "<=": "≤", ">": ">", ">=": "≥"}
 """Relations in MATLAB's spelling, each with its mathematical sign."""
 _GATES: Mapping[str, tuple[Callable[[SX, SX], SX], bool]] = {
@@ -376,11 +376,11 @@ class TruthTable(Block):
                 allowed="an action for each decision, of entries 1, 0 and -1",
                 fix="correct the table",
             )
-        if rows.shape[1] > _MOST_CONDITIONS:
+        if rows.shape[1] > _MAX_CONDITIONS:
             raise InputError(
                 f"there are {rows.shape[1]} conditions",
                 where="TruthTable.decisions",
-                allowed=f"at most {_MOST_CONDITIONS}",
+                allowed=f"at most {_MAX_CONDITIONS}",
                 fix="use several tables",
             )
         table = rows.tolist()

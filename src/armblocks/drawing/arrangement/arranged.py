@@ -19,7 +19,7 @@ _LANE = 11.0
 _PART_GAP = 44.0
 _MANY_NODES = 120
 """A part with more nodes is ordered only once, without exchanged lines at sums."""
-_MOST_WIDTH = 900.0
+_MAX_WIDTH = 900.0
 """Maximum width of a row of unconnected blocks, px."""
 
 
@@ -39,7 +39,7 @@ def arranged_boxes(diagram: Diagram, sized: Mapping[str, Box]) -> dict[str, Box]
     x = row_height = 0.0
     for box in (network.boxes[k] for k in unconnected):
         width = max(box.width, box.name_width)
-        if x and x + width > _MOST_WIDTH:
+        if x and x + width > _MAX_WIDTH:
             x, y, row_height = 0.0, y + row_height, 0.0
         placed[box.name] = box.at(round(x + (width - box.width) / 2), y)
         x, row_height = x + width + _GAP, max(row_height, box.height + NAME_ROOM + _GAP / 2)
@@ -91,13 +91,13 @@ def _best_order(network: Network, flow: Flow) -> tuple[Columns, list[list[int]]]
 def _lanes(columns: Columns, tops: Sequence[float], gap: int) -> int:
     """The maximum number of vertical lines side by side in the gap to the right of a column."""
     spans: dict[int, tuple[float, float]] = {}
-    for piece in columns.pieces:
-        if piece.gap != gap or not (piece.a.level and piece.b.level):
+    for segment in columns.segments:
+        if segment.gap != gap or not (segment.a.level and segment.b.level):
             continue
-        ends = tops[piece.a.node] + piece.a.port, tops[piece.b.node] + piece.b.port
+        ends = tops[segment.a.node] + segment.a.port, tops[segment.b.node] + segment.b.port
         if abs(ends[0] - ends[1]) > 1.5:
-            low, high = spans.get(piece.net, (ends[0], ends[0]))
-            spans[piece.net] = min(low, *ends), max(high, *ends)
+            low, high = spans.get(segment.net, (ends[0], ends[0]))
+            spans[segment.net] = min(low, *ends), max(high, *ends)
     events = sorted(
         [(low, 1) for low, _ in spans.values()] + [(high + 1.0, -1) for _, high in spans.values()]
     )

@@ -15,7 +15,7 @@ from armblocks.drawing.arrangement.feedback import Flow, forward_order
 from armblocks.drawing.arrangement.links import Link, Network
 
 _PASSES = 4
-_MOST_PATHS = 40
+_MAX_PATHS = 40
 _SINK_BONUS = 1000.0
 """Value of a path that ends at a sink, in blocks."""
 _FURTHER_TERM = 1.4
@@ -41,7 +41,7 @@ class End:
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class Segment:
     """A line between two neighbouring columns, or between two nodes of one column.
 
     ``gap``: number of the column to the left of the gap in which it runs.
@@ -63,7 +63,7 @@ class Columns:
     """Nodes in columns: first the blocks, then the dummy nodes of long lines."""
 
     column: list[int]
-    pieces: list[Piece]
+    segments: list[Segment]
     blocks: int
     paths: tuple[tuple[int, ...], ...]
     """The blocks of the main path, from its source to its sink, and then of further paths."""
@@ -155,7 +155,7 @@ def _paths(network: Network, flow: Flow) -> tuple[tuple[int, ...], ...]:
     ]
     remaining = set(range(len(network.names))) - flow.mirrored
     paths: list[tuple[int, ...]] = []
-    while len(paths) < _MOST_PATHS:
+    while len(paths) < _MAX_PATHS:
         links = [link for link in links if link.source in remaining and link.target in remaining]
         path = _best_path(network, links, remaining, sink_bonus=0.0 if paths else _SINK_BONUS)
         if len(path) < 2 and paths:
@@ -200,7 +200,7 @@ def _best_path(
 
 
 class _LineSplitter:
-    """Divides the lines into pieces between neighbouring columns, with dummy nodes in the columns."""
+    """Divides the lines into segments between neighbouring columns, with dummy nodes in the columns."""
 
     def __init__(
         self,
@@ -214,14 +214,14 @@ class _LineSplitter:
         self._column = list(column)
         self._path = {node: k for k, path in enumerate(paths) for node in path}
         self._steps = {step: k for k, path in enumerate(paths) for step in pairwise(path)}
-        self._pieces: list[Piece] = []
+        self._segments: list[Segment] = []
         self._nets: list[int] = []
         self._sides = _sum_ports(network, flow, paths, column)
         for node in exchanged:
             self._sides[node] = {port: -share for port, share in self._sides[node].items()}
 
     def columns(self) -> Columns:
-        """All nodes and pieces."""
+        """All nodes and segments."""
         nets: dict[tuple[int, int], list[Link]] = {}
         for link in self._network.links:
             nets.setdefault((link.source, link.output), []).append(link)
@@ -234,7 +234,7 @@ class _LineSplitter:
         ]
         return Columns(
             self._column,
-            self._pieces,
+            self._segments,
             len(self._network.names),
             self._paths,
             self._path,
@@ -256,7 +256,7 @@ class _LineSplitter:
             return End(len(column) - 1, True, 0.0, 0.0)
 
         def ahead(gap: int, target: int) -> End:
-            """The left end of the piece in a gap. Lines to several targets have separate dummy nodes."""
+            """The left end of the segment in a gap. Lines to several targets have separate dummy nodes."""
             end = start
             for at in range(source_column + 1, gap + 1):
                 before, end = end, dummy(at)
@@ -304,8 +304,8 @@ class _LineSplitter:
                 )
 
     def _join(self, net: int, gap: int, a: End, b: End) -> None:
-        """Add a piece of a line; a piece between two columns begins at its left end."""
-        self._pieces.append(Piece(net, gap, a, b))
+        """Add a segment of a line; a segment between two columns begins at its left end."""
+        self._segments.append(Segment(net, gap, a, b))
 
     def _end(self, block: int, right: bool, number: int, *, inputs: bool = True) -> End:
         box = self._network.boxes[block]

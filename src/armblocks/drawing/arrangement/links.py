@@ -1,4 +1,4 @@
-"""The connections of a diagram as links between numbered blocks, with the price of cutting each of them."""
+"""The connections of a diagram as links between numbered blocks, with the weight of cutting each of them."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from armblocks.diagram.signs import Outline
 from armblocks.drawing.block_boxes import Box
 
 _INTO_MEMORY = 30.0
-"""Price of a cut in front of an integrator, a filter or a plant."""
+"""Weight of a cut in front of an integrator, a filter or a plant."""
 _INTO_FUNCTION = 5.0
 _INTO_FURTHER_PORT = 2.0
 _INTO_SUM = 3.0
 _INTO_FURTHER_TERM = 1.5
 _FED_BACK = 1.0
-"""Price of a cut in front of a further input of a sum: with a plus, and with a minus."""
+"""Weight of a cut in front of a further input of a sum: with a plus, and with a minus."""
 _OUT_OF_MEMORY = 0.5
-"""Factor of the price of a link that leaves a block with a state, because states are usually fed back."""
+"""Factor of the weight of a link that leaves a block with a state, because states are usually fed back."""
 
 
 @dataclass(frozen=True)
@@ -30,8 +30,8 @@ class Link:
     output: int
     target: int
     input: int
-    price: float
-    """Price of cutting this link, relative to other links of the same loop."""
+    weight: float
+    """Weight of cutting this link, relative to other links of the same loop."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,15 +59,15 @@ class Network:
             ):
                 continue  # an incomplete diagram
             into = inputs[target.block][target.port]
-            price = _price(sized[target.block], into, memory[target.block])
-            price *= _OUT_OF_MEMORY if state[source.block] else 1.0
+            weight = _weight(sized[target.block], into, memory[target.block])
+            weight *= _OUT_OF_MEMORY if state[source.block] else 1.0
             links.append(
                 Link(
                     number[source.block],
                     outputs[source.block][source.port],
                     number[target.block],
                     into,
-                    price,
+                    weight,
                 )
             )
         return cls(names, tuple(sized[name] for name in names), tuple(links))
@@ -79,7 +79,7 @@ class Network:
             tuple(self.names[k] for k in members),
             tuple(self.boxes[k] for k in members),
             tuple(
-                Link(number[a.source], a.output, number[a.target], a.input, a.price)
+                Link(number[a.source], a.output, number[a.target], a.input, a.weight)
                 for a in self.links
                 if a.source in number
             ),
@@ -160,7 +160,7 @@ def _is_filter(block: Block) -> bool:
     )  # fmt: skip
 
 
-def _price(target: Box, port: int, memory: bool) -> float:
+def _weight(target: Box, port: int, memory: bool) -> float:
     if isinstance(target.block, kinds.Sum):
         if port == 0:
             return _INTO_SUM

@@ -12,9 +12,9 @@ from armblocks.drawing.arrangement.links import Link, Network
 
 _BEGINNING = 2.0
 _MIRRORED_STATE = 1.5
-"""Price of a block that only backward links feed, and of a plant that feeds only backward links."""
+"""Weight of a block that only backward links feed, and of a plant that feeds only backward links."""
 _ENTRY = 0.2
-"""Price of a block before the one at which signals enter a loop from outside."""
+"""Weight of a block before the one at which signals enter a loop from outside."""
 _PASSES = 8
 _FEW = 40
 """A search starts from every block of a loop with at most this number of blocks."""
@@ -37,7 +37,7 @@ def cut_links(network: Network) -> frozenset[int]:
         if loops[link.source] == loops[link.target] and rank[link.source] >= rank[link.target]
     }
     # A link is cut only if it closes a loop of links that are not cut.
-    for k in sorted(cut, key=lambda k: (-links[k].price, k)):
+    for k in sorted(cut, key=lambda k: (-links[k].weight, k)):
         link = links[k]
         if link.source == link.target:
             continue
@@ -82,33 +82,33 @@ def _strong_components(count: int, links: Sequence[Link]) -> list[list[int]]:
 
 
 def _cheapest_order(members: Sequence[int], network: Network) -> list[int]:
-    """The blocks of a loop in the order with the lowest price of backward links.
+    """The blocks of a loop in the order with the lowest weight of backward links.
 
     The order is that of a depth-first search, improved by moving single blocks. For a small loop it is the
     best result of searches from every block.
     """
     links = network.links
     inside = set(members)
-    price: dict[int, dict[int, float]] = {member: {} for member in members}
+    weight: dict[int, dict[int, float]] = {member: {} for member in members}
     entries: list[int] = []
     for link in links:
         if link.target not in inside or link.source == link.target:
             continue
         if link.source in inside:
-            prices = price[link.source]
-            prices[link.target] = prices.get(link.target, 0.0) + link.price
+            weights = weight[link.source]
+            weights[link.target] = weights.get(link.target, 0.0) + link.weight
         elif link.target not in entries and not network.is_constant(link.source):
             entries.append(link.target)
-    _protect_inputs(price, network)
-    after = {member: list(prices) for member, prices in price.items()}
+    _protect_inputs(weight, network)
+    after = {member: list(weights) for member, weights in weight.items()}
     if len(members) <= _MANY:
         for entry in entries:
             for member in members:
                 if member != entry:
-                    price[entry][member] = price[entry].get(member, 0.0) + _ENTRY
+                    weight[entry][member] = weight[entry].get(member, 0.0) + _ENTRY
     before: dict[int, dict[int, float]] = {member: {} for member in members}
-    for source, prices in price.items():
-        for target, value in prices.items():
+    for source, weights in weight.items():
+        for target, value in weights.items():
             before[target][source] = value
     inward = frozenset(link.target for link in links if link.target in inside and link.source not in inside)
     best: list[int] = []
@@ -118,31 +118,31 @@ def _cheapest_order(members: Sequence[int], network: Network) -> list[int]:
         for _ in range(_PASSES if len(members) <= _MANY else 2):
             moved = False
             for member in list(order):
-                moved |= _moved(order, member, price[member], before[member])
+                moved |= _moved(order, member, weight[member], before[member])
             if not moved:
                 break
-        cost = _cost(order, price, network, inward)
+        cost = _cost(order, weight, network, inward)
         if cost < least - 1e-6:
             best, least = order, cost
     return best
 
 
-def _protect_inputs(price: Mapping[int, dict[int, float]], network: Network) -> None:
-    """Make the price of a cut before a function higher than that of a cut after it."""
-    sources: dict[int, list[int]] = {member: [] for member in price}
-    for source, prices in price.items():
-        for target in prices:
+def _protect_inputs(weight: Mapping[int, dict[int, float]], network: Network) -> None:
+    """Make the weight of a cut before a function higher than that of a cut after it."""
+    sources: dict[int, list[int]] = {member: [] for member in weight}
+    for source, weights in weight.items():
+        for target in weights:
             sources[target].append(source)
     for member, feeding in sources.items():
         if len(feeding) == 1 == len(network.boxes[member].inputs) and not network.is_state(member):
-            behind = sum(price[member].values()) + _ENTRY
-            price[feeding[0]][member] = max(price[feeding[0]][member], behind)
+            behind = sum(weight[member].values()) + _ENTRY
+            weight[feeding[0]][member] = max(weight[feeding[0]][member], behind)
 
 
 def _cost(
-    order: Sequence[int], price: Mapping[int, Mapping[int, float]], network: Network, inward: frozenset[int]
+    order: Sequence[int], weight: Mapping[int, Mapping[int, float]], network: Network, inward: frozenset[int]
 ) -> float:
-    """The price of the backward links, and of blocks with no other input or no other output.
+    """The weight of the backward links, and of blocks with no other input or no other output.
 
     ``inward``: the blocks with an input from outside the loop.
     """
@@ -150,8 +150,8 @@ def _cost(
     fed: set[int] = set(inward)
     feeding: set[int] = set()
     cost = 0.0
-    for source, prices in price.items():
-        for target, value in prices.items():
+    for source, weights in weight.items():
+        for target, value in weights.items():
             if rank[target] < rank[source]:
                 cost += value
             elif value > _ENTRY:

@@ -12,24 +12,24 @@ from typing import TypeAlias
 
 import numpy as np
 
-from armblocks.drawing.arrangement.columns import Columns, Piece
+from armblocks.drawing.arrangement.columns import Columns, Segment
 
 _CROSSING = 1.0
 _PATHS_CROSS = 4.0
-"""Price of a crossing of two paths from a source to a sink."""
+"""Cost of a crossing of two paths from a source to a sink."""
 _BETWEEN = 0.3
-"""Price of a node between the two ends of a line that reverses its direction."""
+"""Cost of a node between the two ends of a line that reverses its direction."""
 _TURNED_SUM = 0.2
-"""Price of a crossing of two lines into one sum with two inputs, whose ports can be exchanged."""
+"""Cost of a crossing of two lines into one sum with two inputs, whose ports can be exchanged."""
 _FEEDBACK_ABOVE = 0.9
-"""Price of a feedback line above its loop that could be below it."""
+"""Cost of a feedback line above its loop that could be below it."""
 _SWEEPS = 8
 _PASSES = 10
 _MANY_NODES = 120
 """In a sheet with more nodes, lines are not moved as a whole."""
 _FEW_LINES = 60
-"""Between two columns with more lines, all crossings have the same price."""
-_MOST_NODES = 1000
+"""Between two columns with more lines, all crossings have the same cost."""
+_MAX_NODES = 1000
 """In a sheet with more nodes, only one start order is tried."""
 _MANY = 30
 """In a column with more nodes, a node is only exchanged with its neighbours."""
@@ -44,10 +44,10 @@ def _threads(columns: Columns, *, strict: bool) -> list[list[int]]:
     """Chains of connected nodes over several columns; ``strict``: without branches."""
     main = {node for node, path in columns.path.items() if path == 0}
     beside: dict[tuple[int, bool], set[int]] = {}
-    for piece in columns.pieces:
-        if not piece.turns:
-            beside.setdefault((piece.a.node, piece.a.right), set()).add(piece.b.node)
-            beside.setdefault((piece.b.node, piece.b.right), set()).add(piece.a.node)
+    for segment in columns.segments:
+        if not segment.turns:
+            beside.setdefault((segment.a.node, segment.a.right), set()).add(segment.b.node)
+            beside.setdefault((segment.b.node, segment.b.right), set()).add(segment.a.node)
     threads: list[list[int]] = []
     visited: set[int] = set()
     for first in range(len(columns.column)):
@@ -67,13 +67,13 @@ def _threads(columns: Columns, *, strict: bool) -> list[list[int]]:
     return threads
 
 
-Drawn: TypeAlias = tuple[Piece, int, float, float]
+Drawn: TypeAlias = tuple[Segment, int, float, float]
 """A line, whether it reverses its direction at its left (1) or right (-1), and the heights of its ends."""
 
 
 class _Ordering:
     def __init__(self, columns: Columns) -> None:
-        self._pieces = columns.pieces
+        self._segments = columns.segments
         self._main = {node for node, path in columns.path.items() if path == 0}
         self._path = columns.path
         self._columns: list[list[int]] = [[] for _ in range(max(columns.column) + 1)]
@@ -81,38 +81,36 @@ class _Ordering:
             self._columns[column].append(node)
         self._column_of = columns.column
         self._position = [0.0] * len(columns.column)
-        self._sides: list[dict[bool, list[Piece]]] = [{True: [], False: []} for _ in columns.column]
-        """The pieces at each node, by the side of the node on which they are."""
-        self._turning: list[list[Piece]] = [[] for _ in columns.column]
+        self._sides: list[dict[bool, list[Segment]]] = [{True: [], False: []} for _ in columns.column]
+        """The segments at each node, by the side of the node on which they are."""
+        self._turning: list[list[Segment]] = [[] for _ in columns.column]
         self._blocks = columns.blocks
         self._two_input_sums = columns.two_input_sums
         self._on_path = {
-            piece
-            for piece in self._pieces
-            if self._path.get(piece.a.node, -1) == self._path.get(piece.b.node, -2)
+            segment
+            for segment in self._segments
+            if self._path.get(segment.a.node, -1) == self._path.get(segment.b.node, -2)
         }
-        self._gaps: dict[int, list[Piece]] = {}
-        for piece in self._pieces:
-            self._gaps.setdefault(piece.gap, []).append(piece)
+        self._gaps: dict[int, list[Segment]] = {}
+        for segment in self._segments:
+            self._gaps.setdefault(segment.gap, []).append(segment)
         self._threads = [*_threads(columns, strict=True), *_threads(columns, strict=False)]
-        for piece in self._pieces:
-            for end in {piece.a.node, piece.b.node}:
+        for segment in self._segments:
+            for end in {segment.a.node, segment.b.node}:
                 side = (
-                    piece.a.right
-                    if piece.turns
-                    else (piece.a.right if piece.a.node == end else piece.b.right)
+                    segment.a.right
+                    if segment.turns
+                    else (segment.a.right if segment.a.node == end else segment.b.right)
                 )
-                self._sides[end][side].append(piece)
-            if piece.turns and piece.a.node != piece.b.node:
-                self._turning[piece.a.node].append(piece)
-                self._turning[piece.b.node].append(piece)
+                self._sides[end][side].append(segment)
+            if segment.turns and segment.a.node != segment.b.node:
+                self._turning[segment.a.node].append(segment)
+                self._turning[segment.b.node].append(segment)
 
     def best(self) -> tuple[float, list[list[int]]]:
         """The cost and the order of the better result from two start orders."""
         results: list[tuple[float, int, list[list[int]]]] = []
-        starts = (self._with_feedback_last, self._as_numbered)[
-            : 1 if len(self._position) > _MOST_NODES else 2
-        ]
+        starts = (self._with_feedback_last, self._as_numbered)[: 1 if len(self._position) > _MAX_NODES else 2]
         for k, start in enumerate(starts):
             start()
             self._sweep(feedback=k == 1)
@@ -170,20 +168,20 @@ class _Ordering:
     def _barycentre(self, node: int, *, right: bool) -> float:
         """The mean position of the other ends of the node's lines on one side, as a share of their column."""
         heights: list[float] = []
-        for piece in self._sides[node][right]:
-            for end, other in ((piece.a, piece.b), (piece.b, piece.a)):
+        for segment in self._sides[node][right]:
+            for end, other in ((segment.a, segment.b), (segment.b, segment.a)):
                 if end.node != node or other.node == node:
                     continue
                 many = max(len(self._columns[self._column_of[other.node]]), 1)
                 height = (self._position[other.node] + 0.5 + other.share - end.share) / many
-                heights.append(height + 0.6 / many if piece.turns else height)
+                heights.append(height + 0.6 / many if segment.turns else height)
         own = (self._position[node] + 0.5) / max(len(self._columns[self._column_of[node]]), 1)
         return sum(heights) / len(heights) if heights else own
 
     # -- sifting ---------------------------------------------------------------------------------------------
 
     def _sift(self) -> None:
-        for _ in range(_PASSES if len(self._position) <= _MOST_NODES else 2):
+        for _ in range(_PASSES if len(self._position) <= _MAX_NODES else 2):
             improved = False
             for column in [*self._columns, *self._columns[::-1]]:
                 if len(column) < 2:
@@ -272,44 +270,47 @@ class _Ordering:
         for side in (True, False):
             ones, others = self._sides[one][side], self._sides[other][side]
             if ones and others:
-                drawn = [self._drawn(piece) for piece in others]
-                for piece in ones:
-                    a = self._drawn(piece)
+                drawn = [self._drawn(segment) for segment in others]
+                for segment in ones:
+                    a = self._drawn(segment)
                     for b in drawn:
                         if _cross(a, b):
-                            cost += self._price(a[0], b[0])
+                            cost += self._crossing_cost(a[0], b[0])
         for node, passed in ((one, other), (other, one)):
-            for piece in self._turning[node]:
-                partner = piece.b.node if piece.a.node == node else piece.a.node
+            for segment in self._turning[node]:
+                partner = segment.b.node if segment.a.node == node else segment.a.node
                 low, high = sorted((self._position[node], self._position[partner]))
                 if low < self._position[passed] < high:
                     cost += _BETWEEN
                 if partner == passed and node < passed:
-                    cost += self._above(piece)
+                    cost += self._above(segment)
         return cost
 
-    def _price(self, a: Piece, b: Piece) -> float:
-        """The price of a crossing; low for lines into a sum with two inputs, whose ports follow the lines."""
+    def _crossing_cost(self, a: Segment, b: Segment) -> float:
+        """The cost of a crossing; low for lines into a sum with two inputs, whose ports follow the lines."""
         if a.turns or b.turns:
             return _CROSSING
         if a.b.node == b.b.node and a.b.node in self._two_input_sums:
             return _TURNED_SUM
         return _PATHS_CROSS if a in self._on_path and b in self._on_path else _CROSSING
 
-    def _above(self, piece: Piece) -> float:
-        """The price of a feedback line whose dummy node or mirrored block is above the other end."""
-        block, dummy = (piece.a, piece.b) if piece.a.node < self._blocks else (piece.b, piece.a)
-        if dummy.node < self._blocks and piece.a.right:
-            block, dummy = piece.a, piece.b
+    def _above(self, segment: Segment) -> float:
+        """The cost of a feedback line whose dummy node or mirrored block is above the other end."""
+        block, dummy = (segment.a, segment.b) if segment.a.node < self._blocks else (segment.b, segment.a)
+        if dummy.node < self._blocks and segment.a.right:
+            block, dummy = segment.a, segment.b
         if block.share < -0.2 and not block.level:
             return 0.0
         return _FEEDBACK_ABOVE if self._position[dummy.node] < self._position[block.node] else 0.0
 
-    def _drawn(self, piece: Piece) -> Drawn:
-        a, b = self._position[piece.a.node] + piece.a.share, self._position[piece.b.node] + piece.b.share
-        if piece.turns:
-            return piece, 1 if piece.a.right else -1, min(a, b), max(a, b)
-        return piece, 0, a, b
+    def _drawn(self, segment: Segment) -> Drawn:
+        a, b = (
+            self._position[segment.a.node] + segment.a.share,
+            self._position[segment.b.node] + segment.b.share,
+        )
+        if segment.turns:
+            return segment, 1 if segment.a.right else -1, min(a, b), max(a, b)
+        return segment, 0, a, b
 
     def cost(self) -> float:
         """The cost of the current order."""
@@ -318,18 +319,18 @@ class _Ordering:
     def _gap_cost(self, gap: int) -> float:
         """The cost of the lines between two columns."""
         cost = 0.0
-        drawn = [self._drawn(piece) for piece in self._gaps.get(gap, ())]
+        drawn = [self._drawn(segment) for segment in self._gaps.get(gap, ())]
         if len(drawn) > _FEW_LINES:
             cost = _crossings(drawn)
         else:
             for k, a in enumerate(drawn):
                 for b in drawn[:k]:
                     if _cross(a, b):
-                        cost += self._price(a[0], b[0])
-        for piece, turns, _, _ in drawn:
-            if turns and piece.a.node != piece.b.node:
-                between = abs(self._position[piece.a.node] - self._position[piece.b.node]) - 1
-                cost += _BETWEEN * between + self._above(piece)
+                        cost += self._crossing_cost(a[0], b[0])
+        for segment, turns, _, _ in drawn:
+            if turns and segment.a.node != segment.b.node:
+                between = abs(self._position[segment.a.node] - self._position[segment.b.node]) - 1
+                cost += _BETWEEN * between + self._above(segment)
         return cost
 
 

@@ -11,7 +11,7 @@ import heapq
 from collections.abc import Sequence
 from itertools import pairwise
 
-from armblocks.drawing.arrangement.columns import Columns, End, Piece
+from armblocks.drawing.arrangement.columns import Columns, End, Segment
 
 BLOCK_GAP = 24.0
 """Distance between the name of a block and the next block below, px."""
@@ -34,7 +34,7 @@ class _Rows:
     def __init__(
         self, columns: Columns, order: Sequence[Sequence[int]], size: Sequence[float], name: float
     ) -> None:
-        self._blocks, self._pieces = columns.blocks, columns.pieces
+        self._blocks, self._segments = columns.blocks, columns.segments
         self._path = columns.path
         self._nets = columns.nets
         self._order = order
@@ -60,8 +60,8 @@ class _Rows:
                 self._below[a][b] = self._above[b][a]
         self._lines: dict[int, list[tuple[int, float, float]]] = {row: [] for row in rows}
         """For every row: a connected row, the distance below it for a straight line, and a weight."""
-        for piece in self._pieces:
-            self._add_line(piece)
+        for segment in self._segments:
+            self._add_line(segment)
         self._y: dict[int, float] = {}
 
     # -- rows of straight lines ------------------------------------------------------------------------------
@@ -69,20 +69,20 @@ class _Rows:
     def _align(self) -> None:
         aligned: set[tuple[int, bool]] = set()
         straight_pairs: dict[int, list[tuple[int, int]]] = {}
-        for piece in sorted((p for p in self._pieces if not p.turns), key=self._rank):
-            left, right = (piece.a, piece.b) if piece.a.right else (piece.b, piece.a)
+        for segment in sorted((p for p in self._segments if not p.turns), key=self._rank):
+            left, right = (segment.a, segment.b) if segment.a.right else (segment.b, segment.a)
             if not (left.level and right.level):
                 continue
             if (left.node, True) in aligned or (right.node, False) in aligned:
                 continue
             pair = self._position[left.node], self._position[right.node]
-            straight = straight_pairs.setdefault(piece.gap, [])
+            straight = straight_pairs.setdefault(segment.gap, [])
             if any((pair[0] - a) * (pair[1] - b) < 0 for a, b in straight):
                 continue
             straight.append(pair)
             aligned |= {(left.node, True), (right.node, False)}
             self._straight[right.node, False], self._straight[left.node, True] = left.node, right.node
-            self._unite(left.node, right.node, left.port - right.port, self._strength(piece))
+            self._unite(left.node, right.node, left.port - right.port, self._strength(segment))
 
     def _unite(self, left: int, right: int, shift: float, strength: float) -> None:
         """Make the right node, and its row, ``shift`` lower than the left one."""
@@ -94,18 +94,18 @@ class _Rows:
         self._members[a] += self._members[b]
         self._weight[a] = max(self._weight[a], self._weight[b], strength)
 
-    def _strength(self, piece: Piece) -> float:
-        ends = piece.a.node, piece.b.node
+    def _strength(self, segment: Segment) -> float:
+        ends = segment.a.node, segment.b.node
         dummies = sum(node >= self._blocks for node in ends)
         paths = {self._path.get(node) for node in ends}
         if len(paths) == 1 and (path := paths.pop()) is not None:
             return max(100.0 - path, 10.0)
         return (3.0, 2.0, 8.0)[dummies]
 
-    def _rank(self, piece: Piece) -> tuple[float, ...]:
-        left, right = (piece.a, piece.b) if piece.a.right else (piece.b, piece.a)
+    def _rank(self, segment: Segment) -> tuple[float, ...]:
+        left, right = (segment.a, segment.b) if segment.a.right else (segment.b, segment.a)
         steps = abs(self._position[left.node] - self._position[right.node])
-        return -self._strength(piece), steps, piece.gap, left.node, right.node, left.port, right.port
+        return -self._strength(segment), steps, segment.gap, left.node, right.node, left.port, right.port
 
     def _minimum_distance(self, upper: int, lower: int) -> float:
         """The minimum distance of the upper edges of two neighbours in a column."""
@@ -119,15 +119,15 @@ class _Rows:
 
     # -- placing ---------------------------------------------------------------------------------------------
 
-    def _add_line(self, piece: Piece) -> None:
-        shift = piece.a.port - piece.b.port + self._offset[piece.a.node] - self._offset[piece.b.node]
-        for end, other, way in ((piece.a, piece.b, -1.0), (piece.b, piece.a, 1.0)):
+    def _add_line(self, segment: Segment) -> None:
+        shift = segment.a.port - segment.b.port + self._offset[segment.a.node] - self._offset[segment.b.node]
+        for end, other, way in ((segment.a, segment.b, -1.0), (segment.b, segment.a, 1.0)):
             if not end.level:  # from above or below
                 shift -= way * (_SUM_GAP if self._from_below(end, other) else -_SUM_GAP)
-        a, b = self._leader[piece.a.node], self._leader[piece.b.node]
+        a, b = self._leader[segment.a.node], self._leader[segment.b.node]
         if a == b:
             return
-        weight = 0.5 if piece.turns else 1.0
+        weight = 0.5 if segment.turns else 1.0
         self._lines[b].append((a, shift, weight))
         self._lines[a].append((b, -shift, weight))
 

@@ -10,7 +10,7 @@ from armblocks.formats.matlab.link_fields import VECTORS, link_field, set_link_f
 from armblocks.formats.matlab.records import LinkRecord, RobotRecord
 from armblocks.formats.matlab.robot_records import robot_field, set_robot_field
 from armblocks.formats.matlab.script_values import ScriptValues, single_index
-from armblocks.formats.matlab.values import MOST_LINKS, Cell, LinkArray, Value, copied
+from armblocks.formats.matlab.values import MAX_LINKS, Cell, LinkArray, Value, copied
 from armblocks.matlab.arrays import Budget, empty, kind_of, number_of, with_element
 from armblocks.matlab.evaluation import Evaluator
 from armblocks.matlab.lexer import COMMANDS
@@ -175,7 +175,7 @@ class Interpreter:
             old = Cell()
         if not isinstance(old, Cell):
             raise location.error(f"{{}} is used on {kind_of(old)}", allowed="cell arrays")
-        index = single_index(location, indices, MOST_LINKS)
+        index = single_index(location, indices, MAX_LINKS)
         inner = old.elements[index] if index < len(old.elements) else None
         stored = self._stored(location, inner, rest, new)
         if isinstance(stored, Cell):
@@ -199,7 +199,7 @@ class Interpreter:
         if old is None or (isinstance(old, np.ndarray) and old.size == 0 and isinstance(new, LinkRecord)):
             old = LinkArray() if isinstance(new, LinkRecord) or rest else empty()
         if isinstance(old, LinkArray):
-            index = single_index(location, indices, MOST_LINKS)
+            index = single_index(location, indices, MAX_LINKS)
             inner = old.links[index] if index < len(old.links) else None
             stored = self._stored(location, inner, rest, new)
             if not isinstance(stored, LinkRecord):

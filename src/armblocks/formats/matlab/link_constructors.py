@@ -25,7 +25,7 @@ _COLUMNS = {
     Release.UP_TO_8: ("alpha", "a", "theta", "d", "sigma", "offset"),
     Release.FROM_9: ("theta", "d", "a", "alpha", "sigma", "offset"),
 }
-_SHORTEST_DYN, _LONGEST_DYN = 15, 20
+_SHORTEST_DYN, _MAX_DYN_LENGTH = 15, 20
 
 
 def link_from_row(
@@ -34,12 +34,12 @@ def link_from_row(
     """A link from 4 to 6 D-H numbers, or from a DYN row of 15 to 20. Raises ``FormatError``."""
     columns = _COLUMNS[release]
     count = len(row)
-    if not (4 <= count <= 6 or _SHORTEST_DYN <= count <= _LONGEST_DYN) or count == _LONGEST_DYN - 1:
+    if not (4 <= count <= 6 or _SHORTEST_DYN <= count <= _MAX_DYN_LENGTH) or count == _MAX_DYN_LENGTH - 1:
         order = " ".join(columns)
         raise location.error(
             f"a row of {count} numbers is not a link",
             allowed=f"4 to 6 numbers {order}, or a legacy row with m r I Jm G B Tc behind the first 5: "
-            f"{_SHORTEST_DYN} to 18 or {_LONGEST_DYN} numbers",
+            f"{_SHORTEST_DYN} to 18 or {_MAX_DYN_LENGTH} numbers",
         )
     link = LinkRecord(location=location, release=release, modified=modified)
     kinematic = count if count <= 6 else 5

@@ -10,7 +10,7 @@ from armblocks.errors import ArmblocksError
 from armblocks.formats.matlab.link_constructors import is_modified, link_from_row, rows_of
 from armblocks.formats.matlab.link_fields import finite_number, numbers, set_link_field
 from armblocks.formats.matlab.records import LinkRecord, Release, RobotRecord
-from armblocks.formats.matlab.values import MOST_LINKS, Cell, LinkArray, Value
+from armblocks.formats.matlab.values import MAX_LINKS, Cell, LinkArray, Value
 from armblocks.matlab.arrays import Array, array_of, kind_of, scalar, text_of
 from armblocks.matlab.source import Location
 from armblocks.robot import (
@@ -115,8 +115,8 @@ def make_serial_link(location: Location, arguments: list[Value]) -> RobotRecord:
 def _links_of_matrix(
     location: Location, release: Release, matrix: Array, *, modified: bool
 ) -> list[LinkRecord]:
-    if matrix.shape[0] > MOST_LINKS:
-        raise location.error(f"a robot of {matrix.shape[0]} links", allowed=f"at most {MOST_LINKS}")
+    if matrix.shape[0] > MAX_LINKS:
+        raise location.error(f"a robot of {matrix.shape[0]} links", allowed=f"at most {MAX_LINKS}")
     return [link_from_row(location, release, row, modified=modified) for row in rows_of(matrix)]
 
 

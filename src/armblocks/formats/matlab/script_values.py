@@ -9,7 +9,7 @@ from armblocks.formats.matlab.link_constructors import CONSTRUCTORS
 from armblocks.formats.matlab.link_fields import link_field
 from armblocks.formats.matlab.records import LinkRecord, RobotRecord
 from armblocks.formats.matlab.robot_records import make_robot, make_serial_link, robot_field
-from armblocks.formats.matlab.values import MOST_LINKS, Cell, LinkArray, Value, copied, join_links
+from armblocks.formats.matlab.values import MAX_LINKS, Cell, LinkArray, Value, copied, join_links
 from armblocks.matlab.arrays import Budget, index_of, kind_of, number_of, scalar
 from armblocks.matlab.functions import TABLE
 from armblocks.matlab.numbers import Numbers
@@ -57,9 +57,9 @@ class ScriptValues:
 
     def cell(self, location: Location, elements: Sequence[Value]) -> Value:
         """``{a, b}``"""
-        if len(elements) > MOST_LINKS:
+        if len(elements) > MAX_LINKS:
             raise location.error(
-                f"{len(elements)} elements in one cell array", allowed=f"at most {MOST_LINKS}"
+                f"{len(elements)} elements in one cell array", allowed=f"at most {MAX_LINKS}"
             )
         if any(isinstance(element, Cell) for element in elements):
             raise location.error(
@@ -84,7 +84,7 @@ class ScriptValues:
         if isinstance(value, LinkRecord):
             value = LinkArray([value])
         if isinstance(value, LinkArray):
-            index = single_index(location, indices, MOST_LINKS)
+            index = single_index(location, indices, MAX_LINKS)
             link = value.links[index] if index < len(value.links) else None
             if link is None:
                 raise location.error(
@@ -103,7 +103,7 @@ class ScriptValues:
         """``value{indices}``"""
         if not isinstance(value, Cell):
             raise location.error(f"{{}} is used on {kind_of(value)}", allowed="cell arrays")
-        index = single_index(location, indices, MOST_LINKS)
+        index = single_index(location, indices, MAX_LINKS)
         element = value.elements[index] if index < len(value.elements) else None
         if element is None:
             raise location.error(

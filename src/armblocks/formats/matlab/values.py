@@ -11,7 +11,7 @@ from armblocks.formats.matlab.records import LinkRecord, RobotRecord
 from armblocks.matlab.arrays import Array, kind_of
 from armblocks.matlab.source import Location
 
-MOST_LINKS = 1000
+MAX_LINKS = 1000
 """Maximum number of elements of a cell array or an array of links."""
 
 
@@ -72,6 +72,6 @@ def join_links(location: Location, values: Sequence[Value]) -> LinkArray:
                 raise location.error(
                     f"{kind_of(value)} is an element of an array of links", allowed="links only"
                 )
-    if len(links) > MOST_LINKS:
-        raise location.error(f"{len(links)} links in one array", allowed=f"at most {MOST_LINKS}")
+    if len(links) > MAX_LINKS:
+        raise location.error(f"{len(links)} links in one array", allowed=f"at most {MAX_LINKS}")
     return LinkArray(links)

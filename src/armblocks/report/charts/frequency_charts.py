@@ -39,7 +39,7 @@ _Array = NDArray[np.float64]
 _Complex = NDArray[np.complex128]
 
 _PANEL = 210.0
-_MOST_CHANNELS = 8
+_MAX_CHANNELS = 8
 _FLOOR = 1e-12
 """Lower limit of displayed gains relative to the largest, because a gain of 0 has no value in decibels."""
 
@@ -52,7 +52,7 @@ def channels(system: LinearSystem) -> list[tuple[int, int, str]]:
         for column, entry in enumerate(system.inputs):
             name = f"{output} from {entry}" if several_in or not several_out else output
             pairs.append((row, column, name))
-    return pairs[:_MOST_CHANNELS]
+    return pairs[:_MAX_CHANNELS]
 
 
 def bode_picture(

@@ -26,7 +26,7 @@ from armblocks.report.charts.scale import padded
 _Array = NDArray[np.float64]
 
 _PANEL = 230.0
-_DEEPEST = 140.0
+_SHOWN_DECIBELS = 140.0
 """Displayed range below the highest line, dB. Lower values are rounding errors."""
 
 
@@ -84,7 +84,7 @@ def _shown(spectrum: SignalSpectrum, decibels: bool, density: bool) -> _Array:
 def _range(values: _Array, decibels: bool) -> tuple[float, float]:
     finite = values[np.isfinite(values)]
     if decibels:
-        return padded(np.maximum(finite, finite.max(initial=-_DEEPEST) - _DEEPEST), 0.06)
+        return padded(np.maximum(finite, finite.max(initial=-_SHOWN_DECIBELS) - _SHOWN_DECIBELS), 0.06)
     return 0.0, padded(finite, 0.06)[1]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 
 from armblocks.errors import FormatError, InputError
-from armblocks.studio.protocol.messages.documents import MOST_DROPPED
+from armblocks.studio.protocol.messages.documents import MAX_DROPPED_BYTES
 
 
 def dropped_bytes(content: str, where: str) -> bytes:
@@ -16,11 +16,11 @@ def dropped_bytes(content: str, where: str) -> bytes:
         raise InputError(
             "the content is not base64", where=where, allowed="base64", fix="drop the file again"
         ) from None
-    if len(data) > MOST_DROPPED:
+    if len(data) > MAX_DROPPED_BYTES:
         raise FormatError(
             f"the file has {len(data)} bytes",
             where=where,
-            allowed=f"at most {MOST_DROPPED}",
+            allowed=f"at most {MAX_DROPPED_BYTES}",
             fix="choose a smaller file",
         )
     return data

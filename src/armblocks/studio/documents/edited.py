@@ -14,7 +14,7 @@ from armblocks.studio.documents.history import History, Value
 from armblocks.studio.protocol.message import Edit, kind_of, messages_of
 from armblocks.studio.protocol.messages.documents import Alteration, Change, DocumentKind
 
-MOST_VERSIONS = 1000
+MAX_VERSIONS = 1000
 """Number of stored versions, which are compared to detect conflicts of an edit made on an older version."""
 
 
@@ -45,7 +45,7 @@ class Edited(History[Value], ABC):
     def __init__(self, value: Value, *, version: int = 0) -> None:
         super().__init__(value, version=version)
         self._author = ""
-        self._versions = deque([Version(version, "", value)], maxlen=MOST_VERSIONS)
+        self._versions = deque([Version(version, "", value)], maxlen=MAX_VERSIONS)
 
     def perform(self, request: Alteration) -> None:
         """Apply the request of a page.

@@ -8,7 +8,7 @@ from typing import ClassVar, Generic, TypeVar
 
 from armblocks.errors import InputError
 
-MOST_UNDO = 10_000
+MAX_UNDO_STEPS = 10_000
 """Number of edits that can be undone; older ones are dropped."""
 
 Value = TypeVar("Value")
@@ -33,7 +33,7 @@ class History(Generic[Value]):
     contains one of these values. ``continued`` is true if the last replacement extended the previous step.
     """
 
-    noun: ClassVar[str]
+    noun: ClassVar[str] = "document"
     """The word for the value in messages: "drawing", "robot"."""
 
     def __init__(self, value: Value, *, version: int = 0) -> None:
@@ -68,7 +68,7 @@ class History(Generic[Value]):
         self.continued = self.continued and not self._future
         if not self.continued:
             self._past.append(Step(title, self.value, gesture))
-            del self._past[:-MOST_UNDO]
+            del self._past[:-MAX_UNDO_STEPS]
         self._future.clear()
         self._become(value)
 

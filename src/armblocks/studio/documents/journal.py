@@ -26,7 +26,7 @@ from armblocks.files import sync_folder
 
 SYNC_SECONDS = 1.0
 """The caller of :meth:`Journal.append` calls :meth:`Journal.sync` within this time, s."""
-MOST_BYTES = 256 * 2**20
+MAX_BYTES = 256 * 2**20
 """A larger journal is not read, bytes."""
 Record = Mapping[str, Any]
 
@@ -98,11 +98,11 @@ def read_journal(path: Path) -> tuple[list[Record], int]:
     Raises ``FormatError`` if no record is complete.
     """
     try:
-        if path.stat().st_size > MOST_BYTES:
+        if path.stat().st_size > MAX_BYTES:
             raise FormatError(
                 "the journal is too large",
                 where=str(path),
-                allowed=f"{MOST_BYTES} bytes",
+                allowed=f"{MAX_BYTES} bytes",
                 fix="save the document, which starts another journal",
             )
         data = path.read_bytes()

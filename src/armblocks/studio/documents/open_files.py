@@ -27,8 +27,8 @@ from armblocks.studio.documents.recoverable_files import RecoverableFiles
 from armblocks.studio.documents.state_folder import StateFolder
 from armblocks.studio.protocol.messages import documents as document_messages
 
-MOST_OPEN = 100
-MOST_KEYS = 1000
+MAX_OPEN_DOCUMENTS = 100
+MAX_KEYS = 1000
 """Number of stored request keys; they ensure that a request that is sent twice is applied once."""
 WATCH_SECONDS = 1.0
 """Interval at which files are checked for changes, s."""
@@ -45,7 +45,7 @@ class OpenFile(Generic[EditedT]):
     """The shipped example or robot from which it was created."""
     on_disk: Fingerprint | None = None
     disk: Disk = "same"
-    request_keys: deque[str] = dataclasses.field(default_factory=lambda: deque(maxlen=MOST_KEYS))
+    request_keys: deque[str] = dataclasses.field(default_factory=lambda: deque(maxlen=MAX_KEYS))
     journal: FileJournal | None = None
     journaled: bool = True
     incomplete: bool = False
@@ -195,7 +195,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
         return open_file
 
     def _add(self, document: Any, key: str) -> OpenedT:
-        if len(self._open) >= MOST_OPEN:
+        if len(self._open) >= MAX_OPEN_DOCUMENTS:
             self._close_one()
         open_file = self._open[key] = self._made(key, document)
         return open_file
@@ -208,7 +208,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
                 return
         raise InputError(
             f"{len(self._open)} {self.kind.name}s with unsaved edits are open",
-            allowed=f"at most {MOST_OPEN}",
+            allowed=f"at most {MAX_OPEN_DOCUMENTS}",
             fix="save or discard some of them",
             where="studio",
         )
@@ -257,7 +257,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
         version = document.version
         self._write(open_file, before, number, lambda journal: journal.replaced(title, value, version))
 
-    def keep_mine(self, open_file: OpenedT) -> None:
+    def ignore_file_change(self, open_file: OpenedT) -> None:
         """Accept that another program has written the file; the next save overwrites it."""
         open_file.disk, open_file.on_disk = "same", None
         if open_file.path is not None and self.folder.exists(open_file.path):

@@ -31,9 +31,9 @@ from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.documents.trusted_files import TrustedFiles, digest_of
 
 SOURCE_SUFFIXES = (".py",)
-MOST_SOURCE = 256 * 1024
+MAX_SOURCE_BYTES = 256 * 1024
 """Maximum size of a Python file, bytes."""
-MOST_CACHED = 4
+MAX_CACHED_FILES = 4
 """Number of files whose columns stay in memory."""
 
 
@@ -59,7 +59,7 @@ class ProjectData(DataFiles):
             key = (path, status.st_mtime_ns, status.st_size, status.st_ino)
             if key not in self._read:
                 self._read[key] = load_columns(path)
-                while len(self._read) > MOST_CACHED:
+                while len(self._read) > MAX_CACHED_FILES:
                     self._read.popitem(last=False)
             self._read.move_to_end(key)
             return self._read[key]
@@ -83,7 +83,7 @@ class ProjectData(DataFiles):
 
     def source(self, path: Path) -> bytes:
         """The content of a Python file. Raises ``FormatError``."""
-        return read_bounded(path, MOST_SOURCE)
+        return read_bounded(path, MAX_SOURCE_BYTES)
 
     def function(self, reference: str, folder: Path | None) -> UserFunction:
         """The function of a file of the project. Raises ``ArmblocksError`` if the file does not define it."""

@@ -20,8 +20,8 @@ from armblocks.formats.shipped import shipped_folder
 READABLE = ROBOT_SUFFIXES
 """Suffixes of files that can be opened: diagrams, robots and scripts."""
 WRITABLE = (".json",)
-MOST_BYTES = 16 * 2**20
-MOST_FILES = 2000
+MAX_BYTES = 16 * 2**20
+MAX_FILES = 2000
 """Number of files in the list of a folder."""
 STRAY_SECONDS = 60.0
 """Age after which a partly written file is considered abandoned by a killed process, s."""
@@ -29,7 +29,7 @@ _HIDDEN = ("node_modules", "__pycache__")
 _STRAY = re.compile(r"\..*\.[0-9a-f]{12}\.(tmp|part)")
 _FORBIDDEN = re.compile(r'[\x00-\x1f\x7f<>:"|?*\\]')
 _DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
-LONGEST_NAME = 120
+MAX_NAME_LENGTH = 120
 
 Disk = Literal["same", "changed", "gone"]
 """State of a file on disk, compared with its known fingerprint."""
@@ -107,14 +107,14 @@ class ProjectFolder:
 
     def read(self, relative: str) -> bytes:
         """Return the content of a file."""
-        return read_bounded(self.path(relative), MOST_BYTES)
+        return read_bounded(self.path(relative), MAX_BYTES)
 
     def read_known(self, relative: str) -> tuple[bytes, Fingerprint]:
         """Return the content of a file and its fingerprint."""
         path = self.path(relative)
         # The status is read before the content: a concurrent write is then reported twice rather than missed.
         status = path.stat() if path.is_file() else None
-        data = read_bounded(path, MOST_BYTES)
+        data = read_bounded(path, MAX_BYTES)
         return data, Fingerprint.of(status or path.stat(), data)
 
     def read_library(self, path: Path) -> bytes:
@@ -126,7 +126,7 @@ class ProjectFolder:
                 fix="copy the library into the project",
                 where="project folder",
             )
-        return read_bounded(path, MOST_BYTES)
+        return read_bounded(path, MAX_BYTES)
 
     def write(self, relative: str, data: bytes) -> Fingerprint:
         """Replace a file atomically and return its fingerprint; missing folders are created."""
@@ -159,7 +159,7 @@ class ProjectFolder:
             status = path.stat()
             if known is not None and known.matches(status):
                 return "same", known
-            current = Fingerprint.of(status, read_bounded(path, MOST_BYTES))
+            current = Fingerprint.of(status, read_bounded(path, MAX_BYTES))
         except FileNotFoundError:
             return "gone", known
         except (OSError, FormatError):
@@ -180,8 +180,8 @@ class ProjectFolder:
                         path.unlink()
 
     def files(self, suffixes: tuple[str, ...] = READABLE) -> list[str]:
-        """Paths of the files with these suffixes, without hidden folders; at most :data:`MOST_FILES`."""
-        return sorted(_first(self._walk(suffixes), MOST_FILES))
+        """Paths of the files with these suffixes, without hidden folders; at most :data:`MAX_FILES`."""
+        return sorted(_first(self._walk(suffixes), MAX_FILES))
 
     def _walk(self, suffixes: tuple[str, ...]) -> Iterator[str]:
         for folder, folders, names in os.walk(self.root):
@@ -213,13 +213,13 @@ def check_file_name(relative: str) -> None:
             reason = "contains a character that some systems cannot store"
         elif _DEVICES.fullmatch(part):
             reason = "is a reserved device name"
-        elif len(part) > LONGEST_NAME:
+        elif len(part) > MAX_NAME_LENGTH:
             reason = f"has {len(part)} characters"
         else:
             continue
         raise FormatError(
             f"'{part[:80]}' cannot be a file name: it {reason}",
-            allowed=f"letters, digits, spaces, - and _, at most {LONGEST_NAME} characters",
+            allowed=f"letters, digits, spaces, - and _, at most {MAX_NAME_LENGTH} characters",
             fix="choose another name",
             where="project folder",
         )

@@ -46,7 +46,7 @@ class DocumentRequests:
             document_messages.Reload,
         ):
             answers.on(alteration, self._alter)
-        answers.on(document_messages.KeepMine, self._keep_mine)
+        answers.on(document_messages.IgnoreFileChange, self._ignore_file_change)
         answers.on(document_messages.Save, self._save)
         answers.on(document_messages.Close, self._close)
         answers.on(document_messages.Recover, self._recover)
@@ -152,9 +152,9 @@ class DocumentRequests:
         await self._notify_change(open_file, before, number)
         return open_file.document.version
 
-    async def _keep_mine(self, _: Page, request: document_messages.KeepMine) -> None:
+    async def _ignore_file_change(self, _: Page, request: document_messages.IgnoreFileChange) -> None:
         presenter, open_file = self._with_key(request.document)
-        presenter.files.keep_mine(open_file)
+        presenter.files.ignore_file_change(open_file)
         await self.notify_state(open_file)
         await self.notify_list()
 

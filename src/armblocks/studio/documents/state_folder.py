@@ -19,8 +19,8 @@ from armblocks import user_folders
 from armblocks.errors import FormatError
 from armblocks.files import read_bounded, write_atomically
 
-MOST_RECENT = 12
-MOST_BYTES = 64 * 1024
+MAX_RECENT_FILES = 12
+MAX_BYTES = 64 * 1024
 SESSION_SECONDS = 12 * 3600.0
 """Age after which a session is not resumed, s."""
 
@@ -45,7 +45,7 @@ class StateFolder:
         """The session of the previous server; ``None`` if there was none or it has expired."""
         try:
             age = time() - self._session.stat().st_mtime
-            stored = json.loads(read_bounded(self._session, MOST_BYTES))
+            stored = json.loads(read_bounded(self._session, MAX_BYTES))
             session = Session(port=int(stored["port"]), secret=str(stored["secret"]))
         except (OSError, FormatError, ValueError, KeyError, TypeError):
             return None
@@ -62,8 +62,8 @@ class StateFolder:
     def recent(self) -> list[str]:
         """Recently opened or saved project files, the latest first."""
         try:
-            stored: Any = json.loads(read_bounded(self._recent, MOST_BYTES))
-            return [str(name) for name in stored["files"]][:MOST_RECENT]
+            stored: Any = json.loads(read_bounded(self._recent, MAX_BYTES))
+            return [str(name) for name in stored["files"]][:MAX_RECENT_FILES]
         except (FormatError, ValueError, KeyError, TypeError):
             return []
 
@@ -72,7 +72,7 @@ class StateFolder:
         recent = self.recent()
         if recent[:1] != [path]:
             files = [path, *(other for other in recent if other != path)]
-            self._write(self._recent, {"files": files[:MOST_RECENT]})
+            self._write(self._recent, {"files": files[:MAX_RECENT_FILES]})
 
     @property
     def _session(self) -> Path:

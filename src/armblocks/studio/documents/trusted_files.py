@@ -11,8 +11,8 @@ from armblocks.errors import FormatError
 from armblocks.files import read_bounded
 from armblocks.studio.documents.state_folder import StateFolder
 
-MOST_TRUSTED = 1000
-MOST_BYTES = 1 << 20
+MAX_TRUSTED_FILES = 1000
+MAX_BYTES = 1 << 20
 
 
 def digest_of(source: bytes) -> str:
@@ -48,7 +48,7 @@ class TrustedFiles:
             self._pairs[path, digest] = None
         else:
             self._pairs = {pair: None for pair in self._pairs if pair[0] != path}
-        for pair in list(self._pairs)[:-MOST_TRUSTED]:
+        for pair in list(self._pairs)[:-MAX_TRUSTED_FILES]:
             del self._pairs[pair]
         if self._state_folder is not None:
             self._state_folder.write_private("trusted.json", {"files": self.pairs})
@@ -57,7 +57,7 @@ class TrustedFiles:
         if self._state_folder is None:
             return []
         try:
-            stored: Any = json.loads(read_bounded(self._state_folder.root / "trusted.json", MOST_BYTES))
+            stored: Any = json.loads(read_bounded(self._state_folder.root / "trusted.json", MAX_BYTES))
             return [(str(path), str(digest)) for path, digest in stored["files"]]
         except (FormatError, ValueError, KeyError, TypeError):
             return []

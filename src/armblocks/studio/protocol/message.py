@@ -1,8 +1,8 @@
 """The base classes of all messages between front end and server, and the search for the messages of a class.
 
-A request declares the type of the value in its reply: ``class Find(Request[list[Found]])``. The union that
-pydantic reads and the types of the front end follow from :func:`messages_of`. A new message needs only its
-class, in a file of :mod:`armblocks.studio.protocol.messages`.
+A request declares the type of the value in its reply: ``class Find(Request[list[FoundBlock]])``. The union
+that pydantic reads and the types of the front end follow from :func:`messages_of`. A new message needs only
+its class, in a file of :mod:`armblocks.studio.protocol.messages`.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ Payload = str | bytes
 """A message as JSON, or a frame of samples."""
 CONGESTED_BYTES = 4 * 2**20
 """Above this queue size, samples of a run are added only as fast as the page receives them, bytes."""
-MOST_BYTES = 64 * 2**20
+MAX_BYTES = 64 * 2**20
 """Above this queue size the connection is closed; the page reconnects when it is responsive again, bytes."""
 
 
@@ -44,7 +44,7 @@ class Outbox:
         self._added.set()
         if self._size > CONGESTED_BYTES:
             self._room.clear()
-        if self._size > MOST_BYTES:
+        if self._size > MAX_BYTES:
             self.close()
 
     async def room(self) -> None:

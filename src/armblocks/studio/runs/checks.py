@@ -22,7 +22,7 @@ from armblocks.studio.runs.workers import answer_of
 from armblocks.studio.sheet.check import check
 from armblocks.studio.sheet.parameter_values import ResolveRobot
 
-MOST_SECONDS = 20.0
+MAX_SECONDS = 20.0
 Checked = tuple[list[Finding], dict[str, WireKind]]
 _CHECKED: TypeAdapter[Checked] = TypeAdapter(Checked)
 
@@ -41,9 +41,9 @@ class Checks:
             findings, wires = await asyncio.to_thread(check, diagram)
             # With faults, the shapes behind these blocks are unknown: only unconnected inputs are certain.
             return [*faults, *(finding for finding in findings if finding.port or not faults)], wires
-        message = await answer_of(write, self.job(diagram), MOST_SECONDS)
+        message = await answer_of(write, self.job(diagram), MAX_SECONDS)
         if not message:
-            return [_finding("", f"the Python functions did not return within {MOST_SECONDS:g} s", _FIX)], {}
+            return [_finding("", f"the Python functions did not return within {MAX_SECONDS:g} s", _FIX)], {}
         return _CHECKED.validate_json(message)
 
     def job(self, diagram: Diagram) -> dict[str, Any]:

@@ -21,9 +21,9 @@ from armblocks.face.model import CompiledDiagram
 from armblocks.simulation import RunState, Samples, Simulation
 
 Array = NDArray[np.float64]
-MOST_BYTES = 64 * 2**20
+MAX_BYTES = 64 * 2**20
 """Limit of the memory of all checkpoints, bytes; beyond it every second checkpoint is removed."""
-FEWEST_SNAPSHOTS = 8
+MIN_SNAPSHOTS = 8
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class RunHistory:
         if run.finished or self.recorded <= snapshots[-1].recorded:
             return
         snapshots.append(Snapshot(self.recorded, run.state(), run.diagram, run.parameters))
-        if len(snapshots) > FEWEST_SNAPSHOTS and sum(snapshot.size for snapshot in snapshots) > MOST_BYTES:
+        if len(snapshots) > MIN_SNAPSHOTS and sum(snapshot.size for snapshot in snapshots) > MAX_BYTES:
             del snapshots[1:-1:2]
 
     def step(self) -> None:

@@ -29,7 +29,7 @@ STOP_SECONDS = 0.8
 """Time after which a worker that has not obeyed ``stop`` is killed, s."""
 SILENT_SECONDS = 600.0
 """Time without a message after which a running worker counts as hung and is killed, s."""
-MOST_SECONDS = 24 * 3600.0
+MAX_SECONDS = 24 * 3600.0
 """Longest duration of a run, pauses included, s."""
 JOIN_SECONDS = 5.0
 """Time within which a process ends after its pipe was closed, s."""
@@ -50,7 +50,7 @@ class RunProcess:
         self._loop = asyncio.get_running_loop()
         self._queue: asyncio.Queue[bytes | None] = asyncio.Queue()
         self._commands: SimpleQueue[bytes | None] = SimpleQueue()
-        self._until = monotonic() + MOST_SECONDS
+        self._until = monotonic() + MAX_SECONDS
         self._killed = False
         """Whether the worker was killed because it did not obey ``stop``."""
         self._failure: str = ""
@@ -114,7 +114,7 @@ class RunProcess:
         except TimeoutError:
             if not self._failure:
                 reason = (
-                    f"exceeds its time limit of {MOST_SECONDS:g} s"
+                    f"exceeds its time limit of {MAX_SECONDS:g} s"
                     if timeout == remaining
                     else "does not respond"
                 )

@@ -16,7 +16,7 @@ from armblocks.errors import ArmblocksError, SimulationError
 from armblocks.studio.runs.worker import begin_run, limit_process
 from armblocks.studio.runs.workers import answer_of
 
-MOST_SECONDS = 300.0
+MAX_SECONDS = 300.0
 
 
 async def report_of(job: Mapping[str, Any]) -> bytes:
@@ -24,7 +24,7 @@ async def report_of(job: Mapping[str, Any]) -> bytes:
 
     Raises ``SimulationError`` with the error of the run or of the report, or if the report takes too long.
     """
-    return _page(await answer_of(write, job, MOST_SECONDS))
+    return _page(await answer_of(write, job, MAX_SECONDS))
 
 
 def _page(reply: bytes) -> bytes:

@@ -11,7 +11,7 @@ from armblocks.diagram.mask_tuning import tunable_parameters
 from armblocks.studio.protocol.messages.runs import Tunable
 from armblocks.studio.sheet.parameter_values import parameter_json
 
-LONGEST = 64
+MAX_NUMBERS = 64
 """Limit of the numbers in a displayed parameter; larger tables are edited in their file."""
 
 
@@ -27,7 +27,7 @@ def tunables(diagram: Diagram) -> list[Tunable]:
             high=_bound(rule.maximum),
         )
         for path, rule, value in tunable_parameters(diagram)
-        if np.size(np.asarray(value)) <= LONGEST
+        if np.size(np.asarray(value)) <= MAX_NUMBERS
     ]
 
 

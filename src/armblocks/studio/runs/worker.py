@@ -43,10 +43,10 @@ from armblocks.studio.sheet.parameter_values import tuned_value
 
 Array = NDArray[np.float64]
 FRAME_SECONDS = 1 / 60
-MOST_MEMORY = 8 * 2**30
+MAX_MEMORY_BYTES = 8 * 2**30
 """Limit of the address space of a worker, bytes."""
-MOST_CPU_SECONDS = 3600
-MOST_NUMBERS = 16_000_000
+MAX_CPU_SECONDS = 3600
+MAX_NUMBERS = 16_000_000
 """Numbers of one run that a page receives, 128 MB; beyond it, only extreme values are sent."""
 
 
@@ -63,7 +63,7 @@ def work(pipe: Connection) -> None:
 def stride_of(run: DiagramRun) -> int:
     """Number of samples that are reduced to their extremes; 1 unless the samples fill the page's memory."""
     numbers = run.simulation.planned * (1 + run.simulation.compiled.signals_layout.size)
-    return 1 if numbers <= MOST_NUMBERS else math.ceil(2 * numbers / MOST_NUMBERS)
+    return 1 if numbers <= MAX_NUMBERS else math.ceil(2 * numbers / MAX_NUMBERS)
 
 
 def limit_process() -> None:
@@ -72,9 +72,9 @@ def limit_process() -> None:
         return
     import resource
 
-    resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
+    resource.setrlimit(resource.RLIMIT_AS, (MAX_MEMORY_BYTES, MAX_MEMORY_BYTES))
     # The soft limit sends SIGXCPU, which identifies its cause; the hard limit would look like lack of memory.
-    resource.setrlimit(resource.RLIMIT_CPU, (MOST_CPU_SECONDS, MOST_CPU_SECONDS + 5))
+    resource.setrlimit(resource.RLIMIT_CPU, (MAX_CPU_SECONDS, MAX_CPU_SECONDS + 5))
 
 
 def begin_run(job: Mapping[str, Any]) -> RunHistory:
@@ -262,7 +262,7 @@ class _Run:
                     for slot in run.simulation.signals_layout
                 ],
                 views=[
-                    run_messages.ViewOf(
+                    run_messages.SinkView(
                         block=name,
                         kind=view.kind.value,
                         signals=list(view.signals),

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from armblocks.studio.server.hub import Hub
 
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
-MOST_MESSAGE_BYTES = 8 * 2**20
+MAX_MESSAGE_BYTES = 8 * 2**20
 
 
 def serve(
@@ -63,7 +63,7 @@ def serve(
         log_config=log_settings(keys.secrets),
         access_log=False,  # access logs would contain the login link
         server_header=False,
-        ws_max_size=MOST_MESSAGE_BYTES,
+        ws_max_size=MAX_MESSAGE_BYTES,
         ws="websockets-sansio",
         timeout_graceful_shutdown=1,
     )

@@ -44,7 +44,7 @@ class DataRequests:
         """Register the handlers of the requests about data files."""
         answers.on(data_messages.DataFileList, self._files)
         answers.on(data_messages.PreviewTable, self._preview)
-        answers.on(data_messages.KeepFile, self._keep)
+        answers.on(data_messages.StoreFile, self._keep)
         answers.on(data_messages.ReadSource, self._source)
         answers.on(data_messages.TrustSource, self._trust)
 
@@ -75,7 +75,7 @@ class DataRequests:
 
         return await asyncio.to_thread(read)
 
-    async def _keep(self, _: Page, request: data_messages.KeepFile) -> data_messages.KeptFile:
+    async def _keep(self, _: Page, request: data_messages.StoreFile) -> data_messages.StoredFile:
         data = dropped_bytes(request.content, request.name[:80])
         name = PurePath(request.name).name
         path = self._folder.path(name, TABLE_SUFFIXES)
@@ -93,7 +93,7 @@ class DataRequests:
         stored = await asyncio.to_thread(store)
         if stored:
             self._recheck()
-        return data_messages.KeptFile(path=name, stored=stored)
+        return data_messages.StoredFile(path=name, stored=stored)
 
     async def _source(self, _: Page, request: data_messages.ReadSource) -> data_messages.FunctionSource:
         path = self._folder.path(request.file, SOURCE_SUFFIXES)

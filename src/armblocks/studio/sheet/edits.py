@@ -72,7 +72,7 @@ from armblocks.studio.sheet.typed_settings import with_settings
 
 DEFAULT_ROBOT = "puma560"
 """The robot of a new robot block."""
-MOST_BLOCKS = 20_000
+MAX_BLOCKS = 20_000
 """Largest number of blocks on a sheet in the editor."""
 
 
@@ -132,11 +132,11 @@ def _paste(edit: PasteBlocks, diagram: Diagram, context: EditContext) -> Diagram
 
 
 def _check_room(diagram: Diagram, count: int) -> None:
-    if len(diagram.blocks) + count > MOST_BLOCKS:
+    if len(diagram.blocks) + count > MAX_BLOCKS:
         raise DiagramError(
             f"the sheet would have {len(diagram.blocks) + count} blocks",
             where=f"diagram '{diagram.name}'",
-            allowed=f"at most {MOST_BLOCKS}",
+            allowed=f"at most {MAX_BLOCKS}",
             fix="group some of them into subsystems",
         )
 

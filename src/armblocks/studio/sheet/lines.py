@@ -13,7 +13,7 @@ from armblocks.drawing.wires import moved_bends
 from armblocks.studio.protocol.messages.sheets import WireLines
 
 Lines = Mapping[str, WireLines]
-_MOST_SHEETS = 16
+_MAX_SHEETS = 16
 
 
 class SheetLines:
@@ -81,7 +81,7 @@ class LinesOfSheets:
         """Return the lines of the sheet at a path of a document."""
         lines = self._sheets.pop((document, path), None) or SheetLines()
         self._sheets[document, path] = lines
-        if len(self._sheets) > _MOST_SHEETS:
+        if len(self._sheets) > _MAX_SHEETS:
             del self._sheets[next(iter(self._sheets))]
         return lines
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from armblocks.diagram import Block, Diagram, DiagramBlock, ParameterKind
-from armblocks.studio.protocol.messages.sheets import Found, Outline
+from armblocks.studio.protocol.messages.sheets import FoundBlock, Outline
 from armblocks.studio.sheet.parameter_values import parameter_json
 
-MOST_FOUND = 50
-MOST_TEXT = 60
+MAX_RESULTS = 50
+MAX_TEXT_LENGTH = 60
 """Number of displayed characters of a value."""
 
 
@@ -25,13 +25,13 @@ def outline(diagram: Diagram) -> Outline:
     )
 
 
-def find(diagram: Diagram, text: str) -> list[Found]:
+def find(diagram: Diagram, text: str) -> list[FoundBlock]:
     """Return the blocks of all sheets whose name, type or values contain every word of ``text``, best first.
 
     A word at the beginning of a name ranks first, then a word in a name, in a type, in a value.
     """
     words = text.lower().split()
-    ranked: list[tuple[int, int, Found]] = []
+    ranked: list[tuple[int, int, FoundBlock]] = []
     for path, name, block in _blocks(diagram, ()):
         rank, matches = 0, list[str]()
         for word in words:
@@ -39,10 +39,10 @@ def find(diagram: Diagram, text: str) -> list[Found]:
             rank = max(rank, word_rank)
             matches += [match] if match else []
         if words and rank < _NO_MATCH:
-            found = Found(inside=list(path), name=name, title=block.title, match=", ".join(matches))
+            found = FoundBlock(inside=list(path), name=name, title=block.title, match=", ".join(matches))
             ranked.append((rank, len(path), found))
     ranked.sort(key=lambda entry: entry[:2])
-    return [found for _, _, found in ranked[:MOST_FOUND]]
+    return [found for _, _, found in ranked[:MAX_RESULTS]]
 
 
 _NO_MATCH = 9
@@ -61,7 +61,9 @@ def _rank(name: str, block: Block, word: str) -> tuple[int, str]:
             continue
         text_of_rule = f"{rule.name} = {_text(parameter_json(block.parameter_value(rule.name)))}"
         if word in text_of_rule.lower():
-            return 3, text_of_rule if len(text_of_rule) <= MOST_TEXT else f"{text_of_rule[: MOST_TEXT - 1]}…"
+            return 3, text_of_rule if len(
+                text_of_rule
+            ) <= MAX_TEXT_LENGTH else f"{text_of_rule[: MAX_TEXT_LENGTH - 1]}…"
     return _NO_MATCH, ""
 
 

@@ -46,7 +46,7 @@ class SheetQueries:
 
     def register(self, answers: Answers) -> None:
         """Register the handlers of the requests about sheets."""
-        answers.on(sheet_messages.Look, self._look)
+        answers.on(sheet_messages.ShowSheet, self._show_sheet)
         answers.on(sheet_messages.RouteWires, self._route)
         answers.on(sheet_messages.AskOutline, self._outline)
         answers.on(sheet_messages.AskMask, self._mask)
@@ -58,7 +58,7 @@ class SheetQueries:
     def _sheet(self, document: str, path: Sequence[str] = ()) -> Diagram:
         return inside(self._diagrams[document].document.diagram, path)
 
-    async def _look(self, page: Page, request: sheet_messages.Look) -> None:
+    async def _show_sheet(self, page: Page, request: sheet_messages.ShowSheet) -> None:
         await self._documents.show(page, self._diagrams[request.document], tuple(request.inside))
 
     async def _route(
@@ -86,7 +86,7 @@ class SheetQueries:
         sheet = self._sheet(request.document, request.inside)
         return clipped(sheet, request.blocks, request.notes, self._resolve_robot, self._folder.root)
 
-    async def _find(self, _: Page, request: sheet_messages.Find) -> list[sheet_messages.Found]:
+    async def _find(self, _: Page, request: sheet_messages.Find) -> list[sheet_messages.FoundBlock]:
         return find(self._sheet(request.document), request.text)
 
     async def _typed_settings(self, _: Page, request: sheet_messages.TypedSettings) -> dict[str, str]:

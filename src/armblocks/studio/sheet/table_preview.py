@@ -14,10 +14,10 @@ from armblocks.studio.protocol.message import Fault
 from armblocks.studio.protocol.messages.data_files import TableColumn, TablePreview
 
 FIRST_ROWS = 6
-MOST_COLUMNS = 500
-MOST_SHOWN = 12
+MAX_COLUMNS = 500
+MAX_SHOWN = 12
 """Number of columns whose rows and curves are shown."""
-MOST_POINTS = 600
+MAX_POINTS = 600
 
 
 def table_preview(file: ColumnFile, shown: str, time: str, columns: Sequence[str]) -> TablePreview:
@@ -34,11 +34,11 @@ def table_preview(file: ColumnFile, shown: str, time: str, columns: Sequence[str
     return TablePreview(
         columns=[
             TableColumn(name=c.name, unit=c.unit, kind=c.kind, rows=c.rows, fault=c.fault)
-            for c in file.columns[:MOST_COLUMNS]
+            for c in file.columns[:MAX_COLUMNS]
         ],
         time=key,
         chosen=chosen,
-        rows=_rows([known[name] for name in [key, *chosen[:MOST_SHOWN]] if name in known]),
+        rows=_rows([known[name] for name in [key, *chosen[:MAX_SHOWN]] if name in known]),
         count=0 if table is None else table.shape[0],
         spacing=spacing,
         times=times,
@@ -66,8 +66,8 @@ def _curves(table: TimeTable | None) -> tuple[list[float], list[list[float]], tu
         return [], [], (0.0, 0.0)
     rows = np.asarray(table)
     steps = np.diff(rows[:, 0])
-    group = max(1, -(-2 * len(rows) // MOST_POINTS))
-    shown = rows[:, 1 : 1 + MOST_SHOWN]
+    group = max(1, -(-2 * len(rows) // MAX_POINTS))
+    shown = rows[:, 1 : 1 + MAX_SHOWN]
     times: list[float] = []
     curves: list[list[float]] = [[] for _ in range(shown.shape[1])]
     for start in range(0, len(rows), group):

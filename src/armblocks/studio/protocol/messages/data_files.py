@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from armblocks.studio.protocol.message import Fault, Message, Request
-from armblocks.studio.protocol.messages.documents import MOST_DROPPED
+from armblocks.studio.protocol.messages.documents import MAX_DROPPED_BYTES
 
 Path = Annotated[str, Field(max_length=1000)]
 Name = Annotated[str, Field(max_length=1000)]
@@ -44,8 +44,8 @@ class TablePreview(Message):
     """The columns of a file, and the table of the chosen ones, or its ``fault``.
 
     ``time`` is the column with the times, ``chosen`` are those of the values. ``rows`` are the first rows of
-    these columns as text. ``times`` (s) and ``curves`` are points for a plot: the least and the greatest
-    values of groups of rows. ``spacing`` is the least and the greatest distance of two times, s.
+    these columns as text. ``times`` (s) and ``curves`` are points for a plot: minimum and maximum of groups
+    of rows. ``spacing`` has the minimum and the maximum difference of successive times, s.
     """
 
     columns: list[TableColumn]
@@ -69,19 +69,19 @@ class PreviewTable(Request[TablePreview]):
     columns: Annotated[list[Name], Field(max_length=10_000)] = Field(default_factory=list[Name])
 
 
-class KeptFile(Message):
-    """The path of a dropped file; ``stored`` is false if another file has this name."""
+class StoredFile(Message):
+    """The path of a dropped file; ``stored`` is false if a file with this name and another content exists."""
 
     path: str
     stored: bool
 
 
-class KeepFile(Request[KeptFile]):
-    """Store a dropped file with a table in the project folder; ``replace``: also over another file."""
+class StoreFile(Request[StoredFile]):
+    """Store a dropped table file in the project folder; ``replace``: overwrite a file of the same name."""
 
-    kind: Literal["keep_file"] = "keep_file"
+    kind: Literal["store_file"] = "store_file"
     name: str = Field(max_length=255)
-    content: str = Field(max_length=4 * MOST_DROPPED // 3 + 4)
+    content: str = Field(max_length=4 * MAX_DROPPED_BYTES // 3 + 4)
     """Content of the file, base64."""
     replace: bool = False
 
@@ -118,9 +118,9 @@ class ReadSource(Request[FunctionSource]):
 
 
 class TrustSource(Request[None]):
-    """Trust the content of a Python file that the page has shown, or no content of it.
+    """Trust a Python file with the content that the page has shown, or withdraw the trust.
 
-    Refused if the file has another content than ``digest`` by now.
+    The request is refused if the content of the file no longer has this ``digest``.
     """
 
     kind: Literal["trust_source"] = "trust_source"

@@ -14,7 +14,7 @@ from armblocks.studio.protocol.message import AnyOf, Edit, Event, Message, Reque
 
 DocumentKind = Literal["diagram", "robot"]
 Disk = Literal["same", "changed", "gone"]
-MOST_DROPPED = 5 * 2**20
+MAX_DROPPED_BYTES = 5 * 2**20
 """Largest size of a file that is dropped on the studio, bytes."""
 
 # -- data of documents ---------------------------------------------------------------------------------------
@@ -96,7 +96,7 @@ class Drop(Request[list[str]]):
 
     kind: Literal["drop"] = "drop"
     name: str = Field(max_length=255)
-    content: str = Field(max_length=4 * MOST_DROPPED // 3 + 4)
+    content: str = Field(max_length=4 * MAX_DROPPED_BYTES // 3 + 4)
     """Content of the file, base64."""
 
 
@@ -173,10 +173,10 @@ class Reload(Alteration):
     kind: Literal["reload"] = "reload"
 
 
-class KeepMine(Request[None]):
+class IgnoreFileChange(Request[None]):
     """Keep the document although its file has changed on disk; the next save overwrites the file."""
 
-    kind: Literal["keep_mine"] = "keep_mine"
+    kind: Literal["ignore_file_change"] = "ignore_file_change"
     document: str
 
 

@@ -115,7 +115,7 @@ class AskRobotTables(Request[RobotTables]):
     kind: Literal["robot_tables"] = "robot_tables"
 
 
-class OfRobot(Request[ReplyT], Generic[ReplyT]):
+class RobotRequest(Request[ReplyT], Generic[ReplyT]):
     """A request about the robot of a document; ``block`` selects the robot of a block in a diagram."""
 
     document: str
@@ -123,20 +123,20 @@ class OfRobot(Request[ReplyT], Generic[ReplyT]):
     block: str = ""
 
 
-class AskScene(OfRobot[RobotScene]):
+class AskScene(RobotRequest[RobotScene]):
     """Return the bodies of a robot."""
 
     kind: Literal["scene"] = "scene"
 
 
-class AskPose(OfRobot[list[list[list[float]]]]):
+class AskPose(RobotRequest[list[list[list[float]]]]):
     """Return the poses of base, links and tool of a robot at ``q``: (L+2, 4, 4)."""
 
     kind: Literal["pose"] = "pose"
     q: Joints
 
 
-class AskPicture(OfRobot[str]):
+class AskPicture(RobotRequest[str]):
     """Return a drawing of a robot at ``q``, as SVG."""
 
     kind: Literal["picture"] = "picture"

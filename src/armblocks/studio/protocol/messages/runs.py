@@ -11,7 +11,7 @@ from armblocks.studio.protocol.message import Event, Fault, Message, Request
 # -- data of a run -------------------------------------------------------------------------------------------
 
 
-class ViewOf(Message):
+class SinkView(Message):
     """The plot or 3-D view of a sink; ``signals`` are the recorded signals that it shows."""
 
     block: str
@@ -114,7 +114,7 @@ class RunStarted(RunEvent):
     run: str
     stop_time: float
     channels: list[Channel]
-    views: list[ViewOf]
+    views: list[SinkView]
     aliases: dict[str, str]
     tunables: list[Tunable]
     stride: int

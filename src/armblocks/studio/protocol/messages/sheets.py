@@ -32,7 +32,7 @@ class Outline(Message):
     subsystems: list[Outline]
 
 
-class Found(Message):
+class FoundBlock(Message):
     """A block found by a search; ``match`` is the matching value, ``""`` if the name or type matches."""
 
     inside: list[str]
@@ -190,10 +190,10 @@ class DiagramChange(ContentChange):
     settings: dict[str, bool | float | str | None]
 
 
-class Look(Request[None]):
+class ShowSheet(Request[None]):
     """Display the sheet inside a subsystem; the empty path is the top sheet."""
 
-    kind: Literal["look"] = "look"
+    kind: Literal["show_sheet"] = "show_sheet"
     document: str
     inside: list[str]
 
@@ -246,7 +246,7 @@ class AskMask(Request[SetMask]):
     block: str = ""
 
 
-class Find(Request[list[Found]]):
+class Find(Request[list[FoundBlock]]):
     """Search all sheets for blocks by words in names, types and values."""
 
     kind: Literal["find"] = "find"
