@@ -12,6 +12,7 @@ import { MaskDialog } from './inspector/mask_dialog'
 import { Find } from './library/find'
 import { QuickInsert } from './library/quick_insert'
 import { Configuration } from './run/configuration'
+import { ParameterSets } from './run/parameter_sets_dialog'
 import { Shortcuts } from './shortcuts'
 
 /** All dialogs, in one bundle that is loaded after the first rendering. */
@@ -22,6 +23,7 @@ export function AllDialogs() {
       <BlockDialog />
       <MaskDialog />
       <Configuration />
+      <ParameterSets />
       <QuickInsert />
       <ConnectDialog />
       <CommandPalette />

@@ -2,7 +2,7 @@ import { align, comment, distribute, flip, ground, group, rotate, selectedBlocks
 import { rename } from './canvas/block_node'
 import { copy, cut, duplicate, paste } from './canvas/clipboard'
 import { addNote, sheetView, ZOOM_STEP } from './canvas/sheet_actions'
-import { openConfiguration, openMask, openTour, save, showDialog } from './dialogs'
+import { openConfiguration, openMask, openParameterSets, openTour, save, showDialog } from './dialogs'
 import { exportDrawing, openReport } from './documents/export'
 import { control, startOrResume } from './run/start'
 import { alterDocument, ask, change, openSheet, useStudio } from './store'
@@ -127,6 +127,7 @@ const COMMANDS: Command[] = [
   { title: 'Export the sheet as PNG', run: () => exportDrawing('png') },
   { title: 'Export the sheet as PDF', run: () => exportDrawing('pdf') },
   { title: 'Configuration parameters', keys: 'Ctrl+E', run: openConfiguration },
+  { title: 'Parameter sets: save, apply and compare', run: openParameterSets },
   { title: 'Take the tour', run: openTour },
   { title: 'All commands by name', keys: 'Ctrl+K', run: () => showDialog('commands') },
   { title: 'All keys', keys: '?', run: () => showDialog('keys') },

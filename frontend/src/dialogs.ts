@@ -12,6 +12,7 @@ type Dialog =
   | 'connect'
   | 'configuration'
   | 'mask'
+  | 'parameter_sets'
   | 'save_as'
   | 'open'
   | 'recovery'
@@ -66,6 +67,11 @@ export const openTour = (): void => useTour.setState({ stop: 0 })
 /** The configuration parameters belong to a document. */
 export function openConfiguration(): void {
   if (useStudio.getState().document) showDialog('configuration')
+}
+
+/** The parameter sets belong to a document. */
+export function openParameterSets(): void {
+  if (useStudio.getState().document) showDialog('parameter_sets')
 }
 
 /** Edit the mask of a subsystem on the sheet; without a block, the mask of the sheet. */

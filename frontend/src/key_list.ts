@@ -63,6 +63,7 @@ export const KEYS: KeyGroup[] = [
       'documents/tour.tsx',
       'scopes/inspector.tsx',
       'run/tune_panel.tsx',
+      'run/parameter_sets_dialog.tsx',
       'robot/editor/joints_panel.tsx',
     ],
     keys: [

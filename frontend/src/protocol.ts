@@ -29,6 +29,7 @@ export interface Envelope {
     | Open
     | OpenShipped
     | AskOutline
+    | AskParameterSets
     | AskPicture
     | Ping
     | AskPose
@@ -97,6 +98,7 @@ export interface Change {
     | AddBlocks
     | AddJoint
     | SetAppearance
+    | ApplyParameterSet
     | ArrangeBlocks
     | BendWires
     | BreakLink
@@ -118,8 +120,12 @@ export interface Change {
     | PasteBlocks
     | RemoveBlocks
     | RemoveJoint
+    | RemoveParameterSet
+    | RemoveSetParameter
     | Rename
     | RenameLink
+    | RenameParameterSet
+    | SaveParameterSet
     | SetSettings;
 }
 /**
@@ -182,6 +188,13 @@ export interface SetAppearance {
   blocks: string[];
   name_side?: ("auto" | "below" | "above" | "left" | "right" | "hidden") | null;
   colour?: ("none" | "red" | "orange" | "yellow" | "green" | "cyan" | "blue" | "purple" | "grey") | null;
+}
+/**
+ * Write the values of a parameter set into the model.
+ */
+export interface ApplyParameterSet {
+  kind: "apply_parameter_set";
+  name: string;
 }
 /**
  * Lay out the blocks of a sheet again, from left to right.
@@ -402,6 +415,20 @@ export interface RemoveJoint {
   link: string;
 }
 /**
+ * Remove a parameter set.
+ */
+export interface RemoveParameterSet {
+  kind: "remove_parameter_set";
+  name: string;
+}
+/**
+ * Remove a parameter from all parameter sets, also one that does not exist in the model.
+ */
+export interface RemoveSetParameter {
+  kind: "remove_set_parameter";
+  path: string;
+}
+/**
  * Rename a block; its wires and its position remain.
  */
 export interface Rename {
@@ -416,6 +443,29 @@ export interface RenameLink {
   kind: "rename_link";
   link: string;
   name: string;
+}
+/**
+ * Rename a parameter set.
+ */
+export interface RenameParameterSet {
+  kind: "rename_parameter_set";
+  name: string;
+  to: string;
+}
+/**
+ * Store values of parameters, by ``block.parameter``, under a name.
+ *
+ * ``of_others``: also the model's values of the parameters of all other sets. ``replace``: the values
+ * replace those of a set with this name, which must exist.
+ */
+export interface SaveParameterSet {
+  kind: "save_parameter_set";
+  name: string;
+  values: {
+    [k: string]: unknown;
+  };
+  of_others?: boolean;
+  replace?: boolean;
 }
 /**
  * Change run settings, by the names of ``SimulationOptions``; ``None`` restores the default.
@@ -518,6 +568,17 @@ export interface OpenShipped {
 export interface AskOutline {
   kind: "outline";
   document: string;
+}
+/**
+ * Return the parameter sets of a model, and its values of their parameters and of those in ``also``.
+ */
+export interface AskParameterSets {
+  kind: "parameter_sets";
+  document: string;
+  /**
+   * @maxItems 1000
+   */
+  also?: string[];
 }
 /**
  * Return a drawing of a robot at ``q``, as SVG.
@@ -737,13 +798,14 @@ export interface TrustSource {
   trusted: boolean;
 }
 /**
- * Change a tunable parameter during a run.
+ * Change tunable parameters during a run, by ``block.parameter``, all at the same time.
  */
 export interface Tune {
   run: string;
   kind: "tune";
-  parameter: string;
-  value: unknown;
+  values: {
+    [k: string]: unknown;
+  };
 }
 /**
  * Parse a text typed into a parameter field; the reply is its value, a refusal describes the error.
@@ -1232,6 +1294,7 @@ export interface Replies {
   open: string[];
   open_shipped: string;
   outline: Outline;
+  parameter_sets: ParameterSetTable;
   picture: string;
   ping: null;
   pose: number[][][];
@@ -1293,11 +1356,37 @@ export interface Outline {
   subsystems: Outline[];
 }
 /**
+ * The parameter sets of a model: values by set and path, and the faults of values that are invalid.
+ */
+export interface ParameterSetTable {
+  parameters: SetParameter[];
+  sets: {
+    [k: string]: {
+      [k: string]: unknown;
+    };
+  };
+  faults: {
+    [k: string]: {
+      [k: string]: string;
+    };
+  };
+}
+/**
+ * A parameter of parameter sets: its value in the model, and whether it may change during a run.
+ */
+export interface SetParameter {
+  path: string;
+  unit: string;
+  doc: string;
+  value: unknown;
+  tunable: boolean;
+}
+/**
  * The columns of a file, and the table of the chosen ones, or its ``fault``.
  *
  * ``time`` is the column with the times, ``chosen`` are those of the values. ``rows`` are the first rows of
- * these columns as text. ``times`` (s) and ``curves`` are points for a plot: the minimum and
- * the maximum of groups of rows. ``spacing`` is the minimum and the maximum difference of successive times, s.
+ * these columns as text. ``times`` (s) and ``curves`` are points for a plot: minimum and maximum of groups
+ * of rows. ``spacing`` has the minimum and the maximum difference of successive times, s.
  */
 export interface TablePreview {
   columns: TableColumn[];

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
         diagram_difference,
         formula,
         with_comments,
+        with_parameter_set,
     )
     from armblocks.equations import SimulationOptions
     from armblocks.face.arm import Arm
@@ -119,6 +120,7 @@ else:
             "trim": "armblocks.face.trimming",
             "write_files": "armblocks.face.reporting",
             "with_comments": "armblocks.diagram",
+            "with_parameter_set": "armblocks.diagram",
             "write_report": "armblocks.face.reporting",
         },
     )
@@ -178,6 +180,7 @@ __all__ = [
     "to_python",
     "trim",
     "with_comments",
+    "with_parameter_set",
     "write_files",
     "write_report",
 ]

@@ -3,10 +3,11 @@ import { IconArrowBackUp, IconPin, IconPinFilled } from '@tabler/icons-react'
 import { useEffect, useMemo, useState } from 'react'
 import { create } from 'zustand'
 import { valueText } from '../inspector/value_text'
-import { newKey } from '../keys'
 import type { Tunable } from '../protocol'
-import { ask, useStudio } from '../store'
+import { useStudio } from '../store'
+import { ParameterSetMenu } from './parameter_set_menu'
 import { useRuns } from './runs'
+import { dropTrialValues, keepTrialValues, tryValue, useKnownParameters } from './trial_values'
 
 interface PinnedParameters {
   pinned: ReadonlySet<string>
@@ -26,8 +27,11 @@ function useTunables(): Map<string, Tunable> {
   const library = useStudio((s) => s.library)
   const pathPrefix = useStudio((s) => s.document?.inside.map((name) => `${name}/`).join('') ?? '')
   const ofRun = useStudio((s) => s.run?.tunables)
+  const ofSets = useKnownParameters((s) => s.parameters)
   return useMemo(() => {
     const tunables = new Map((ofRun ?? []).map((tunable) => [tunable.path, tunable]))
+    for (const [path, parameter] of ofSets)
+      tunables.set(path, { low: null, high: null, ...tunables.get(path), ...parameter })
     for (const block of Object.values(blocks ?? {})) {
       if (block.comment) continue
       for (const rule of library.get(block.type)?.parameters ?? []) {
@@ -45,7 +49,7 @@ function useTunables(): Map<string, Tunable> {
       }
     }
     return tunables
-  }, [blocks, library, pathPrefix, ofRun])
+  }, [blocks, library, pathPrefix, ofRun, ofSets])
 }
 
 /** Tunable parameters of the selected and pinned blocks, which can be changed during a run. */
@@ -65,6 +69,7 @@ export function TunePanel() {
   const count = Object.keys(trialValues).length
   return (
     <div className="tune">
+      <ParameterSetMenu />
       <div className="tuned-rows">
         {listed.map((tunable) => (
           <TuneRow key={tunable.path} tunable={tunable} />
@@ -84,7 +89,7 @@ export function TunePanel() {
           <Button
             size="compact-xs"
             variant="default"
-            onClick={() => dropTrialValues(Object.keys(trialValues), tunables)}
+            onClick={() => void dropTrialValues(Object.keys(trialValues))}
           >
             Drop
           </Button>
@@ -97,52 +102,6 @@ export function TunePanel() {
   )
 }
 
-function send(path: string, value: unknown): void {
-  const { run } = useStudio.getState()
-  if (run?.state === 'running' || run?.state === 'paused')
-    void ask({ kind: 'tune', run: run.run, parameter: path, value })
-}
-
-const unsentValues = new Map<string, unknown>()
-
-/** Try a value; at most once a frame while a slider moves. */
-function tryValue(path: string, value: unknown): void {
-  useRuns.setState((s) => ({ trialValues: { ...s.trialValues, [path]: value } }))
-  if (!unsentValues.size)
-    requestAnimationFrame(() => {
-      unsentValues.forEach((latest, path) => send(path, latest))
-      unsentValues.clear()
-    })
-  unsentValues.set(path, value)
-}
-
-function dropTrialValues(paths: string[], tunables: Map<string, Tunable>): void {
-  for (const path of paths) {
-    unsentValues.delete(path)
-    const modelValue = tunables.get(path)?.value
-    if (modelValue !== undefined) send(path, modelValue)
-  }
-  useRuns.setState((s) => ({
-    trialValues: Object.fromEntries(Object.entries(s.trialValues).filter(([path]) => !paths.includes(path))),
-  }))
-}
-
-/** Keep all trial values in the model, as one undo step. */
-async function keepTrialValues(): Promise<void> {
-  const { document } = useStudio.getState()
-  const { trialValues } = useRuns.getState()
-  if (!document) return
-  const edit = { kind: 'keep_tuned' as const, values: trialValues }
-  const version = await ask({
-    kind: 'change',
-    document: document.state.document,
-    key: newKey(),
-    inside: [],
-    edit,
-  })
-  if (version !== undefined) useRuns.setState({ trialValues: {} })
-}
-
 function TuneRow({ tunable }: { tunable: Tunable }) {
   const { path, unit, doc } = tunable
   const trialValues = useRuns((s) => s.trialValues)
@@ -151,7 +110,7 @@ function TuneRow({ tunable }: { tunable: Tunable }) {
   const text = valueText(value)
   const [typed, setTyped] = useState(text)
   useEffect(() => setTyped(text), [text])
-  const lastDot = path.lastIndexOf('.')
+  const nameAt = path.lastIndexOf('.') + 1
   const commit = () => {
     const number = Number(typed)
     if (typed.trim() && typed !== text) tryValue(path, Number.isFinite(number) ? number : typed)
@@ -160,8 +119,11 @@ function TuneRow({ tunable }: { tunable: Tunable }) {
     <div className={changed ? 'tune-row changed' : 'tune-row'}>
       <div className="tune-head" title={doc}>
         <span className="path">
-          {path.slice(0, lastDot)}
-          <b>.{path.slice(lastDot + 1)}</b>
+          {path.slice(0, Math.max(nameAt - 1, 0))}
+          <b>
+            {nameAt > 0 && '.'}
+            {path.slice(nameAt)}
+          </b>
           {unit && <span className="unit"> {unit}</span>}
         </span>
         {changed && (
@@ -171,7 +133,7 @@ function TuneRow({ tunable }: { tunable: Tunable }) {
               variant="subtle"
               color="gray"
               aria-label={`Discard the value of ${path}`}
-              onClick={() => dropTrialValues([path], new Map([[path, tunable]]))}
+              onClick={() => void dropTrialValues([path])}
             >
               <IconArrowBackUp size={13} />
             </ActionIcon>

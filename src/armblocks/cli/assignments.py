@@ -9,9 +9,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from armblocks.errors import ArmblocksError, InputError
+
+if TYPE_CHECKING:
+    from armblocks import Diagram
 
 Value = float | bool | str | list[Any]
 
@@ -43,6 +46,20 @@ def parse_assignments(texts: Sequence[str]) -> dict[str, Value]:
             raise InputError(f"'{path}' is set twice", where="--set", fix="keep one of the two")
         values[path] = parse_value(value.strip(), where=f"--set {path}")
     return values
+
+
+def chosen_parameters(diagram: Diagram, set_name: str | None, texts: Sequence[str] | None) -> dict[str, Any]:
+    """Values by ``block.parameter``: those of a parameter set of the diagram, then those of ``--set``.
+
+    Raises ``UnknownNameError`` for an unknown set, and as
+    :func:`~armblocks.diagram.parameter_sets.checked_set` and :func:`parse_assignments`.
+    """
+    from armblocks.diagram.parameter_sets import checked_set, parameter_set, set_location
+
+    values: dict[str, Any] = {}
+    if set_name is not None:
+        values |= checked_set(diagram, parameter_set(diagram, set_name), set_location(diagram, set_name))
+    return values | parse_assignments(texts or [])
 
 
 def parse_value(text: str, where: str = "--set") -> Value:

@@ -61,3 +61,11 @@ ModelName = Annotated[
     ),
 ]
 """The argument of the commands that take a diagram."""
+ParameterSetName = Annotated[
+    str | None,
+    typer.Option(
+        "--parameter-set",
+        metavar="NAME",
+        help="Use the values of a parameter set of the model, before --set.",
+    ),
+]

@@ -64,7 +64,7 @@ def print_difference(difference: DiagramDifference, before: str, after: str, con
     removed = [f"{entry.path}: {_block_text(entry.block)}" for entry in difference.removed]
     renamed = [f"{entry.before} -> {entry.after} ({entry.block.type_name()})" for entry in difference.renamed]
     types = [f"{entry.path}: {entry.before} -> {entry.after}" for entry in difference.types]
-    settings, about, parameters, masks, comments, signals = (
+    settings, about, parameters, masks, comments, signals, sets = (
         [_change_text(entry, "." if entry.path else "") for entry in entries]
         for entries in (
             difference.settings,
@@ -73,6 +73,7 @@ def print_difference(difference: DiagramDifference, before: str, after: str, con
             difference.masks,
             difference.comments,
             difference.signal_names,
+            difference.parameter_sets,
         )
     )
     notes = [_change_text(entry, "") for entry in difference.notes]
@@ -81,6 +82,7 @@ def print_difference(difference: DiagramDifference, before: str, after: str, con
     _print_group("Masks", (("~", masks),), console)
     _print_group("Comments", (("~", comments),), console)
     _print_group("Signal names", (("~", signals),), console)
+    _print_group("Parameter sets", (("~", sets),), console)
     wires = (("-", _wires(difference.wires_removed)), ("+", _wires(difference.wires_added)))
     _print_group("Wires", wires, console)
     logged = (("-", _ports(difference.logged_removed)), ("+", _ports(difference.logged_added)))
@@ -226,6 +228,7 @@ def difference_document(difference: DiagramDifference) -> dict[str, object]:
         "masks": [_change(entry) for entry in difference.masks],
         "comments": [_change(entry) for entry in difference.comments],
         "signal_names": [_change(entry) for entry in difference.signal_names],
+        "parameter_sets": [_change(entry) for entry in difference.parameter_sets],
         "wires_added": [{"path": entry.path, "wire": str(entry.wire)} for entry in difference.wires_added],
         "wires_removed": [
             {"path": entry.path, "wire": str(entry.wire)} for entry in difference.wires_removed

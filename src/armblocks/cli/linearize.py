@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from armblocks.cli.assignments import parse_assignments
-from armblocks.cli.completion import ModelName
+from armblocks.cli.assignments import chosen_parameters
+from armblocks.cli.completion import ModelName, ParameterSetName
 from armblocks.cli.terminal import STRONG, results_console, table
 from armblocks.errors import InputError
 
@@ -53,6 +53,7 @@ def linearize(
         list[str] | None,
         typer.Option("--set", metavar="BLOCK.PARAMETER=VALUE", help="Change a parameter; may be repeated."),
     ] = None,
+    parameter_set: ParameterSetName = None,
     save: Annotated[Path | None, typer.Option(help="Also write a .json, .npz or .mat file.")] = None,
     report: Annotated[Path | None, typer.Option(help="Folder for all figures.")] = None,
     hertz: Annotated[bool, typer.Option("--hertz", help="Frequencies in Hz, not in rad/s.")] = False,
@@ -71,7 +72,7 @@ def linearize(
             where="armblocks linearize",
         )
     diagram = ab.load_diagram(model)
-    parameters = parse_assignments(assignments or [])
+    parameters = chosen_parameters(diagram, parameter_set, assignments)
     point: float | OperatingPoint = at
     if trimmed:
         point = ab.trim(diagram, free=free or (), at=at, parameters=parameters).point

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armblocks.cli.assignments import parse_assignments
-from armblocks.cli.completion import ModelName
+from armblocks.cli.assignments import chosen_parameters
+from armblocks.cli.completion import ModelName, ParameterSetName
 from armblocks.cli.progress import RunProgress
 from armblocks.cli.terminal import messages_console, results_console
 from armblocks.errors import FormatError, LimitWarning, SimulationError
@@ -73,6 +73,7 @@ def run(
         list[str] | None,
         typer.Option("--set", metavar="BLOCK.PARAMETER=VALUE", help="Change a parameter; may be repeated."),
     ] = None,
+    parameter_set: ParameterSetName = None,
     formats: Annotated[
         list[DataFormat] | None, typer.Option("--format", help="An additional data format; may be repeated.")
     ] = None,
@@ -88,8 +89,8 @@ def run(
     import armblocks as ab
     from armblocks.cli.summary import print_displays, print_files, print_motions, print_run
 
-    parameters = parse_assignments(assignments or [])
     diagram = ab.load_diagram(model, trust=trust)
+    parameters = chosen_parameters(diagram, parameter_set, assignments)
     settings = _given_settings(stop_time=stop_time, solver=solver, step=step, sample_time=sample_time)
     settings |= _given_settings(rtol=rtol, atol=atol, record_jumps=jumps)
     _check_files(diagram, formats or [])

@@ -23,6 +23,10 @@ def print_hierarchy(diagram: Diagram, console: Console) -> None:
         tree.add(Text(diagram.description, "italic"))
     for line in _mask_lines(diagram):
         tree.add(line)
+    for set_name, values in diagram.parameter_sets.items():
+        branch = tree.add(Text.assemble("parameter set ", (set_name, STRONG)))
+        for path, value in values.items():
+            branch.add(Text(f"{path} = {value_text(value)}"))
     _add_subsystems(tree, diagram)
     console.print(tree)
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
-from armblocks.cli.assignments import parse_assignments, parse_value
-from armblocks.cli.completion import ModelName
+from armblocks.cli.assignments import chosen_parameters, parse_value
+from armblocks.cli.completion import ModelName, ParameterSetName
 from armblocks.cli.terminal import STRONG, results_console, table
 from armblocks.errors import InputError, SimulationError
 
@@ -54,6 +54,7 @@ def trim(
         list[str] | None,
         typer.Option("--set", metavar="BLOCK.PARAMETER=VALUE", help="Change a parameter; may be repeated."),
     ] = None,
+    parameter_set: ParameterSetName = None,
     save: Annotated[
         Path | None, typer.Option(help="Save the point as .npz, for armblocks run --from-state.")
     ] = None,
@@ -68,7 +69,7 @@ def trim(
     import armblocks as ab
 
     diagram = ab.load_diagram(model)
-    parameters = parse_assignments(assignments or [])
+    parameters = chosen_parameters(diagram, parameter_set, assignments)
     console = results_console()
 
     only_model = not any((fixed, free, outputs, moving, guess, bounds, save))

@@ -38,6 +38,7 @@ from armblocks.diagram.mask import ParameterFormula, formula, mask_parameter
 from armblocks.diagram.model import sampling_of
 from armblocks.diagram.names import check_block_name
 from armblocks.diagram.parameter import REQUIRED, Parameter, ParameterKind, parameter, shape_of
+from armblocks.diagram.parameter_sets import with_parameter_set
 from armblocks.diagram.port import (
     Condition,
     DelayLine,
@@ -155,5 +156,6 @@ __all__ = [
     "shape_of",
     "trace_diagram",
     "with_comments",
+    "with_parameter_set",
     "with_parameters",
 ]

@@ -14,6 +14,7 @@ from armblocks.diagram.diagram import Connection, Diagram, Note, Placement, bloc
 from armblocks.diagram.mask import ParameterFormula, checked_mask, formula, mask_parameter, values_of
 from armblocks.diagram.names import check_block_name, check_signal_names, folded
 from armblocks.diagram.parameter import Parameter, Value
+from armblocks.diagram.parameter_sets import check_set_name, checked_set, set_location
 from armblocks.diagram.port import PortRef
 from armblocks.diagram.structure import (
     DiagramBlock,
@@ -100,6 +101,7 @@ class DiagramBuilder:
         self._logged: dict[PortRef, None] = {}
         self._commented: dict[str, Comment] = {}
         self._signal_names: dict[PortRef, str] = {}
+        self._parameter_sets: dict[str, dict[str, Any]] = {}
         self._mask: list[Parameter] = []
         self._mask_values: dict[str, Value] = {}
         self._outer: dict[str, ParameterFormula] = {}
@@ -258,6 +260,16 @@ class DiagramBuilder:
         check_signal_names(self._blocks, {**self._signal_names, ref: name}, f"diagram '{self.name}'")
         self._signal_names[ref] = name
 
+    def parameter_set(self, name: str, values: Mapping[str, Any]) -> None:
+        """Store values of parameters under a name: ``builder.parameter_set("stiff", {"pid.kp": 40.0})``.
+
+        The paths are those of ``simulate(parameters=…)``. The diagram keeps its own values:
+        ``ab.with_parameter_set(diagram, "stiff")`` applies those of the set. ``build`` checks them. Raises
+        ``DiagramError`` for an invalid name.
+        """
+        check_set_name(name, self._parameter_sets, f"diagram '{self.name}'")
+        self._parameter_sets[name] = dict(values)
+
     def comment_out(self, block: BlockHandle | str) -> None:
         """Comment a block out: it takes no part in the model, and its outputs are zeros of the same shapes.
 
@@ -286,6 +298,12 @@ class DiagramBuilder:
     def build(self) -> Diagram:
         """The frozen diagram, after all checks of :func:`armblocks.diagram.check.check_diagram`."""
         diagram = self.draft()
+        if diagram.parameter_sets:
+            sets = {
+                name: checked_set(diagram, values, set_location(diagram, name))
+                for name, values in diagram.parameter_sets.items()
+            }
+            diagram = dataclasses.replace(diagram, parameter_sets=sets)
         check_diagram(diagram)
         return diagram
 
@@ -306,6 +324,7 @@ class DiagramBuilder:
             signal_names=self._signal_names,
             mask=tuple(self._mask),
             mask_values=self._mask_values,
+            parameter_sets=self._parameter_sets,
         )
 
     def _next_port(self, kind: type[Inport | Outport]) -> int:

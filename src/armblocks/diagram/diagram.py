@@ -85,6 +85,13 @@ _APPEARANCE = {"rotation": ROTATIONS, "name_side": NAME_SIDES, "colour": BLOCK_C
 _READ_ONLY = ("blocks", "layout", "bends", "notes", "extras", "mask_values", "commented", "signal_names")
 """The fields of a diagram that are read-only mappings."""
 
+
+def _read_only_sets(sets: Mapping[str, Mapping[str, Value]]) -> Mapping[str, Mapping[str, Value]]:
+    return MappingProxyType(
+        {name: MappingProxyType(dict(sorted(values.items()))) for name, values in sorted(sets.items())}
+    )
+
+
 Gate = Mapping[str, PortRef]
 """The drivers of the hidden inputs of a block inside a conditional subsystem, such as ``?on``."""
 
@@ -140,6 +147,9 @@ class Diagram:
     :mod:`armblocks.diagram.comments`."""
     signal_names: Mapping[PortRef, str] = field(default_factory=dict[PortRef, str])
     """Names of the signals at outputs, see :mod:`armblocks.diagram.signal_names`."""
+    parameter_sets: Mapping[str, Mapping[str, Value]] = field(default_factory=dict[str, Mapping[str, Value]])
+    """Values of parameters by path, under the name of their set, see
+    :mod:`armblocks.diagram.parameter_sets`."""
     shares: Mapping[str, str] = field(default_factory=dict[str, str])
     """For a flat diagram: blocks that share the parameters of the block of the given name."""
     _cache: dict[str, object] = field(
@@ -169,16 +179,19 @@ class Diagram:
         for name in _READ_ONLY:
             ordered = dict(sorted(getattr(self, name).items()))
             object.__setattr__(self, name, MappingProxyType(ordered))
+        object.__setattr__(self, "parameter_sets", _read_only_sets(self.parameter_sets))
         object.__setattr__(self, "connections", tuple(sorted(self.connections)))
         object.__setattr__(self, "logged", tuple(sorted(self.logged)))
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state for pickling and copying: the fields without cached results."""
         state = {entry.name: getattr(self, entry.name) for entry in dataclasses.fields(self) if entry.init}
-        return state | {name: dict(state[name]) for name in _READ_ONLY}
+        sets = {name: dict(values) for name, values in self.parameter_sets.items()}
+        return state | {name: dict(state[name]) for name in _READ_ONLY} | {"parameter_sets": sets}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         read_only: dict[str, Any] = {name: MappingProxyType(state[name]) for name in _READ_ONLY}
+        read_only["parameter_sets"] = _read_only_sets(state["parameter_sets"])
         for name, value in (state | read_only).items():
             object.__setattr__(self, name, value)
         object.__setattr__(self, "_cache", {})

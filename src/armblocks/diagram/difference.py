@@ -75,8 +75,8 @@ class DiagramDifference:
     ``types`` are blocks of another type under the same name; their parameters are listed too, with ``None``
     where one type has no such parameter. A formula is compared as text. ``masks`` are changed mask
     declarations of the diagram at ``path``, ``comments`` changed comments of blocks, ``signal_names`` those
-    of signals. ``logged_*`` are outputs that are recorded without a Scope; ``notes`` are annotations, without
-    their positions.
+    of signals. ``parameter_sets`` are values of parameter sets, with the name ``set: path``. ``logged_*`` are
+    outputs that are recorded without a Scope; ``notes`` are annotations, without their positions.
     """
 
     added: tuple[PlacedBlock, ...] = ()
@@ -87,6 +87,7 @@ class DiagramDifference:
     masks: tuple[ValueChange, ...] = ()
     comments: tuple[ValueChange, ...] = ()
     signal_names: tuple[ValueChange, ...] = ()
+    parameter_sets: tuple[ValueChange, ...] = ()
     wires_added: tuple[PlacedWire, ...] = ()
     wires_removed: tuple[PlacedWire, ...] = ()
     logged_added: tuple[PlacedPort, ...] = ()
@@ -134,6 +135,7 @@ class _Findings:
     masks: list[ValueChange] = field(default_factory=list[ValueChange])
     comments: list[ValueChange] = field(default_factory=list[ValueChange])
     signal_names: list[ValueChange] = field(default_factory=list[ValueChange])
+    parameter_sets: list[ValueChange] = field(default_factory=list[ValueChange])
     wires_added: list[PlacedWire] = field(default_factory=list[PlacedWire])
     wires_removed: list[PlacedWire] = field(default_factory=list[PlacedWire])
     logged_added: list[PlacedPort] = field(default_factory=list[PlacedPort])
@@ -200,6 +202,13 @@ def _compare_sheets(before: Diagram, after: Diagram, path: str, findings: _Findi
         old_rule, new_rule = old_mask.get(name), new_mask.get(name)
         if old_rule != new_rule:
             findings.masks.append(ValueChange(path=path, name=name, before=old_rule, after=new_rule))
+    old_sets, new_sets = _set_values(before), _set_values(after)
+    for name in sorted({**old_sets, **new_sets}):
+        old_value, new_value = old_sets.get(name), new_sets.get(name)
+        if old_value != new_value:
+            findings.parameter_sets.append(
+                ValueChange(path=path, name=name, before=old_value, after=new_value)
+            )
     if before.description != after.description:
         findings.descriptions.append(
             ValueChange(path=path, name="description", before=before.description, after=after.description)
@@ -211,6 +220,14 @@ def _compare_sheets(before: Diagram, after: Diagram, path: str, findings: _Findi
         old_text, new_text = old_notes.get(name), new_notes.get(name)
         if old_text != new_text:
             findings.notes.append(ValueChange(path=path, name=name, before=old_text, after=new_text))
+
+
+def _set_values(diagram: Diagram) -> dict[str, object]:
+    """All values of the parameter sets, ``"set: path"``; a set without values is ``"set"``."""
+    values: dict[str, object] = {}
+    for name, entries in diagram.parameter_sets.items():
+        values |= {f"{name}: {path}": value for path, value in entries.items()} or {name: ()}
+    return values
 
 
 def _compare_blocks(before: Block, after: Block, path: str, findings: _Findings) -> None:

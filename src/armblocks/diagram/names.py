@@ -17,6 +17,12 @@ NOT_SIGNALS = ("time", "run")
 def check_block_name(name: str, where: str, noun: str = "block") -> None:
     """Raise ``DiagramError`` for a name unfit for a path, ``block/port`` or ``block.parameter``."""
     allowed = f"1 to {MAX_NAME_LENGTH} characters, without '/', '.' and control characters"
+    check_printable(name, where, noun, allowed, without="/.")
+
+
+def check_printable(name: str, where: str, noun: str, allowed: str, *, without: str = "") -> None:
+    """Raise ``DiagramError`` for a name that is blank or too long, or has a control character or one of
+    ``without``."""
     shown = repr(name if len(name) <= 60 else name[:57] + "...")
     if not name.strip():
         raise DiagramError(f"a {noun} has an empty name", where=where, allowed=allowed, fix="name it")
@@ -29,7 +35,7 @@ def check_block_name(name: str, where: str, noun: str = "block") -> None:
         )
     for character in name:
         # Category C: control characters, and invisible marks that change the text direction.
-        if character in "/." or unicodedata.category(character).startswith("C"):
+        if character in without or unicodedata.category(character).startswith("C"):
             raise DiagramError(
                 f"the {noun} name {shown} contains {character!r}",
                 where=where,

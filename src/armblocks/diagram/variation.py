@@ -26,9 +26,12 @@ def with_parameters(diagram: Diagram, values: Mapping[str, object]) -> Diagram:
     linked to a library. Raises ``UnknownNameError`` for an unknown block or parameter, ``DiagramError`` for a
     value that is invalid for the block or makes the diagram inconsistent.
     """
+    of_blocks: dict[str, dict[str, object]] = {}
     for path, value in values.items():
         name, _, parameter = path.rpartition(".")
-        diagram = _with_value(diagram, name, parameter, value)
+        of_blocks.setdefault(name, {})[parameter] = value
+    for name, of_block in of_blocks.items():
+        diagram = _with_values(diagram, name, of_block)
     check_diagram(diagram)
     return diagram
 
@@ -43,7 +46,7 @@ def with_comments(diagram: Diagram, comments: Mapping[str, Comment | None]) -> D
     linked to a library, and for an inconsistent diagram.
     """
     for path, comment in comments.items():
-        outside, level, name = _found(diagram, path)
+        outside, level, name = found_block(diagram, path)
         _check_unlinked(outside, path)
         if comment is not None:
             check_comment(path, level.block(name), comment)
@@ -54,11 +57,11 @@ def with_comments(diagram: Diagram, comments: Mapping[str, Comment | None]) -> D
     return diagram
 
 
-_Outside = Sequence[tuple[Diagram, str, DiagramBlock]]
+Outside = Sequence[tuple[Diagram, str, DiagramBlock]]
 """The enclosing subsystems of a level: their levels, names and blocks, outer ones first."""
 
 
-def _found(diagram: Diagram, path: str) -> tuple[_Outside, Diagram, str]:
+def found_block(diagram: Diagram, path: str) -> tuple[Outside, Diagram, str]:
     """The enclosing subsystems, the level and the name of the block at a path.
 
     Raises ``UnknownNameError`` for an unknown block.
@@ -76,7 +79,7 @@ def _found(diagram: Diagram, path: str) -> tuple[_Outside, Diagram, str]:
     return outside, diagram, name
 
 
-def _rebuilt(outside: _Outside, changed: Diagram) -> Diagram:
+def _rebuilt(outside: Outside, changed: Diagram) -> Diagram:
     """The outermost diagram with another innermost level."""
     for level, first, subsystem in reversed(outside):
         inside = dataclasses.replace(subsystem, diagram=changed)
@@ -84,27 +87,29 @@ def _rebuilt(outside: _Outside, changed: Diagram) -> Diagram:
     return changed
 
 
-def _with_value(diagram: Diagram, path: str, parameter: str, value: object) -> Diagram:
-    """A copy in which one parameter of the block at a path has another value."""
+def _with_values(diagram: Diagram, path: str, values: Mapping[str, object]) -> Diagram:
+    """A copy in which some parameters of the block at a path have other values.
+
+    The values of a block are checked together, because some parameters limit others.
+    """
     if not path:
-        if parameter not in diagram.mask_values:
-            known = [*diagram.mask_values, *(f"{name}.…" for name in diagram.blocks)]
-            raise UnknownNameError("parameter", parameter, known, where=f"diagram '{diagram.name}'")
-        return _located("", lambda: diagram.with_mask_values({parameter: value}))
-    outside, diagram, name = _found(diagram, path)
+        for parameter in values:
+            if parameter not in diagram.mask_values:
+                known = [*diagram.mask_values, *(f"{name}.…" for name in diagram.blocks)]
+                raise UnknownNameError("parameter", parameter, known, where=f"diagram '{diagram.name}'")
+        return _located("", lambda: diagram.with_mask_values(values))
+    outside, diagram, name = found_block(diagram, path)
     block = diagram.block(name)
-    _check_free(outside, path, block, parameter)
+    for parameter in values:
+        check_settable(outside, path, block, parameter)
     changed = dataclasses.replace(
         diagram,
-        blocks={
-            **diagram.blocks,
-            name: _located(path, lambda: block.with_parameters(**{parameter: value})),
-        },
+        blocks={**diagram.blocks, name: _located(path, lambda: block.with_parameters(**values))},
     )
     return _rebuilt(outside, changed)
 
 
-def _check_unlinked(outside: _Outside, path: str) -> None:
+def _check_unlinked(outside: Outside, path: str) -> None:
     """Raise ``DiagramError`` for a change inside a library block."""
     linked = next((k for k, (_, _, inside) in enumerate(outside) if inside.diagram.link), None)
     if linked is not None:
@@ -119,7 +124,7 @@ def _check_unlinked(outside: _Outside, path: str) -> None:
         )
 
 
-def _check_free(outside: _Outside, path: str, block: Block, parameter: str) -> None:
+def check_settable(outside: Outside, path: str, block: Block, parameter: str) -> None:
     """Raise ``DiagramError`` for a parameter that is set by a formula or a library."""
     _check_unlinked(outside, f"{path}.{parameter}")
     text = dict(block.formulas).get(parameter)

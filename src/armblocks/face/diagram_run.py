@@ -89,16 +89,26 @@ class DiagramRun:
         Nothing is compiled. Raises ``UnknownNameError`` for a name that does not exist, ``InputError`` for
         one that is not tunable, a value that its block does not allow, and a run that has ended.
         """
-        changed = with_parameters(self.diagram, {path: value})
+        self.set_all({path: value})
+
+    def set_all(self, values: Mapping[str, ArrayLike]) -> None:
+        """Change several tunable parameters at once, ``{"limit.lower": 2.0, "limit.upper": 3.0}``.
+
+        Parameters that limit each other are checked together. Raises as :meth:`set`; no value is then
+        changed.
+        """
+        changed = with_parameters(self.diagram, values)
         tuned = tuned_parameters(self.diagram, changed)
         if tuned is None:
-            follows = (
-                followers(self.diagram, path).structural if path in mask_parameters(self.diagram) else []
-            )
+            masks = mask_parameters(self.diagram)
+            follows = [
+                name for path in values if path in masks for name in followers(self.diagram, path).structural
+            ]
             why = f": '{follows[0]}', which depends on it, is not tunable" if follows else ""
+            shown = ", ".join(f"'{path}'" for path in values)
             names = [name for name, _, _ in tunable_parameters(self.diagram)]
             raise InputError(
-                f"parameter '{path}' cannot take this value during a run{why}",
+                f"parameter {shown} cannot take this value during a run{why}",
                 where=self.diagram.name,
                 allowed=f"tunable parameters, with unchanged shape: {', '.join(names)}",
                 fix="end the run, change the diagram and begin another run",

@@ -20,6 +20,9 @@ A diagram may declare parameters, its ``mask``; a block's ``formulas`` of them a
 their values are not written. The values of mask parameters are among the parameters of the subsystem block,
 for the outermost diagram under ``parameters`` of the document.
 
+``parameter_sets`` has named values of parameters by path, ``{"stiff": {"pid.kp": 40, "kp": 2}}``, see
+:mod:`armblocks.diagram.parameter_sets`. Each is checked by the rule of its parameter.
+
 A block that takes no part in the model has ``"commented": "out"`` or ``"through"``, see
 :mod:`armblocks.diagram.comments`.
 

@@ -104,6 +104,9 @@ class _Listing:
             f"{builder}.name_signal({_end(diagram, ref, names)}, {_text(name)})"
             for ref, name in diagram.signal_names.items()
         ]
+        for name, values in diagram.parameter_sets.items():
+            entries = ", ".join(f"{_text(path)}: {_value(value)}" for path, value in values.items())
+            written += _call(f"{builder}.parameter_set", [_text(name), f"{{{entries}}}"])
         written += [f"{builder}.comment_{mark}({names[name]})" for name, mark in diagram.commented.items()]
         return [*before, *written]
 

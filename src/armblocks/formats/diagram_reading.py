@@ -17,13 +17,14 @@ from armblocks.diagram import (
     check_block_count,
     formula,
 )
+from armblocks.diagram.parameter_sets import check_value_count, settable_parameter
 from armblocks.equations import SimulationOptions
-from armblocks.errors import UnknownNameError
+from armblocks.errors import ArmblocksError, UnknownNameError
 from armblocks.formats.json_document import Node
 from armblocks.formats.layout_json import Layout, connection_from
 from armblocks.formats.located_errors import located
 from armblocks.formats.mask_json import mask_parameter_from
-from armblocks.formats.parameter_json import is_diagram, parameter_from
+from armblocks.formats.parameter_json import is_diagram, parameter_from, plain_value, with_infinities
 from armblocks.formats.robot_references import RobotReader
 from armblocks.formats.subsystem_libraries import Libraries
 from armblocks.formats.unknown_members import Extras, split_extras
@@ -36,6 +37,7 @@ INNER_KEYS = (
     "connections",
     "logged",
     "signal_names",
+    "parameter_sets",
     "layout",
     "settings",
 )
@@ -95,8 +97,33 @@ class DiagramReader:
             builder.bend(wire, bends)
         for key, note in layout.notes.items():
             builder.note(key, note)
+        if "parameter_sets" in members:
+            self._add_parameter_sets(builder, members["parameter_sets"])
         with located(node):
             return builder.draft() if self.draft else builder.build()
+
+    def _add_parameter_sets(self, builder: DiagramBuilder, node: Node) -> None:
+        """The parameter sets of a diagram. Those of a draft may have parameters that do not exist."""
+        diagram = builder.draft()
+        for name, entry in node.members().items():
+            with located(entry):
+                check_value_count(len(entry.members()), "")
+            values = {path: self._set_value(diagram, path, value) for path, value in entry.members().items()}
+            with located(entry):
+                builder.parameter_set(name, values)
+
+    def _set_value(self, diagram: Diagram, path: str, node: Node) -> object:
+        """The checked value of one entry of a parameter set; in a draft it may violate the rules."""
+        if not self.draft:
+            with located(node):
+                rule, _ = settable_parameter(diagram, path)
+            return parameter_from(rule, node, self.robots)
+        value = plain_value(node)
+        try:  # without the location of the entry, whose computation takes long for many entries
+            rule, _ = settable_parameter(diagram, path)
+            return rule.check(with_infinities(rule, value), "")
+        except ArmblocksError:
+            return value
 
     def _block(self, key: str, node: Node, extras: Extras) -> Block:
         if "type" not in node.members():

@@ -11,7 +11,7 @@ from armblocks.diagram import Block, Diagram, Parameter
 from armblocks.equations import SimulationOptions
 from armblocks.formats.layout_json import layout_to
 from armblocks.formats.mask_json import mask_parameter_to
-from armblocks.formats.parameter_json import is_diagram, parameter_to
+from armblocks.formats.parameter_json import is_diagram, parameter_to, plain_parameter
 from armblocks.formats.robot_references import RobotWriter
 from armblocks.formats.subsystem_libraries import shortest_link
 from armblocks.formats.unknown_members import members_of
@@ -55,6 +55,7 @@ class DiagramWriter:
                 if diagram.signal_names
                 else {}
             ),
+            **({"parameter_sets": _parameter_sets(diagram)} if diagram.parameter_sets else {}),
             "layout": layout_to(diagram, layout_extras),
             "settings": {**extras.get("settings", {}), **settings},
         }
@@ -94,6 +95,13 @@ class DiagramWriter:
 
     def _value(self, rule: Parameter, value: object) -> object:
         return parameter_to(rule, value, self.robots)
+
+
+def _parameter_sets(diagram: Diagram) -> dict[str, object]:
+    return {
+        name: {path: plain_parameter(value) for path, value in values.items()}
+        for name, values in diagram.parameter_sets.items()
+    }
 
 
 def _commented(name: str, diagram: Diagram) -> dict[str, object]:

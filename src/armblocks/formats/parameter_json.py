@@ -26,9 +26,8 @@ def parameter_from(rule: Parameter, node: Node, robots: RobotReader) -> object:
         return robots.function(node) if node.value else rule.default
     if rule.kind is ParameterKind.TABLE and isinstance(node.value, str | dict):
         return robots.table(node)
-    value = _with_infinities(node.value) if rule.kind in _NUMERIC else node.value
     with located(node):
-        return rule.check(value, "")
+        return rule.check(with_infinities(rule, node.value), "")
 
 
 def parameter_to(rule: Parameter, value: object, robots: RobotWriter) -> object:
@@ -42,13 +41,32 @@ def parameter_to(rule: Parameter, value: object, robots: RobotWriter) -> object:
     return _with_texts_for_infinities(value) if rule.kind in _NUMERIC else value
 
 
+def plain_value(node: Node) -> object:
+    """A number, truth value, text, or nested arrays of them, whose rule is not known."""
+    if isinstance(node.value, list):
+        return tuple(plain_value(element) for element in node.elements())
+    if not isinstance(node.value, bool | int | float | str):
+        raise node.error("the value is not a number or an array", allowed="numbers, arrays and texts")
+    return node.value
+
+
+def with_infinities(rule: Parameter, value: object) -> object:
+    """The value with infinite numbers for their texts, if the parameter is a number or an array."""
+    return _with_infinities(value) if rule.kind in _NUMERIC else value
+
+
+def plain_parameter(value: object) -> object:
+    """The JSON form of a number, an array or a text."""
+    return _with_texts_for_infinities(value)
+
+
 def is_diagram(rule: Parameter) -> bool:
     """Whether the value of a parameter is the inner diagram of a subsystem."""
     return rule.kind is ParameterKind.DIAGRAM
 
 
 def _with_infinities(value: object) -> object:
-    if isinstance(value, list):
+    if isinstance(value, list | tuple):
         return [_with_infinities(entry) for entry in cast("list[object]", value)]
     return _INFINITIES.get(value, value) if isinstance(value, str) else value
 

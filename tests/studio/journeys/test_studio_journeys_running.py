@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -148,6 +149,62 @@ def test_two_runs_are_compared(opened: Opened) -> None:
     name.press("Enter")
     page.get_by_role("button", name="Forget slow").click()
     expect(page.locator(".kept-run")).to_have_count(1)
+
+
+def test_parameter_sets_are_saved_applied_and_compared(opened: Opened, studio: Studio) -> None:
+    page = opened(lag_model("varied"))
+    tab(page, "Tune")
+
+    def chosen_set(name: str) -> None:
+        page.get_by_role("button", name="Parameter set:").click()
+        page.get_by_role("menuitemcheckbox", name=name, exact=True).click()
+
+    def save_as(name: str) -> None:
+        page.get_by_role("button", name="Parameter set:").click()
+        page.get_by_role("menuitem", name=re.compile("sets? …")).click()
+        dialog = page.locator(DIALOG)
+        dialog.get_by_role("textbox", name="Name of a new set").fill(name)
+        page.keyboard.press("Enter")
+        expect(dialog.get_by_role("columnheader", name=name)).to_be_visible()
+        page.keyboard.press("Escape")
+        expect(dialog).to_have_count(0)
+
+    select(page, "gain")
+    field = page.get_by_role("textbox", name="gain.gain", exact=True)
+    field.fill("6")
+    field.press("Enter")
+    save_as("large")
+    chosen_set("Values of the model")
+    expect(field).to_have_value("2")
+    select(page, "lag")
+    lag = page.get_by_role("textbox", name="lag.time_constant", exact=True)
+    lag.fill("0.1")
+    lag.press("Enter")
+    save_as("fast")
+    chosen_set("large")
+    run(page)
+    value = page.locator(".display-value", has_text=re.compile(r"\d")).first
+    assert number(value.inner_text()) == pytest.approx(6 * (1 - math.exp(-9)), rel=1e-3)
+
+    # A set becomes part of the model in one step, and the file contains all sets.
+    page.keyboard.press("Control+k")
+    page.keyboard.type("parameter sets")
+    page.keyboard.press("Enter")
+    dialog = page.locator(DIALOG)
+    row = dialog.get_by_role("row", name="gain.gain")
+    expect(row.get_by_role("cell")).to_have_text(["2", "2", "6", ""])
+    dialog.get_by_role("button", name="Commands for fast").click()
+    page.get_by_role("menuitem", name="Put into the model").click()
+    expect(dialog.get_by_role("row", name="lag.time_constant").get_by_role("cell").first).to_have_text("0.1")
+    page.keyboard.press("Escape")
+    page.keyboard.press("Control+s")
+    expect(page.get_by_role("button", name="Undo apply the parameter set fast (Ctrl+Z)")).to_be_visible()
+    file = studio.folder / "varied.json"
+    wait_until(page, lambda: "parameter_sets" in file.read_text(encoding="utf-8"))
+    kept = ab.load_diagram(file)
+    assert dict(kept.parameter_sets["fast"]) == {"gain.gain": 2.0, "lag.time_constant": 0.1}
+    assert dict(kept.parameter_sets["large"]) == {"gain.gain": 6.0}
+    assert kept.blocks["lag"].parameter_value("time_constant") == 0.1
 
 
 def saved(page: Page, scope: str, entry: str) -> bytes:

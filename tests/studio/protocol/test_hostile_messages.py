@@ -92,6 +92,11 @@ def requests(document: str, robot: str) -> list[dict[str, Any]]:
         },
         {"kind": "paste", "text": diagram_to_bytes(Diagram(name="d", blocks={}), load_robot).decode()},
         {"kind": "settings", "values": {"stop_time": 1.0}},
+        {"kind": "save_parameter_set", "name": "stiff", "values": {"PID.P": "2*pi"}, "of_others": True},
+        {"kind": "rename_parameter_set", "name": "soft", "to": "stiff"},
+        {"kind": "apply_parameter_set", "name": "soft"},
+        {"kind": "remove_set_parameter", "path": "PID.P"},
+        {"kind": "remove_parameter_set", "name": "soft"},
         {"kind": "arrange"},
     ]
     common = {"document": document, "base": None, "author": "me"}
@@ -134,6 +139,7 @@ def requests(document: str, robot: str) -> list[dict[str, Any]]:
         {"kind": "ping"},
         {"kind": "files"},
         {"kind": "outline", "document": document},
+        {"kind": "parameter_sets", "document": document},
         {"kind": "find", "document": document, "text": "PID"},
         {"kind": "copy", "document": document, "inside": [], "blocks": ["PID"], "notes": []},
         {"kind": "ask_mask", "document": document, "inside": [], "block": ""},
@@ -143,7 +149,7 @@ def requests(document: str, robot: str) -> list[dict[str, Any]]:
         {"kind": "control", "run": "0123456789abcdef", "action": "stop"},
         {"kind": "rewind", "run": "0123456789abcdef", "time": 0.0},
         {"kind": "speed", "run": "0123456789abcdef", "speed": None},
-        {"kind": "tune", "run": "0123456789abcdef", "parameter": "PID.P", "value": 1.0},
+        {"kind": "tune", "run": "0123456789abcdef", "values": {"PID.P": 1.0}},
         {
             "kind": "typed",
             "document": document,
@@ -246,6 +252,8 @@ def test_every_kind_of_message_answers_hostile_values_with_an_error(folder: Path
         for place in range(len(requests("", ""))):
             document = (await send(opening))["value"]
             request = requests(document, robot)[place]
+            values = {"kind": "save_parameter_set", "name": "soft", "values": {"PID.P": 1.0}}
+            await send({"kind": "change", "document": document, "edit": values})
             await send({"kind": "save", "document": document, "path": f"{place}.json"})
             fault = (await send(request))["fault"]
             nothing_to = ("scene", "pose", "robot_of_block", "undo", "redo")

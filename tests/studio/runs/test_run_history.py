@@ -67,7 +67,7 @@ def test_tuned_values_apply_from_the_instant_of_return() -> None:
     history.add_snapshot()
     count, state = history.recorded, history.run.state()
     history.run.advance(4.0)
-    history.tune("PID.P", 7.0)
+    history.tune({"PID.P": 7.0})
     history.run.advance(5.0)
     history.return_to_sample(count)
     assert history.recorded == count
@@ -135,9 +135,9 @@ def test_a_run_in_a_process_is_tuned_rewound_and_finished() -> None:
             run_messages.RunProgress, lambda event: event.state == "paused"
         )  # after the last samples
         reached = len(received.times)
-        run.obey(run_messages.Tune(run="r", parameter="PID.P", value="2*3"))
+        run.obey(run_messages.Tune(run="r", values={"PID.P": "2*3"}))
         assert (await received.until(run_messages.RunTuned)).parameter == "PID.P"
-        run.obey(run_messages.Tune(run="r", parameter="PID.P", value="six"))
+        run.obey(run_messages.Tune(run="r", values={"PID.P": "six"}))
         assert "six" in (await received.until(run_messages.RunProgress, lambda event: event.fault)).message
         run.obey(run_messages.Control(run="r", action="back"))
         assert (await received.until(run_messages.RunRewound)).count < reached

@@ -117,7 +117,7 @@ def test_a_slow_run_is_never_ahead_of_the_clock(
 def test_a_tuned_value_applies_from_the_displayed_instant(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    tune = run_messages.Tune(run="r", parameter="gain.gain", value=2.0)
+    tune = run_messages.Tune(run="r", values={"gain.gain": 2.0})
     pause, resume = (run_messages.Control(run="r", action=action) for action in ("pause", "resume"))
     pipe = ran(monkeypatch, 1.0, (12.005, tune), (15.005, pause), (15.005, resume))
     (tuned,) = (event for event in pipe.events if event["kind"] == "run_tuned")

@@ -112,6 +112,20 @@ def keep_tuned(s: Sheet) -> do.DiagramEdit:
     return do.KeepTuned(values={s.one(numbers(s)): s.chance.random()})
 
 
+SET_NAMES = ("stiff", "soft")
+
+
+def save_parameter_set(s: Sheet) -> do.DiagramEdit:
+    values = {path: s.one((0.5, "2*pi", 3)) for path in s.some(numbers(s))}
+    flags = {"of_others": s.chance.random() < 0.5, "replace": s.chance.random() < 0.3}
+    return do.SaveParameterSet(name=s.one(SET_NAMES), values=values, **flags)
+
+
+def remove_set_parameter(s: Sheet) -> do.DiagramEdit:
+    paths = {path for values in s.diagram.parameter_sets.values() for path in values}
+    return do.RemoveSetParameter(path=s.one(sorted(paths)))
+
+
 MAKERS: dict[type[do.DiagramEdit], Callable[[Sheet], do.DiagramEdit]] = {
     do.AddBlocks: add,
     do.PasteBlocks: paste,
@@ -127,6 +141,13 @@ MAKERS: dict[type[do.DiagramEdit], Callable[[Sheet], do.DiagramEdit]] = {
     do.SetParameters: parameters,
     do.SetMask: mask,
     do.KeepTuned: keep_tuned,
+    do.SaveParameterSet: save_parameter_set,
+    do.RenameParameterSet: lambda s: do.RenameParameterSet(
+        name=s.one(SET_NAMES), to=s.one((*SET_NAMES, "Soft"))
+    ),
+    do.RemoveParameterSet: lambda s: do.RemoveParameterSet(name=s.one(SET_NAMES)),
+    do.RemoveSetParameter: remove_set_parameter,
+    do.ApplyParameterSet: lambda s: do.ApplyParameterSet(name=s.one(SET_NAMES)),
     do.ArrangeBlocks: lambda s: do.ArrangeBlocks(),
     do.LogSignal: lambda s: do.LogSignal(port=s.one(s.outputs), logged=s.chance.random() < 0.7),
     do.CommentBlocks: lambda s: do.CommentBlocks(
@@ -140,8 +161,13 @@ MAKERS: dict[type[do.DiagramEdit], Callable[[Sheet], do.DiagramEdit]] = {
     do.Describe: lambda s: do.Describe(text=s.one(("words", "other words"))),
 }
 
-SELDOM_VALID = (do.KeepTuned, do.KeepTuned)
-"""Edits that are made more often: a value is kept only in a model that can run."""
+SELDOM_VALID = (
+    *(do.KeepTuned, do.KeepTuned),
+    *(do.SaveParameterSet, do.SaveParameterSet, do.SaveParameterSet),
+    *(do.ApplyParameterSet, do.RenameParameterSet, do.RenameParameterSet, do.RemoveSetParameter),
+)
+"""Edits that are made more often: values are kept only in a model that can run, and most edits of parameter
+sets need a set."""
 
 
 def random_edit(document: Document, chance: random.Random) -> tuple[list[str], do.DiagramEdit]:

@@ -44,6 +44,9 @@ def changed_aspects(before: Diagram, after: Diagram, path: Aspect = ()) -> set[A
     for name in before.mask_values.keys() | after.mask_values.keys():
         if before.mask_values.get(name) != after.mask_values.get(name):
             aspects.add((*path, "/", f"mask parameter {name}"))
+    for name in before.parameter_sets.keys() | after.parameter_sets.keys():
+        if before.parameter_sets.get(name) != after.parameter_sets.get(name):
+            aspects.add((*path, "/", f"parameter set {name}"))
     for field in ("name", "description", "settings", "extras", "mask"):
         if getattr(before, field) != getattr(after, field):
             aspects.add((*path, "/", field))

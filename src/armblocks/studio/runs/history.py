@@ -87,10 +87,10 @@ class RunHistory:
         while self.recorded == before and not self.run.finished:
             self.run.advance(steps=1)
 
-    def tune(self, path: str, value: object) -> None:
-        """Change a parameter from the present time on; raises the errors of :meth:`DiagramRun.set`."""
+    def tune(self, values: Mapping[str, object]) -> None:
+        """Change parameters from the present time on; raises the errors of :meth:`DiagramRun.set_all`."""
         self.add_snapshot()
-        self.run.set(path, np.asarray(value, dtype=np.float64))
+        self.run.set_all({path: np.asarray(value, dtype=np.float64) for path, value in values.items()})
 
     def return_to_sample(self, recorded: int) -> None:
         """Return to the latest state with at most ``recorded`` samples, but not before the first step.

@@ -85,8 +85,8 @@ def begin_run(job: Mapping[str, Any]) -> RunHistory:
         if fault is not None:
             raise DiagramError(fault.what, where=f"block '{path}'", allowed=fault.allowed, fix=fault.fix)
     history = RunHistory(CompiledDiagram(diagram))
-    for path, value in job["tuned"].items():
-        history.tune(path, tuned_value(value, path))
+    if job["tuned"]:
+        history.tune({path: tuned_value(value, path) for path, value in job["tuned"].items()})
     return history
 
 
@@ -204,25 +204,24 @@ class _Run:
                     self.pace.speed = command["speed"]
                     self.pace.count_from(self.time)
                 case _:
-                    self._tune(history, command["parameter"], command["value"])
+                    self._tune(history, command["values"])
 
     def _set_state(self, state: Literal["running", "paused"]) -> None:
         self.state = state
         self.pace.count_from(self.time)
         self._progress()
 
-    def _tune(self, history: RunHistory, parameter: str, value: Any) -> None:
-        """Change a parameter from the present time on; report an invalid value and continue."""
+    def _tune(self, history: RunHistory, values: Mapping[str, Any]) -> None:
+        """Change parameters from the present time on; report an invalid value and continue."""
         try:
             self._return_to_shown_time(history)
-            history.tune(parameter, tuned_value(value, parameter))
+            history.tune({path: tuned_value(value, path) for path, value in values.items()})
         except ArmblocksError as error:
             self._progress(error.what, _fault(error))
-        else:
-            self.tuned[parameter] = value
-            self._notify(
-                run_messages.RunTuned(run=self.key, time=self.time, parameter=parameter, value=value)
-            )
+            return
+        self.tuned |= values
+        for path, value in values.items():
+            self._notify(run_messages.RunTuned(run=self.key, time=self.time, parameter=path, value=value))
 
     def _go_back(self, history: RunHistory, recorded: int) -> None:
         """Return to at most ``recorded`` samples; tuned values apply from there on."""

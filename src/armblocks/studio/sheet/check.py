@@ -8,6 +8,7 @@ from collections.abc import Collection, Mapping
 from armblocks.diagram import Bus, Diagram, PortRef, flatten_hierarchy, infer_shapes, infer_units, open_inputs
 from armblocks.diagram.check import check_diagram
 from armblocks.diagram.levels import joined, levels_of
+from armblocks.diagram.parameter_sets import check_parameter_sets
 from armblocks.errors import AlgebraicLoopError, ArmblocksError, DiagramError
 from armblocks.studio.protocol.messages.sheets import Finding, WireKind
 
@@ -27,6 +28,7 @@ def check(diagram: Diagram) -> tuple[list[Finding], dict[str, WireKind]]:
     try:
         wires = _wires(diagram)
         check_diagram(diagram)
+        check_parameter_sets(diagram)
     except ArmblocksError as error:
         return _findings(error, known, _origins(diagram)), {}
     return [], wires

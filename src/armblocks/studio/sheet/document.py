@@ -14,6 +14,7 @@ from armblocks.studio.protocol.messages.sheet_edits import DiagramEdit, ModelEdi
 from armblocks.studio.sheet.clipping import ReadDiagram, reader
 from armblocks.studio.sheet.edits import EDITS, EditContext
 from armblocks.studio.sheet.nesting import check_own, inside, with_inside
+from armblocks.studio.sheet.parameter_sets import with_consistent_sets
 from armblocks.studio.sheet.parameter_values import ResolveRobot
 
 
@@ -65,8 +66,11 @@ class Document(Edited[Diagram]):
         if isinstance(edit, ModelEdit):
             return Outcome(title, EDITS.applied(edit, self.diagram, self._context), request.gesture)
         check_own(self.diagram, request.inside)
-        after = EDITS.applied(edit, inside(self.diagram, request.inside), self._context)
-        return Outcome(title, with_inside(self.diagram, request.inside, after), request.gesture)
+        sheet = EDITS.applied(edit, inside(self.diagram, request.inside), self._context)
+        after = with_inside(self.diagram, request.inside, sheet)
+        return Outcome(
+            title, with_consistent_sets(self.diagram, after, edit, request.inside), request.gesture
+        )
 
     def aspects(self, before: Diagram, after: Diagram) -> set[Aspect]:
         """Return the aspects in which two diagrams differ."""

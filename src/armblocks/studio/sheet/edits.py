@@ -25,6 +25,7 @@ from armblocks.diagram import (
     Placement,
     PortRef,
     check_comment,
+    with_parameter_set,
     with_parameters,
 )
 from armblocks.diagram.diagram import block_in_scope
@@ -36,6 +37,7 @@ from armblocks.formats.data_files import DataFiles
 from armblocks.studio.documents.edit_table import EditTable
 from armblocks.studio.protocol.messages.sheet_edits import (
     AddBlocks,
+    ApplyParameterSet,
     ArrangeBlocks,
     BendWires,
     BreakLink,
@@ -53,7 +55,11 @@ from armblocks.studio.protocol.messages.sheet_edits import (
     PasteBlocks,
     Place,
     RemoveBlocks,
+    RemoveParameterSet,
+    RemoveSetParameter,
     Rename,
+    RenameParameterSet,
+    SaveParameterSet,
     SetAppearance,
     SetMask,
     SetNotes,
@@ -62,6 +68,7 @@ from armblocks.studio.protocol.messages.sheet_edits import (
     SheetNote,
     Wire,
 )
+from armblocks.studio.sheet import parameter_sets
 from armblocks.studio.sheet.clipping import ReadDiagram, leaves_horizontally, pasted, reader
 from armblocks.studio.sheet.grounding import grounded
 from armblocks.studio.sheet.mask_edits import with_mask
@@ -430,6 +437,31 @@ def _set_mask(edit: SetMask, diagram: Diagram, context: EditContext) -> Diagram:
 @EDITS.on(KeepTuned, lambda edit: f"keep {_counted(edit.values, 'tuned value')}")
 def _keep_tuned(edit: KeepTuned, diagram: Diagram, _: EditContext) -> Diagram:
     return with_parameters(diagram, {path: tuned_value(value, path) for path, value in edit.values.items()})
+
+
+@EDITS.on(SaveParameterSet, lambda edit: f"save the parameter set {edit.name.strip()}")
+def _save_parameter_set(edit: SaveParameterSet, diagram: Diagram, _: EditContext) -> Diagram:
+    return parameter_sets.saved(edit, diagram)
+
+
+@EDITS.on(RenameParameterSet, lambda edit: f"rename the parameter set {edit.name}")
+def _rename_parameter_set(edit: RenameParameterSet, diagram: Diagram, _: EditContext) -> Diagram:
+    return parameter_sets.renamed(edit, diagram)
+
+
+@EDITS.on(RemoveParameterSet, lambda edit: f"remove the parameter set {edit.name}")
+def _remove_parameter_set(edit: RemoveParameterSet, diagram: Diagram, _: EditContext) -> Diagram:
+    return parameter_sets.removed(edit, diagram)
+
+
+@EDITS.on(RemoveSetParameter, lambda edit: f"remove {edit.path} from the parameter sets")
+def _remove_set_parameter(edit: RemoveSetParameter, diagram: Diagram, _: EditContext) -> Diagram:
+    return parameter_sets.without_parameter(edit, diagram)
+
+
+@EDITS.on(ApplyParameterSet, lambda edit: f"apply the parameter set {edit.name}")
+def _apply_parameter_set(edit: ApplyParameterSet, diagram: Diagram, _: EditContext) -> Diagram:
+    return with_parameter_set(diagram, edit.name)
 
 
 @EDITS.on(SetSettings, lambda edit: "change the settings")

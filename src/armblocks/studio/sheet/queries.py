@@ -23,6 +23,7 @@ from armblocks.studio.sheet.mask_edits import mask_of
 from armblocks.studio.sheet.nesting import inside
 from armblocks.studio.sheet.open_documents import OpenDocuments
 from armblocks.studio.sheet.outline import find, outline
+from armblocks.studio.sheet.parameter_sets import parameter_set_table
 from armblocks.studio.sheet.parameter_values import ResolveRobot, parameter_json, parameter_value
 from armblocks.studio.sheet.typed_settings import setting_faults
 
@@ -50,6 +51,7 @@ class SheetQueries:
         answers.on(sheet_messages.RouteWires, self._route)
         answers.on(sheet_messages.AskOutline, self._outline)
         answers.on(sheet_messages.AskMask, self._mask)
+        answers.on(sheet_messages.AskParameterSets, self._parameter_sets)
         answers.on(sheet_messages.Copy, self._copy)
         answers.on(sheet_messages.Find, self._find)
         answers.on(sheet_messages.TypedValue, self._typed_value)
@@ -81,6 +83,11 @@ class SheetQueries:
     async def _mask(self, _: Page, request: sheet_messages.AskMask) -> SetMask:
         path = [*request.inside, request.block] if request.block else request.inside
         return mask_of(self._sheet(request.document, path)).model_copy(update={"block": request.block})
+
+    async def _parameter_sets(
+        self, _: Page, request: sheet_messages.AskParameterSets
+    ) -> sheet_messages.ParameterSetTable:
+        return parameter_set_table(self._sheet(request.document), request.also)
 
     async def _copy(self, _: Page, request: sheet_messages.Copy) -> str:
         sheet = self._sheet(request.document, request.inside)

@@ -92,11 +92,10 @@ class SetSpeed(RunCommand):
 
 
 class Tune(RunCommand):
-    """Change a tunable parameter during a run."""
+    """Change tunable parameters during a run, by ``block.parameter``, all at the same time."""
 
     kind: Literal["tune"] = "tune"
-    parameter: str
-    value: Any
+    values: dict[str, Any]
 
 
 # -- events --------------------------------------------------------------------------------------------------

@@ -235,6 +235,53 @@ class KeepTuned(ModelEdit):
     values: dict[str, Any]
 
 
+SetName = Annotated[str, Field(max_length=200)]
+"""The name of a parameter set, see :mod:`armblocks.diagram.parameter_sets`."""
+
+
+class SaveParameterSet(ModelEdit):
+    """Store values of parameters, by ``block.parameter``, under a name.
+
+    ``of_others``: also the model's values of the parameters of all other sets. ``replace``: the values
+    replace those of a set with this name, which must exist.
+    """
+
+    kind: Literal["save_parameter_set"] = "save_parameter_set"
+    name: SetName
+    values: dict[str, Any]
+    of_others: bool = False
+    replace: bool = False
+
+
+class RenameParameterSet(ModelEdit):
+    """Rename a parameter set."""
+
+    kind: Literal["rename_parameter_set"] = "rename_parameter_set"
+    name: SetName
+    to: SetName
+
+
+class RemoveParameterSet(ModelEdit):
+    """Remove a parameter set."""
+
+    kind: Literal["remove_parameter_set"] = "remove_parameter_set"
+    name: SetName
+
+
+class RemoveSetParameter(ModelEdit):
+    """Remove a parameter from all parameter sets, also one that does not exist in the model."""
+
+    kind: Literal["remove_set_parameter"] = "remove_set_parameter"
+    path: str
+
+
+class ApplyParameterSet(ModelEdit):
+    """Write the values of a parameter set into the model."""
+
+    kind: Literal["apply_parameter_set"] = "apply_parameter_set"
+    name: SetName
+
+
 class GroupBlocks(DiagramEdit):
     """Move blocks into a new subsystem; its ports are the wires that cross its boundary."""
 

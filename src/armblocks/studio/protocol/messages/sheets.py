@@ -254,6 +254,32 @@ class Find(Request[list[FoundBlock]]):
     text: Annotated[str, Field(max_length=200)]
 
 
+class SetParameter(Message):
+    """A parameter of parameter sets: its value in the model, and whether it may change during a run."""
+
+    path: str
+    unit: str
+    doc: str
+    value: Any
+    tunable: bool
+
+
+class ParameterSetTable(Message):
+    """The parameter sets of a model: values by set and path, and the faults of values that are invalid."""
+
+    parameters: list[SetParameter]
+    sets: dict[str, dict[str, Any]]
+    faults: dict[str, dict[str, str]]
+
+
+class AskParameterSets(Request[ParameterSetTable]):
+    """Return the parameter sets of a model, and its values of their parameters and of those in ``also``."""
+
+    kind: Literal["parameter_sets"] = "parameter_sets"
+    document: str
+    also: list[str] = Field(default_factory=list[str], max_length=1000)
+
+
 class TypedValue(Request[Any]):
     """Parse a text typed into a parameter field; the reply is its value, a refusal describes the error."""
 
