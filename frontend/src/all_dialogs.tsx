@@ -3,6 +3,7 @@ import { ConnectDialog } from './canvas/connect_dialog'
 import { DroppedTableDialog } from './canvas/dropped_table_dialog'
 import { ContextMenu } from './context_menu'
 import { CommandPalette } from './command_palette'
+import { CloseDialog } from './documents/close_dialog'
 import { OpenDialog } from './documents/open_dialog'
 import { RecoveryDialog } from './documents/recovery_dialog'
 import { SaveDialog } from './documents/save_dialog'
@@ -31,6 +32,7 @@ export function AllDialogs() {
       <Tour />
       <Shortcuts />
       <SaveDialog />
+      <CloseDialog />
       <OpenDialog />
       <RecoveryDialog />
       <DroppedTableDialog />

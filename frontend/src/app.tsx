@@ -2,6 +2,7 @@ import { useComputedColorScheme, useMantineColorScheme } from '@mantine/core'
 import { DockviewReact, type IDockviewPanelHeaderProps } from 'dockview-react'
 import { lazy, Suspense, useEffect } from 'react'
 import { setDock } from './dock'
+import { DocumentTabs } from './documents/document_tabs'
 import { deferred, useDeferredReady, usePrefetch, useDialogRequested } from './deferred'
 import { Notices } from './notices'
 import { panelsOf, type Panel } from './panel'
@@ -39,7 +40,10 @@ export function App() {
   return (
     <div className="studio">
       <div className={editing ? 'behind' : 'sheets'} inert={editing}>
-        <TopBar />
+        <div className="head">
+          <TopBar />
+          {!editing && <DocumentTabs />}
+        </div>
         <main className="dock">
           <DockviewReact
             className={scheme === 'dark' ? 'dockview-theme-dark' : 'dockview-theme-light'}

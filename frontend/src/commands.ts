@@ -4,7 +4,9 @@ import { copy, cut, duplicate, paste } from './canvas/clipboard'
 import { addNote, sheetView, ZOOM_STEP } from './canvas/sheet_actions'
 import { openConfiguration, openMask, openParameterSets, openTour, save, showDialog } from './dialogs'
 import { exportDrawing, openReport } from './documents/export'
+import { canClose, canStepTabs, closeInFront, stepTabs } from './documents/tabs'
 import { control, startOrResume } from './run/start'
+import { arePressed } from './model/key_combinations'
 import { alterDocument, ask, change, openSheet, useStudio } from './store'
 import { setTheme } from './theme'
 
@@ -15,6 +17,8 @@ export interface Command {
   keys?: string
   /** Whether the key is active only while the sheet has the focus. */
   sheetOnly?: boolean
+  /** Whether the key is also active in the robot editor, which has its own keys. */
+  inRobotEditor?: boolean
   /** Whether text fields handle this key themselves. */
   handledByFields?: boolean
   /** Whether the command is available now; by default always. */
@@ -55,6 +59,21 @@ const COMMANDS: Command[] = [
   { title: 'Save under another name', keys: 'Ctrl+Shift+S', run: () => showDialog('save_as') },
   { title: 'Open', keys: 'Ctrl+O', run: () => showDialog('open') },
   { title: 'New diagram', run: () => void ask({ kind: 'new', document_kind: 'diagram' }) },
+  {
+    title: 'Next document',
+    keys: 'Alt+PageDown',
+    inRobotEditor: true,
+    enabled: canStepTabs,
+    run: () => stepTabs(1),
+  },
+  {
+    title: 'Previous document',
+    keys: 'Alt+PageUp',
+    inRobotEditor: true,
+    enabled: canStepTabs,
+    run: () => stepTabs(-1),
+  },
+  { title: 'Close the document', keys: 'Alt+W', inRobotEditor: true, enabled: canClose, run: closeInFront },
   { title: 'Group into a subsystem', keys: 'Ctrl+G', sheetOnly: true, enabled: hasBlocks, run: group },
   {
     title: 'Edit the mask: parameters of the subsystem or the model',
@@ -132,22 +151,6 @@ const COMMANDS: Command[] = [
   { title: 'All commands by name', keys: 'Ctrl+K', run: () => showDialog('commands') },
   { title: 'All keys', keys: '?', run: () => showDialog('keys') },
 ]
-
-const ARROWS: Record<string, string> = { '→': 'arrowright', '←': 'arrowleft' }
-
-/** Whether exactly these keys are pressed, all of them with Ctrl. */
-function arePressed(keys: string, event: KeyboardEvent): boolean {
-  return keys.split(', ').some((combination) => {
-    const parts = combination.split('+')
-    const key = parts.at(-1)!.toLowerCase()
-    return (
-      parts.includes('Ctrl') &&
-      (event.ctrlKey || event.metaKey) &&
-      event.shiftKey === parts.includes('Shift') &&
-      event.key.toLowerCase() === (ARROWS[key] ?? key)
-    )
-  })
-}
 
 /** The command for the pressed keys, among the commands of the sheet or among all others. */
 export function commandOf(event: KeyboardEvent, ofSheet: boolean): Command | undefined {

@@ -8,6 +8,7 @@ type Dialog =
   | 'commands'
   | 'find'
   | 'keys'
+  | 'close'
   | 'insert'
   | 'connect'
   | 'configuration'

@@ -1,11 +1,22 @@
+import { restoreView, storeRun, storeView, updateStoredRun } from './documents/document_views'
 import { lastShown, storeShown } from './documents/last_shown'
+import { addTab, reattachTabs } from './documents/tabs'
 import type { ChangeOf, ContentOf, DocumentKind, EventOf, ServerEvent } from './messages'
-import type { Checked, DocumentState, Wire } from './protocol'
+import type { Checked, DocumentState, Fault, Wire } from './protocol'
 import { reattachRobots, leaveEditor, robotChanged, robotOpened, showRobot } from './robot/editor/state'
 import { canDraw } from './run/pace'
 import * as runs from './run/runs'
 import { recoverable } from './model/recoverable'
-import { ask, bringToFront, connection, refuse, showState, useStudio, type OpenDocument } from './store'
+import {
+  ask,
+  bringToFront,
+  connection,
+  refuse,
+  showState,
+  useStudio,
+  type OpenDocument,
+  type RunView,
+} from './store'
 
 const wireKey = (wire: Wire) => `${wire.source} -> ${wire.target}`
 
@@ -96,34 +107,35 @@ function opened<Kind extends DocumentKind>(
   content: ContentOf<Kind> & { kind: Kind },
 ): void {
   OPEN_HANDLERS[content.kind](event, content)
+  if (event.in_front) addTab(event.state)
 }
 
 function diagramOpened({ state, in_front }: EventOf<'opened'>, content: ContentOf<'diagram'>): void {
   const { document, run } = useStudio.getState()
   const { sheet, inside, settings } = content
   const isShown = document?.state.document === state.document
-  if (!isShown && !in_front) return
+  // Without a shown diagram, the next one is shown behind the robot editor.
+  if (!isShown && !in_front && document) return
   const otherSheet = isShown && document.inside.join('/') !== inside.join('/')
   if (otherSheet) useStudio.setState({ selection: new Set<string>(), editing: null })
   if (isShown && run && (run.state === 'running' || run.state === 'paused') && content.run !== run.run)
     useStudio.setState({ run: { ...run, state: 'failed', message: 'The studio ended during this run.' } })
+  if (!isShown) storeView()
+  const shown = {
+    state,
+    inside,
+    settings,
+    ...sheet,
+    findings: isShown ? document.findings : [],
+    wireKinds: isShown ? document.wireKinds : {},
+  }
+  if (!isShown) restoreView(shown, content.run)
   useStudio.setState({
-    ...showState({
-      state,
-      inside,
-      settings,
-      ...sheet,
-      findings: isShown ? document.findings : [],
-      wireKinds: isShown ? document.wireKinds : {},
-    }),
-    ...(isShown ? {} : { run: null, selection: new Set<string>(), editing: null, strict: false }),
+    ...showState(shown),
     // Notices about another document are outdated.
     ...(isShown || !document ? {} : { notices: [] }),
   })
-  if (!isShown) {
-    runs.dropTrials()
-    leaveEditor()
-  }
+  if (!isShown && in_front) leaveEditor()
   storeShown(state, inside)
 }
 
@@ -161,52 +173,61 @@ function documentChecked(event: EventOf<'checked'>): void {
 
 function runStarted(event: EventOf<'run_started'>): void {
   // Sent again after a reconnection: the samples are the same.
-  if (useStudio.getState().run?.run === event.run) return
-  runs.onRunStarted(event)
-  useStudio.setState({
-    strict: false,
-    notices: [],
-    run: {
-      run: event.run,
-      state: 'running',
-      time: 0,
-      stopTime: event.stop_time,
-      realTimeFactor: 0,
-      message: '',
-      fault: null,
-      solver: '',
-      reason: '',
-      channels: event.channels,
-      views: event.views,
-      aliases: event.aliases,
-      tunables: event.tunables,
-    },
-  })
+  const { run, document } = useStudio.getState()
+  if (run?.run === event.run) return
+  const displayed = document?.state.document === event.document
+  runs.onRunStarted(event, displayed)
+  const started: RunView = {
+    run: event.run,
+    state: 'running',
+    time: 0,
+    stopTime: event.stop_time,
+    realTimeFactor: 0,
+    message: '',
+    fault: null,
+    solver: '',
+    reason: '',
+    channels: event.channels,
+    views: event.views,
+    aliases: event.aliases,
+    tunables: event.tunables,
+  }
+  if (displayed) useStudio.setState({ strict: false, notices: [], run: started })
+  else storeRun(event.document, started)
 }
 
 function runProgressed(event: EventOf<'run_progress'>): void {
-  const { run } = useStudio.getState()
+  const { run, document } = useStudio.getState()
   runs.onRunProgress(event)
+  const progress: Partial<RunView> = {
+    state: event.state,
+    time: event.time,
+    realTimeFactor: event.real_time_factor,
+    message: event.message,
+    fault: event.fault ?? null,
+    solver: event.solver ?? '',
+    reason: event.reason ?? '',
+  }
+  if (event.document !== document?.state.document) {
+    updateStoredRun(event, progress)
+    if (event.fault) refuseInTab(event.document, event.fault)
+    return
+  }
   // The progress of a run may be displayed later; other messages of a run are handled at once.
   if (
     run?.run === event.run &&
     (event.state !== 'running' || run.state !== 'running' || canDraw(performance.now()))
   )
-    useStudio.setState({
-      run: {
-        ...run,
-        state: event.state,
-        time: event.time,
-        realTimeFactor: event.real_time_factor,
-        message: event.message,
-        fault: event.fault ?? null,
-        solver: event.solver ?? '',
-        reason: event.reason ?? '',
-      },
-    })
+    useStudio.setState({ run: { ...run, ...progress } })
   if (!event.fault) return
   useStudio.setState({ strict: true })
   refuse(event.fault)
+}
+
+/** Show a notice for a failed run of a diagram in another tab, with the title of the diagram. */
+function refuseInTab(document: string, fault: Fault): void {
+  const title = useStudio.getState().documents.find((known) => known.document === document)?.title
+  refuse({ ...fault, where: [title, fault.where].filter(Boolean).join(' › ') })
 }
 
 /** Reopen the last document of this page, or the one in its address; then send the pending requests. */
@@ -224,11 +245,14 @@ async function restoreDiagram(welcome: EventOf<'welcome'>): Promise<void> {
     useStudio.setState({ returned: true })
     const key = await ask({ kind: 'attach', document, document_kind: 'diagram', inside, path, origin })
     if (key !== undefined) {
+      // Not later: the pending requests may belong to documents in other tabs.
+      await reattachTabs(welcome)
       connection.resend()
       return
     }
     useStudio.setState({ returned: false })
   }
+  await reattachTabs(welcome)
   connection.resend()
   if (!displayed) await openFromAddress(welcome)
 }

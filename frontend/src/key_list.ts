@@ -56,6 +56,16 @@ export const KEYS: KeyGroup[] = [
     ],
   },
   {
+    title: 'Document tabs',
+    sources: ['documents/tab_strip.tsx'],
+    keys: [
+      ['arrows', 'Show the next or previous document'],
+      ['Home, End', 'Show the first or last document'],
+      ['Del, middle click', 'Close the document'],
+      ['right click, Menu key', 'Commands on the document'],
+    ],
+  },
+  {
     title: 'Lists, fields and the tour',
     sources: [
       'library/pick_list.tsx',

@@ -477,7 +477,9 @@ export interface SetSettings {
   };
 }
 /**
- * Close a document; ``discard`` is required if it has unsaved edits.
+ * Close a document on this page; ``discard`` is required if it has unsaved edits.
+ *
+ * A document that another page shows stays open there, with its edits; the reply is then ``False``.
  */
 export interface Close {
   kind: "close";
@@ -1145,6 +1147,7 @@ export interface Fault {
  */
 export interface RunProgress {
   kind: "run_progress";
+  document: string;
   run: string;
   state: "running" | "paused" | "done" | "stopped" | "failed";
   time: number;
@@ -1282,7 +1285,7 @@ export interface Replies {
   ask_mask: SetMask;
   attach: string;
   change: number;
-  close: null;
+  close: boolean;
   control: null;
   copy: string;
   data_files: DataFile[];

@@ -19,7 +19,7 @@ import type {
   WireKind,
   WireLines,
 } from './protocol'
-import { samples } from './samples'
+import { receiveFrame } from './run/runs'
 
 /** The displayed diagram, in the last state sent by the server. */
 export interface OpenDocument {
@@ -115,7 +115,7 @@ useStudio.subscribe(scheduleFrame)
 /** The connection to the server; `events.ts` handles its events. */
 export const connection = new Connection(
   (frame) => {
-    samples.receive(frame)
+    receiveFrame(frame)
     scheduleFrame()
   },
   (state) => useStudio.setState({ connectionState: state }),

@@ -17,6 +17,7 @@ import { showDialog } from '../dialogs'
 import type { Places } from '../model/wires'
 import { WireValues } from '../run/wire_values'
 import { ask, change, openSheet, useStudio } from '../store'
+import { sheetKey } from '../documents/document_views'
 import { ArrangeBar } from './arrange_bar'
 import { BlockNode } from './block_node'
 import { endConnection } from './connecting'
@@ -31,7 +32,7 @@ import { useSheetDrawing } from './sheet_drawing'
 import type { SheetGraph, SheetNode } from './sheet_graph'
 import { useSheetKeys } from './sheet_keys'
 import { FIT } from './sheet_layout'
-import { useFitView, useNameScale, useSheetView, useCentredBlock } from './sheet_view'
+import { useFitView, useInitialView, useNameScale, useSheetView, useCentredBlock } from './sheet_view'
 import { SignalNames } from './signal_names'
 import { useStableHandlers } from './stable_handlers'
 import { Welcome } from './welcome'
@@ -63,8 +64,8 @@ export function Canvas() {
         </Breadcrumbs>
       )}
       {document.linked.length > 0 && <LibraryNote link={document.link} linked={document.linked} />}
-      <ReactFlowProvider key={[state.document, ...inside].join('/')}>
-        <Sheet />
+      <ReactFlowProvider key={sheetKey(state.document, inside)}>
+        <Sheet sheetKey={sheetKey(state.document, inside)} />
       </ReactFlowProvider>
     </div>
   )
@@ -100,7 +101,7 @@ async function breakLink(linked: string[]): Promise<void> {
   openSheet(document.inside)
 }
 
-function Sheet() {
+function Sheet({ sheetKey }: { sheetKey: string }) {
   const blocks = useStudio((s) => s.document!.blocks)
   const wires = useStudio((s) => s.document!.wires)
   const notes = useStudio((s) => s.document!.notes)
@@ -114,7 +115,7 @@ function Sheet() {
   useSheetKeys(sheet, selectedWires, setSelectedWires)
   useSheetView(sheet, flow)
   useNameScale(sheet)
-  useFitView(sheet, flow)
+  useFitView(sheet, flow, sheetKey)
   const handlers = useStableHandlers({
     onNodesChange: (changes: NodeChange<SheetNode>[]) => nodesChanged(changes, graph, sheetDrag),
     onEdgesChange: (changes: EdgeChange<WireEdgeType>[]) =>
@@ -130,8 +131,7 @@ function Sheet() {
   const rightButton = useRightButton(flow, edges, setSelectedWires)
   const selectedEdge = selectedWires.size === 1 ? edges.find(({ selected }) => selected) : undefined
   const empty = Object.keys(blocks).length === 0 && Object.keys(notes).length === 0
-  // An empty sheet would be fitted to the first block that is dropped on it, which would then jump.
-  const [initiallyFilled] = useState(!empty)
+  const initialView = useInitialView(sheetKey, empty)
   return (
     <div
       className="canvas"
@@ -163,7 +163,7 @@ function Sheet() {
         zoomOnPinch
         minZoom={0.1}
         maxZoom={4}
-        fitView={initiallyFilled}
+        {...initialView}
         fitViewOptions={FIT}
         elevateNodesOnSelect={false}
         aria-label="Diagram"

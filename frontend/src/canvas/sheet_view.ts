@@ -1,7 +1,8 @@
 import { useStore, type ReactFlowInstance } from '@xyflow/react'
-import { useEffect, type RefObject } from 'react'
+import { useEffect, useState, type RefObject } from 'react'
 import type { Rectangle } from '../model/free_place'
 import type { SheetBlock } from '../protocol'
+import { viewports } from '../documents/document_views'
 import { useStudio } from '../store'
 import type { SheetNode } from './sheet_graph'
 import { sheetView } from './sheet_actions'
@@ -55,11 +56,22 @@ function revealBlock(
   if (dx || dy) void flow.setViewport({ x: x + dx, y: y + dy, zoom }, { duration: 150 })
 }
 
-/** The sheet is fitted to its panel, at every panel size, until the user moves it. */
-export function useFitView(sheet: Sheet, flow: Flow): void {
+/**
+ * The sheet is fitted to its panel, at every panel size, until the user moves it. The moved view is stored
+ * under the key of the sheet, and shown when the sheet is shown again.
+ */
+export function useFitView(sheet: Sheet, flow: Flow, key: string): void {
   useEffect(() => {
     const element = sheet.current
     if (!element) return
+    let moved = viewports.has(key)
+    const store = () => moved && viewports.set(key, flow.getViewport())
+    addEventListener('pagehide', store, true)
+    const leave = () => {
+      store()
+      removeEventListener('pagehide', store, true)
+    }
+    if (moved) return leave
     let timer = 0
     const observer = new ResizeObserver(() => {
       clearTimeout(timer)
@@ -70,11 +82,28 @@ export function useFitView(sheet: Sheet, flow: Flow): void {
       clearTimeout(timer)
       observer.disconnect()
     }
+    const move = () => {
+      moved = true
+      stop()
+    }
     observer.observe(element)
     for (const kind of ['pointerdown', 'wheel', 'keydown', 'drop'])
-      element.addEventListener(kind, stop, { once: true })
-    return stop
-  }, [sheet, flow])
+      element.addEventListener(kind, move, { once: true })
+    return () => {
+      stop()
+      leave()
+    }
+  }, [sheet, flow, key])
+}
+
+/** The stored view of a sheet, else the view of all blocks. */
+export function useInitialView(key: string, empty: boolean) {
+  const [view] = useState(() => {
+    const defaultViewport = viewports.get(key)
+    // An empty sheet would be fitted to the first block that is dropped on it, which would then jump.
+    return defaultViewport ? { defaultViewport } : { fitView: !empty }
+  })
+  return view
 }
 
 /** Names are larger on a sheet that is zoomed out, as on a small screen: below the blocks they have room. */

@@ -10,9 +10,9 @@ import {
   IconX,
 } from '@tabler/icons-react'
 import type { DocumentState } from '../protocol'
-import { closeRobot } from '../robot/editor/state'
 import { ask, bringToFront, useStudio } from '../store'
 import { save, showDialog } from '../dialogs'
+import { closeDocument } from './tabs'
 
 /** Maximum number of files in the menu; the dialog lists all. */
 const MAX_FILES = 12
@@ -129,13 +129,13 @@ function OpenDocuments() {
     <>
       {diagrams.length > 0 && <Menu.Label>Open now</Menu.Label>}
       {diagrams.map((state) => (
-        <OpenItem key={state.document} state={state} close={(document) => ask({ kind: 'close', document })}>
+        <OpenItem key={state.document} state={state}>
           {state.path ?? state.title}
         </OpenItem>
       ))}
       {robots.length > 0 && <Menu.Label>Open robots</Menu.Label>}
       {robots.map((state) => (
-        <OpenItem key={state.document} state={state} close={closeRobot}>
+        <OpenItem key={state.document} state={state}>
           {state.title} {state.path && <span className="unit">{state.path}</span>}
         </OpenItem>
       ))}
@@ -143,15 +143,7 @@ function OpenDocuments() {
   )
 }
 
-function OpenItem({
-  state,
-  close,
-  children,
-}: {
-  state: DocumentState
-  close: (document: string) => Promise<unknown>
-  children: React.ReactNode
-}) {
+function OpenItem({ state, children }: { state: DocumentState; children: React.ReactNode }) {
   return (
     <Menu.Item
       leftSection={state.kind === 'robot' ? <IconRobot size={15} /> : <IconPencil size={15} />}
@@ -167,7 +159,7 @@ function OpenItem({
             aria-label={`Close ${state.title}`}
             onClick={(event) => {
               event.stopPropagation()
-              void close(state.document)
+              void closeDocument(state.document)
             }}
           />
         )

@@ -49,14 +49,15 @@ export class RunSamples {
     return 8 * this.time.length * (1 + this.data.length)
   }
 
-  receive(frame: ArrayBuffer): void {
+  /** Add a frame; returns whether it belongs to this run. */
+  receive(frame: ArrayBuffer): boolean {
     const length = new DataView(frame).getUint32(0, true)
     const header = JSON.parse(new TextDecoder().decode(new Uint8Array(frame, 4, length))) as {
       run: string
       first: number
       count: number
     }
-    if (header.run !== this.run) return
+    if (header.run !== this.run) return false
     const { first, count } = header
     this.reserve(first + count)
     let offset = 4 + length
@@ -67,6 +68,7 @@ export class RunSamples {
     }
     this.count = first + count
     this.version = ++lastVersion
+    return true
   }
 
   /** Drop the samples after the first `count`, because the run has stepped back. */

@@ -65,17 +65,18 @@ function update(key: string, change: (run: StoredRun) => Partial<StoredRun>): vo
   }))
 }
 
-export function onRunStarted(event: EventOf<'run_started'>): void {
+/** Store a run that has started. `displayed`: whether the page shows its diagram. */
+export function onRunStarted(event: EventOf<'run_started'>, displayed: boolean): void {
   const stored = useRuns.getState().runs.find(({ key }) => key === event.run)
   if (stored) {
     // After a reconnection the server sends its run again from the beginning.
     stored.samples.truncate(0)
-    showSamples(stored.samples)
+    if (displayed) showSamples(stored.samples)
     update(event.run, () => ({ state: 'running', tunings: [] }))
     return
   }
   const runSamples = new RunSamples(event.run, event.channels, event.aliases)
-  showSamples(runSamples)
+  if (displayed) showSamples(runSamples)
   useRuns.setState((s) => {
     const run: StoredRun = {
       key: event.run,
@@ -89,7 +90,7 @@ export function onRunStarted(event: EventOf<'run_started'>): void {
       reason: '',
       samples: runSamples,
       views: event.views,
-      trialValues: { ...s.trialValues },
+      trialValues: displayed ? { ...s.trialValues } : {},
       tunings: [],
     }
     const runs = [...s.runs, run].slice(-MAX_RUNS)
@@ -104,7 +105,10 @@ export function onRunTuned({ run, time, parameter, value }: EventOf<'run_tuned'>
 }
 
 export function onRunRewound({ run, time, count }: EventOf<'run_rewound'>): void {
-  if (samples.run === run) samples.truncate(count)
+  useRuns
+    .getState()
+    .runs.find(({ key }) => key === run)
+    ?.samples.truncate(count)
   scheduleFrame()
   // Values tuned later apply from the time to which the run has returned.
   update(run, ({ tunings }) => ({
@@ -119,8 +123,9 @@ export function onRunProgress({ run, state, solver, reason }: EventOf<'run_progr
   update(run, () => ({ state, solver, reason }))
 }
 
-/** Another document is shown: trial values and runs of the previous one are dropped. */
-export function dropTrials(): void {
-  showSamples(new RunSamples('', [], {}))
-  useRuns.setState({ trialValues: {} })
+/** Add a frame to the samples of its run: the displayed one, or one of a document in another tab. */
+export function receiveFrame(frame: ArrayBuffer): void {
+  if (samples.receive(frame)) return
+  for (const run of useRuns.getState().runs)
+    if ((run.state === 'running' || run.state === 'paused') && run.samples.receive(frame)) return
 }

@@ -15,6 +15,7 @@ from armblocks.blocks import BLOCKS
 from armblocks.errors import ArmblocksError, FormatError, InputError
 from armblocks.formats import load_diagram
 from armblocks.studio.built_page import built_page
+from armblocks.studio.protocol.page import Page
 from armblocks.studio.runs import worker as run_worker
 from armblocks.studio.server.hub import Hub
 from armblocks.studio.server.launch import serve
@@ -164,3 +165,45 @@ def test_a_run_without_memory_fails_with_an_error_message(monkeypatch: pytest.Mo
     event = json.loads(message[-1][1:])
     assert event["state"] == "failed"
     assert event["fault"]["what"] == "the run exceeds its memory limit"
+
+
+def test_a_document_is_closed_only_on_the_page_that_closes_it(tmp_path: Path) -> None:
+    async def scenario(hub: Hub, ask: Callable[..., Awaitable[Any]], events: Events) -> None:
+        key = await ask("new", document_kind="diagram")
+        received: Events = []
+
+        async def hear(text: str) -> None:
+            received.append(json.loads(text))
+
+        other = Page(hear, hear)  # type: ignore[arg-type]
+        await hub.welcome(other)
+        attach = {"kind": "attach", "document": key, "document_kind": "diagram"}
+        await hub.answer(other, json.dumps({"number": 1, "request": attach}))
+        await ask("change", document=key, key="1", edit={"kind": "add", "blocks": [GAIN]})
+        assert await ask("close", document=key, discard=True) is False
+        assert [state["document"] for state in received[-1]["documents"]] == [key]
+        close = {"kind": "close", "document": key}
+        await hub.answer(other, json.dumps({"number": 2, "request": close}))
+        assert "unsaved edits" in received[-1]["fault"]["what"]
+        await hub.answer(other, json.dumps({"number": 3, "request": {**close, "discard": True}}))
+        assert received[-1]["value"] is True
+        assert key not in hub.documents
+
+    run_scenario(tmp_path, scenario)
+
+
+def test_pages_that_do_not_show_a_document_are_notified_of_unsaved_changes(tmp_path: Path) -> None:
+    async def scenario(hub: Hub, ask: Callable[..., Awaitable[Any]], events: Events) -> None:
+        received: Events = []
+
+        async def hear(text: str) -> None:
+            received.append(json.loads(text))
+
+        await hub.welcome(Page(hear, hear))  # type: ignore[arg-type]
+        key = await ask("new", document_kind="diagram")
+        await ask("change", document=key, key="1", edit={"kind": "add", "blocks": [GAIN]})
+        assert [state["dirty"] for state in received[-1]["documents"]] == [True]
+        await ask("undo", document=key)
+        assert [state["dirty"] for state in received[-1]["documents"]] == [False]
+
+    run_scenario(tmp_path, scenario)

@@ -20,8 +20,10 @@ import {
 } from '@tabler/icons-react'
 import { DockviewReact, type DockviewReadyEvent, type IDockviewPanelHeaderProps } from 'dockview-react'
 import { lazy, Suspense, useEffect } from 'react'
+import { commandOf } from '../../commands'
 import { showDialog } from '../../dialogs'
 import { alterDocument, ask, bringToFront, useStudio } from '../../store'
+import { DocumentTabs } from '../../documents/document_tabs'
 import { edit, leaveEditor, useRobotEditor, type OpenRobot } from './state'
 import { JointsPanel } from './joints_panel'
 import { ReadingsPanel } from './readings_panel'
@@ -122,7 +124,13 @@ export default function RobotEditor() {
       event.stopPropagation()
       const pressed = event.key.toLowerCase()
       if (event.key === '?' && !(event.target instanceof HTMLInputElement)) showDialog('keys')
-      if (!(event.ctrlKey || event.metaKey)) return
+      const command = commandOf(event, false)
+      if (command?.inRobotEditor) {
+        event.preventDefault()
+        if (command.enabled?.() ?? true) command.run()
+        return
+      }
+      if (!(event.ctrlKey || event.metaKey) || event.altKey) return
       if (pressed === 's') saveRobot()
       else if (pressed === 'z' && !event.shiftKey) undo()
       else if (pressed === 'y' || (pressed === 'z' && event.shiftKey)) redo()
@@ -136,6 +144,7 @@ export default function RobotEditor() {
   return (
     <div className="robot-editor" role="region" aria-label={`Robot ${shown.name}`}>
       <Bar shown={shown} />
+      <DocumentTabs />
       <Notes />
       <div className="robot-dock">
         <DockviewReact

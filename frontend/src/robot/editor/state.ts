@@ -82,11 +82,10 @@ export function leaveEditor(): void {
   useRobotEditor.setState({ current: null, notes: [] })
 }
 
-/** Close a robot without unsaved edits. */
-export async function closeRobot(robot: string): Promise<void> {
-  if ((await ask({ kind: 'close', document: robot })) === undefined) return
-  const { [robot]: _, ...robots } = useRobotEditor.getState().robots
-  useRobotEditor.setState({ robots })
+/** Remove a robot that was closed. */
+export function forgetRobot(robot: string): void {
+  const { [robot]: closed, ...robots } = useRobotEditor.getState().robots
+  if (closed) useRobotEditor.setState({ robots })
 }
 
 const STORAGE_KEY = 'armblocks-robot'

@@ -145,11 +145,14 @@ class DocumentRequests:
     async def _alter(self, _: Page, request: document_messages.Alteration) -> int:
         presenter, open_file = self._with_key(request.document)
         before, number = open_file.document.value, open_file.document.version
+        was_dirty = open_file.document.dirty
         if isinstance(request, document_messages.Reload):
             presenter.files.reload(open_file, request.key)
         elif not presenter.files.perform(open_file, request):
             return number
         await self._notify_change(open_file, before, number)
+        if open_file.document.dirty != was_dirty:  # the lists of pages that do not show the document
+            await self.notify_list()
         return open_file.document.version
 
     async def _ignore_file_change(self, _: Page, request: document_messages.IgnoreFileChange) -> None:
@@ -168,10 +171,14 @@ class DocumentRequests:
         await self.notify_list()
         return path
 
-    async def _close(self, _: Page, request: document_messages.Close) -> None:
+    async def _close(self, page: Page, request: document_messages.Close) -> bool:
         presenter, open_file = self._with_key(request.document)
-        presenter.files.close(open_file, discard=request.discard)
+        shared = any(other is not page for other in self._pages.showing(open_file.key))
+        if not shared:
+            presenter.files.close(open_file, discard=request.discard)
+        page.shows.pop(open_file.key, None)
         await self.notify_list()
+        return not shared
 
     async def _recover(self, page: Page, request: document_messages.Recover) -> str | None:
         files = [presenter.files for presenter in self._presenters.values()]

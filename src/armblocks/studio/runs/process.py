@@ -157,6 +157,7 @@ class RunProcess:
             fix="run the model again; if it happens again, record fewer samples or shorten the run",
         )
         return run_messages.RunProgress(
+            document=self.document,
             run=self.key,
             state="stopped" if self._killed else "failed",
             time=last.time if last else 0.0,

@@ -318,6 +318,7 @@ class _Run:
         factor = self.time / max(perf_counter() - self.began, 1e-9)
         self._notify(
             run_messages.RunProgress(
+                document=self.document,
                 run=self.key,
                 state=self.state,
                 time=self.time,

@@ -192,8 +192,11 @@ class Save(Request[str]):
     overwrite: bool = False
 
 
-class Close(Request[None]):
-    """Close a document; ``discard`` is required if it has unsaved edits."""
+class Close(Request[bool]):
+    """Close a document on this page; ``discard`` is required if it has unsaved edits.
+
+    A document that another page shows stays open there, with its edits; the reply is then ``False``.
+    """
 
     kind: Literal["close"] = "close"
     document: str

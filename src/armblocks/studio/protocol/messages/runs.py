@@ -143,6 +143,7 @@ class RunProgress(RunEvent):
     """State and time of a run. At the end, ``solver`` and ``reason`` state which solver was used and why."""
 
     kind: Literal["run_progress"] = "run_progress"
+    document: str
     run: str
     state: Literal["running", "paused", "done", "stopped", "failed"]
     time: float
