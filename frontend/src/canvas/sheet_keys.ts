@@ -10,10 +10,13 @@ import { wireKey, type Places } from '../model/wires'
 
 const ARROW_STEP = 5
 
-/** Keys typed before the list of blocks has the focus. */
-function pendingText(): string {
+const SEARCH_LISTS = new Set(['find', 'commands'])
+
+/** Add a letter that was typed before an opened list has the focus; otherwise open the list of blocks. */
+function typeLetter(letter: string): void {
   const { open, typed } = useDialogs.getState()
-  return open === 'insert' ? typed : ''
+  if (open && SEARCH_LISTS.has(open)) useDialogs.setState({ typed: typed + letter })
+  else showDialog('insert', open === 'insert' ? typed + letter : letter)
 }
 
 /** Keys that press a button or leave it; all others are keys of the sheet also after a button was pressed. */
@@ -79,7 +82,7 @@ export function useSheetKeys(
     else if (event.key === 'Escape' && document.inside.length && !selection.size)
       openSheet(document.inside.slice(0, -1))
     else if (event.key === 'Escape') select([])
-    else if (/^\p{L}$/u.test(event.key)) showDialog('insert', pendingText() + event.key)
+    else if (/^\p{L}$/u.test(event.key)) typeLetter(event.key)
     else return false
     return true
   }

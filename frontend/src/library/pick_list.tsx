@@ -1,9 +1,12 @@
+import './pick_list.css'
 import { Kbd, Modal, TextInput } from '@mantine/core'
 import { useEffect, useRef, useState, type ReactNode } from 'react'
 
 export interface PickItem {
   key: string
   title: string
+  /** The heading of consecutive entries; without one, entries have no heading. */
+  group?: string
   note?: string
   face?: ReactNode
   keys?: string
@@ -73,29 +76,70 @@ export function PickList({
         }}
       />
       <div role="listbox" aria-label={list} className="found" ref={listElement}>
-        {items.map(({ key, title, note, face, keys }, index) => (
-          <button
-            key={key}
-            type="button"
-            role="option"
-            aria-selected={index === activeIndex}
-            tabIndex={-1}
-            onClick={() => pick(index)}
-            onMouseMove={({ movementX, movementY }) => {
-              // Browsers also report a move when the list changes under a resting pointer.
-              if (movementX || movementY) setActiveIndex(index)
-            }}
-          >
-            {face}
-            <span className="what">
-              <b>{title}</b>
-              {note && <small>{note}</small>}
-            </span>
-            {keys && <Kbd size="xs">{keys}</Kbd>}
-          </button>
-        ))}
+        {groupsOf(items).map(({ group, first, members }) => {
+          const options = members.map((item, index) => (
+            <Option
+              key={item.key}
+              item={item}
+              active={first + index === activeIndex}
+              activate={() => setActiveIndex(first + index)}
+              pick={() => pick(first + index)}
+            />
+          ))
+          return group ? (
+            <div role="group" aria-label={group} key={first} className="group">
+              <div className="heading" aria-hidden>
+                {group}
+              </div>
+              {options}
+            </div>
+          ) : (
+            options
+          )
+        })}
       </div>
       {items.length === 0 && <p className="empty">{emptyText}</p>}
     </Modal>
+  )
+}
+
+/** Consecutive entries with the same heading; `first` is the index of the first one. */
+function groupsOf(items: PickItem[]) {
+  const groups: { group: string; first: number; members: PickItem[] }[] = []
+  for (const [index, item] of items.entries()) {
+    const last = groups.at(-1)
+    if (last?.group === (item.group ?? '')) last.members.push(item)
+    else groups.push({ group: item.group ?? '', first: index, members: [item] })
+  }
+  return groups
+}
+
+interface OptionProps {
+  item: PickItem
+  active: boolean
+  activate: () => void
+  pick: () => void
+}
+
+function Option({ item: { title, note, face, keys }, active, activate, pick }: OptionProps) {
+  return (
+    <button
+      type="button"
+      role="option"
+      aria-selected={active}
+      tabIndex={-1}
+      onClick={pick}
+      onMouseMove={({ movementX, movementY }) => {
+        // Browsers also report a move when the list changes under a resting pointer.
+        if (movementX || movementY) activate()
+      }}
+    >
+      {face}
+      <span className="what">
+        <b>{title}</b>
+        {note && <small>{note}</small>}
+      </span>
+      {keys && <Kbd size="xs">{keys}</Kbd>}
+    </button>
   )
 }
