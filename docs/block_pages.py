@@ -79,7 +79,7 @@ def block_page(kind: type[Block]) -> str:
     diagram = ab.block_example(kind)
     name = kind.type_name()
     family = BLOCKS.family_of(kind)
-    called = f"**{prose(kind.title)}**, of" if other_title(kind) else "Of"
+    name_in_studio = f"Name in the studio: **{prose(kind.title)}**. " if other_title(kind) else ""
     lines = [
         # Not in the table of contents, because the theme would list all blocks on the page of each block.
         "---",
@@ -90,7 +90,7 @@ def block_page(kind: type[Block]) -> str:
         "",
         f'<div class="symbol alone">{symbol(kind, name)}</div>',
         "",
-        f"{called} the family [{family}](../blocks.md#{family}).",
+        f"{name_in_studio}Family: [{family}](../blocks.md#{family}).",
         "",
         *docstring(kind),
         "",
@@ -102,7 +102,8 @@ def block_page(kind: type[Block]) -> str:
     others = [other for other in BLOCKS.families[family] if other is not kind]
     if others:
         links = ", ".join(f"[{other.type_name()}]({other.type_name()}.md)" for other in others)
-        lines += ["## See also", "", f"The family {family}: {links}. [All blocks](../blocks.md).", ""]
+        text = f"Other blocks of the family {family}: {links}. [All blocks](../blocks.md)."
+        lines += ["## See also", "", text, ""]
     return "\n".join(lines)
 
 
@@ -237,7 +238,10 @@ def behaviour(diagram: Diagram) -> list[str]:
     if rows:
         lines = ["## States and events", "", *table(("name", "kind", "unit", "meaning"), rows)]
     if block.sampled:
-        lines += ["It is evaluated at the ticks of its clock only; its outputs are held in between.", ""]
+        text = (
+            "The block is evaluated only at the ticks of its clock; its outputs are held between the ticks."
+        )
+        lines += [text, ""]
     if block.time_derivatives:
         pairs = ", ".join(
             f"`{out}` is the exact time derivative of the signal at `{into}`"
@@ -265,7 +269,7 @@ def worked_example(kind: type[Block], diagram: Diagram) -> list[str]:
     lines += ["```python", diagram_to_python(diagram).rstrip(), "```", ""]
     data = diagram_to_bytes(diagram, load_robot).decode()
     lines += [
-        "<details><summary>The same as a file</summary>",
+        "<details><summary>The example as a diagram file</summary>",
         "",
         "```text",  # syntax colours would triple the size of the page
         data.rstrip(),

@@ -12,7 +12,7 @@ const OLD_FONT = /,\s*url\([^)]*\.woff\)\s*format\('woff'\)/
 /** Removes unused styles. */
 const unusedStyles: Exclude<NonNullable<NonNullable<UserConfig['css']>['postcss']>, string>['plugins'] = [
   {
-    postcssPlugin: 'unseen',
+    postcssPlugin: 'unused-styles',
     Rule(rule) {
       const used = rule.selectors.filter((selector) => !OTHER_THEME.test(selector))
       if (!used.length) rule.remove()

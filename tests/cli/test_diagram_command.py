@@ -12,7 +12,7 @@ from armblocks.diagram import Connection, Diagram, DiagramBuilder, PortRef, Subs
 from armblocks.drawing import DRAWING_FORMATS, drawing_bytes
 
 Invoke = Callable[..., Result]
-BEGINNINGS = {"svg": b"<?xml", "png": b"\x89PNG", "pdf": b"%PDF-"}
+FIRST_BYTES = {"svg": b"<?xml", "png": b"\x89PNG", "pdf": b"%PDF-"}
 
 
 def nested() -> Diagram:
@@ -35,7 +35,7 @@ def test_every_format_is_written_and_two_drawings_are_equal(
     assert result.exit_code == 0, result.output
     assert result.stdout == f"wrote drawn.{kind}\n"
     written = (tmp_path / f"drawn.{kind}").read_bytes()
-    assert written.startswith(BEGINNINGS[kind])
+    assert written.startswith(FIRST_BYTES[kind])
     assert written == drawing_bytes(ab.load_diagram("van_der_pol_pid"), kind)
 
 

@@ -301,7 +301,7 @@ def test_the_linearised_puma_agrees_with_mass_matrix_and_gravity_gradient() -> N
     slope = np.column_stack(
         [(puma.gravload(q + e) - puma.gravload(q - e)) / (2 * step) for e in step * np.eye(6)]
     )
-    # In equilibrium the derivative of qdd by q is that of the gravity load; central differences have the
-    # error h^2.
+    # In equilibrium the derivative of qdd with respect to q is that of the gravity load; central differences
+    # have the error h^2.
     assert np.allclose(system.A[6:, :6], -inverse @ slope, rtol=0.0, atol=1e-5 * np.abs(inverse).max())
     assert np.array_equal(system.A[:6, 6:], np.eye(6))

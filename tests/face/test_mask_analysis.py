@@ -1,4 +1,4 @@
-"""Derivatives by mask parameters include the parameters that depend on them through formulas."""
+"""Derivatives with respect to mask parameters include the parameters that depend on them through formulas."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Derivatives of runs by parameters compared with closed forms and differences of runs."""
+"""Derivatives of runs with respect to parameters compared with closed forms and differences of runs."""
 
 from __future__ import annotations
 

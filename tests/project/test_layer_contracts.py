@@ -71,7 +71,7 @@ def test_every_contract_is_kept(copy: Path) -> None:
 
 
 def test_every_contract_detects_its_violation(copy: Path) -> None:
-    """All violations are present at the same time: the output for each contract names its own."""
+    """All violations are present at the same time: the output for each contract names its violation."""
     for package, line, _ in VIOLATIONS.values():
         with copy.joinpath("src", "armblocks", *package.split("."), "__init__.py").open(
             "a", encoding="utf-8"

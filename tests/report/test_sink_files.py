@@ -106,7 +106,7 @@ def test_a_symbolic_link_out_of_the_folder_is_refused(tmp_path: Path) -> None:
 def test_the_error_for_a_folder_that_cannot_be_created_names_it(tmp_path: Path) -> None:
     (tmp_path / "taken").write_text("a file")
     model = diagram(sink=ToFile(file="taken/kept.csv"))
-    with pytest.raises(FormatError, match=r"the folder of 'taken/kept\.csv' cannot be made"):
+    with pytest.raises(FormatError, match=r"the folder of 'taken/kept\.csv' cannot be created"):
         ab.write_files(tmp_path, model, ab.simulate(model))
 
 

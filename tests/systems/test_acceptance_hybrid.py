@@ -42,7 +42,7 @@ Run = Callable[..., ab.SimulationResult]
 
 
 def integrating(builder: ab.DiagramBuilder, name: str, rate: object, **parameters: object) -> ab.BlockHandle:
-    """Add an integrator after its rate."""
+    """Add an integrator with the input ``rate``."""
     return builder.add(name, bl.Integrator(**parameters), rate)
 
 

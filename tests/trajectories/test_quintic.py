@@ -48,10 +48,10 @@ def test_rates_at_both_ends_are_exact():
     assert_array_equal(moving.at(np.array(4.0)).qd, QD1)
 
 
-@pytest.mark.parametrize(("t", "stand"), [(-1.0, Q0), (5.0, QF)])
-def test_the_trajectory_is_at_rest_outside_the_interval(t: float, stand: np.ndarray):
+@pytest.mark.parametrize(("t", "position"), [(-1.0, Q0), (5.0, QF)])
+def test_the_trajectory_is_at_rest_outside_the_interval(t: float, position: np.ndarray):
     motion = Quintic(q0=Q0, qf=QF, tmax=T, qd0=QD0, qd1=QD1).at(np.array(t))
-    assert_allclose(motion.q, stand, rtol=1e-15)
+    assert_allclose(motion.q, position, rtol=1e-15)
     assert_array_equal(motion.qd, np.zeros(3))
     assert_array_equal(motion.qdd, np.zeros(3))
 

@@ -15,12 +15,12 @@ test.each<Corner>([
     { x: -300, y: -300 },
     { x: 300, y: 300 },
   ]) {
-    const now = resized(box, [right, down], by, 3)
-    expect(right < 0 ? now.x + now.width : now.x).toBe(right < 0 ? box.x + box.width : box.x)
-    expect(down < 0 ? now.y + now.height : now.y).toBe(down < 0 ? box.y + box.height : box.y)
-    expect([now.width % 5, now.height % 5]).toEqual([0, 0])
-    expect(now.width).toBeGreaterThanOrEqual(20)
-    expect(now.height).toBeGreaterThanOrEqual(30)
+    const result = resized(box, [right, down], by, 3)
+    expect(right < 0 ? result.x + result.width : result.x).toBe(right < 0 ? box.x + box.width : box.x)
+    expect(down < 0 ? result.y + result.height : result.y).toBe(down < 0 ? box.y + box.height : box.y)
+    expect([result.width % 5, result.height % 5]).toEqual([0, 0])
+    expect(result.width).toBeGreaterThanOrEqual(20)
+    expect(result.height).toBeGreaterThanOrEqual(30)
   }
 })
 

@@ -99,7 +99,8 @@ def dead_time(
 
 
 class PadeApproximation:
-    """Derivatives by ``[x; q]`` in place of ``x``, with ``q' = P q + R d`` and ``v = S q + W d``."""
+    """Derivatives with respect to ``[x; q]`` in place of ``x``, with ``q' = P q + R d`` and ``v = S q + W
+    d``."""
 
     def __init__(self, dead: DeadTime, order: int) -> None:
         self.dead = dead
@@ -127,7 +128,7 @@ class PadeApproximation:
         )
 
     def _others(self, by_z: Array) -> Array:
-        """The derivatives by all of ``z`` except delayed values."""
+        """The derivatives with respect to all of ``z`` except delayed values."""
         others = by_z.copy()
         others[:, self.dead.indices] = 0.0
         return others

@@ -68,7 +68,7 @@ def linearise(
     names, units = _elements(system.states)
 
     def ticked(ticking: tuple[int, ...]) -> Jacobians:
-        """The derivatives of ``z`` after a tick by the values before the tick."""
+        """The derivatives of ``z`` after a tick with respect to the values before the tick."""
         jacobians = _without(evaluated.update_jacobians(point, np.array(ticking, dtype=np.float64)), unknowns)
         _check_finite(system, _elements(system.discrete)[0], jacobians, "the discrete variable")
         return approximation(jacobians) if approximation else jacobians
@@ -205,8 +205,8 @@ def _elements(layout: Signature) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def _unknowns(evaluated: EvaluatedSystem, point: Point) -> Jacobians | None:
-    """The derivatives of the unknowns of the implicit equations by all other variables; ``None`` without
-    unknowns."""
+    """The derivatives of the unknowns of the implicit equations with respect to all other variables; ``None``
+    without unknowns."""
     system = evaluated.system
     if not system.algebraic.size:
         return None

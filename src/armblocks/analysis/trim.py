@@ -227,7 +227,7 @@ class _Search:
         return blocks
 
     def jacobian(self, point: Point) -> Array:
-        """Derivatives of the equations by the unknowns."""
+        """Derivatives of the equations with respect to the unknowns."""
         problem = self.problem
         rows: list[Array] = []
         for j, chosen, subtracted in self._jacobian_rows(point):

@@ -1,7 +1,7 @@
 """Tables with many points: a binary search finds the interval, and its end points are read by index.
 
 The equations of a short table contain every point, which is faster than a search for up to ``SHORT`` points.
-Those of a long table have a cost of log n, for compiling and for running. Its positions and values are run
+The cost of a long table grows with log n, in compilation and in runs. Its positions and values are run
 inputs, stored contiguously, and a run is not differentiated with respect to them. The run inputs of a long
 cubic spline are computed from positions and values (:mod:`.splines`).
 """
@@ -21,7 +21,10 @@ KNOTS = Parameter(
     name="knots", kind=ParameterKind.ARRAY, default=(), doc="positions of the spline, axis after axis"
 )
 SPLINE = Parameter(
-    name="spline", kind=ParameterKind.ARRAY, default=(), doc="its values and derivatives, alternating"
+    name="spline",
+    kind=ParameterKind.ARRAY,
+    default=(),
+    doc="values and derivatives of the spline, alternating",
 )
 """Run inputs of a block with a long spline, in place of the positions and values."""
 
@@ -49,8 +52,8 @@ def interval_of(u: SX, positions: SX) -> SX:
     return fmin(fmax(last_at_or_below(positions, u), 0.0), positions.numel() - 2.0)
 
 
-def line(u: SX, positions: SX, interval: SX, entry: Callable[[SX], SX]) -> SX:
-    """The relative position in an interval, computed as in :func:`interpolation.linear_weights`."""
+def interpolated(u: SX, positions: SX, interval: SX, entry: Callable[[SX], SX]) -> SX:
+    """The linear interpolation in an interval, with the weights of :func:`interpolation.linear_weights`."""
     begin, end = read_entry(positions, interval), read_entry(positions, interval + 1.0)
     share = (u - begin) / (end - begin)
     return (1.0 - share) * entry(interval) + share * entry(interval + 1.0)

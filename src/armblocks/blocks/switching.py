@@ -93,8 +93,10 @@ def cell_of(target: SX, before: SX, guards: Signals, up: str = "up", down: str =
 
 
 def edge_count(target: SX, before: SX, next_edge: SX) -> SX:
-    """The number of past edges: ``before``, but at the ``next_edge`` (1) ``before + 1``, or ``target`` (the
-    number by the time) if that is larger."""
+    """The number of past edges: ``before`` until the event ``next_edge``, then at least ``before + 1``.
+
+    ``target`` is the number that follows from the time; it may be larger.
+    """
     return if_else(next_edge, fmax(target, before + 1.0), before)
 
 

@@ -215,7 +215,7 @@ class HeldOutput(Block):
 
     def input_ports(self) -> tuple[Port, ...]:
         return (
-            Port("u", "the signal that leaves"),
+            Port("u", "the output inside the subsystem"),
             Port("works", "1 while or when the subsystem is active", "", ()),
             *((_ANEW,) * self.anew),
         )

@@ -21,7 +21,7 @@ from armblocks.errors import InputError, UnknownNameError
 
 
 @dataclass
-class Followers:
+class DependentParameters:
     """The parameters that depend on one mask parameter through formulas, by path, at any depth.
 
     ``tunable``: parameters that stay inputs of the compiled system, as formulas of the mask parameter's
@@ -42,7 +42,7 @@ def mask_parameters(diagram: Diagram) -> Mapping[str, tuple[Diagram, Parameter]]
     }
 
 
-def followers(diagram: Diagram, path: str, symbol: SX | None = None) -> Followers:
+def dependent_parameters(diagram: Diagram, path: str, symbol: SX | None = None) -> DependentParameters:
     """The parameters that depend on the mask parameter of this path, whose value is ``symbol``.
 
     Raises ``UnknownNameError`` for a path that is not a mask parameter.
@@ -51,12 +51,12 @@ def followers(diagram: Diagram, path: str, symbol: SX | None = None) -> Follower
     if path not in known:
         raise UnknownNameError("mask parameter", path, known, where=f"diagram '{diagram.name}'")
     level, rule = known[path]
-    dependents = Followers()
+    dependents = DependentParameters()
     value = as_symbols(level.mask_values[rule.name])
     perturbed = (
         symbol if symbol is not None else SX.sym(rule.name, *((1, 1) if value is None else value.shape))
     )
-    _follow(path.rpartition(".")[0], level, {rule.name: perturbed}, dependents)
+    _add_dependents(path.rpartition(".")[0], level, {rule.name: perturbed}, dependents)
     return dependents
 
 
@@ -81,7 +81,7 @@ def added_parameter(diagram: Diagram, path: str) -> AddedParameter:
         )
     slot = Slot(path, shape_of(value), rule.unit)
     change = SX.sym(rule.name, slot.size)
-    dependents = followers(diagram, path, nominal + unflatten(change, slot.shape))
+    dependents = dependent_parameters(diagram, path, nominal + unflatten(change, slot.shape))
     if dependents.structural:
         raise InputError(
             f"'{dependents.structural[0]}', which is not tunable, depends on '{path}'",
@@ -109,7 +109,9 @@ def with_mask_parameters(system: HybridSystem, diagram: Diagram, names: Iterable
     return with_added_parameters(system, tuple(added_parameter(diagram, name) for name in added))
 
 
-def _follow(path: str, level: Diagram, perturbed: Mapping[str, SX], dependents: Followers) -> None:
+def _add_dependents(
+    path: str, level: Diagram, perturbed: Mapping[str, SX], dependents: DependentParameters
+) -> None:
     """Find formulas of the perturbed parameters in one diagram and, recursively, in its subsystems."""
     constants = {
         name: symbols
@@ -135,7 +137,7 @@ def _follow(path: str, level: Diagram, perturbed: Mapping[str, SX], dependents: 
             else:
                 dependents.structural.append(f"{joined(path, name)}.{parameter}")
         if inner and isinstance(block, DiagramBlock):
-            _follow(joined(path, name), block.diagram, inner, dependents)
+            _add_dependents(joined(path, name), block.diagram, inner, dependents)
 
 
 def _stays_input(block: Block, parameter: str) -> bool:
@@ -158,7 +160,8 @@ def tunable_parameters(diagram: Diagram) -> list[tuple[str, Parameter, Value]]:
     parameters = [
         (path, rule, level.mask_values[rule.name])
         for path, (level, rule) in mask_parameters(diagram).items()
-        if as_symbols(level.mask_values[rule.name]) is not None and not followers(diagram, path).structural
+        if as_symbols(level.mask_values[rule.name]) is not None
+        and not dependent_parameters(diagram, path).structural
     ]
     flat = flat_diagram(diagram)
     # Blocks that share parameters have the same paths.

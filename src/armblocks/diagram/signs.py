@@ -78,7 +78,7 @@ def graph(*points: tuple[float, float]) -> Graph:
     return Graph(points)
 
 
-def swing(cycles: float, growth: float = 0.0) -> Graph:
+def sine_curve(cycles: float, growth: float = 0.0) -> Graph:
     """A sine around the middle with growing frequency."""
     points = [k / 64 for k in range(65)]
     return graph(*((u, 0.5 + 0.5 * math.sin(2 * math.pi * cycles * u * (1 + growth * u))) for u in points))
@@ -137,7 +137,7 @@ def polynomial(name: str, coefficients: object, letter: str = "s", *, delays: bo
         if value == 0 and len(values) > 1:
             continue
         degree = highest - k
-        symbol = "" if degree == 0 else letter + ("" if degree == 1 else raised(degree))
+        symbol = "" if degree == 0 else letter + ("" if degree == 1 else superscript(degree))
         magnitude = axis_number(abs(float(f"{value:.3g}")))
         text = symbol if symbol and magnitude == "1" else magnitude + symbol
         sign = "−" if value < 0 else "+"
@@ -146,13 +146,13 @@ def polynomial(name: str, coefficients: object, letter: str = "s", *, delays: bo
     return text if len(text) <= 20 else f"{name}({letter}{'⁻¹' * delays})"
 
 
-def raised(number: int) -> str:
+def superscript(number: int) -> str:
     """An integer in superscript digits."""
     return "".join("⁰¹²³⁴⁵⁶⁷⁸⁹⁻"["0123456789-".index(digit)] for digit in str(number))
 
 
 def _roots(roots: object, letter: str) -> str:
-    """``s (s + 1)``; ``1`` without roots, ``Π(s − …)`` for more than two."""
+    """``s (s + 1)``; ``1`` without roots; the number of roots if there are more than two or complex ones."""
     values = np.asarray(roots, dtype=np.complex128).reshape(-1).tolist()
     if len(values) > 2 or any(abs(value.imag) > 0 for value in values):
         return f"{len(values)} roots"

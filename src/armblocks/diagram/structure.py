@@ -81,7 +81,7 @@ class Inport(Block):
         _check_dimensions(self)
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the signal that enters", self.unit, stated_shape(self)),)
+        return (Port("y", "the input of the subsystem", self.unit, stated_shape(self)),)
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
         stated = stated_shape(self)
@@ -129,7 +129,7 @@ class Outport(Block):
         _check_dimensions(self)
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "the signal that leaves", self.unit, stated_shape(self)),)
+        return (Port("u", "the output of the subsystem", self.unit, stated_shape(self)),)
 
 
 PASS_THROUGH = Diagram(
@@ -203,7 +203,7 @@ class DiagramBlock(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Subsystem(DiagramBlock):
-    """A subsystem: a diagram inside a block. In and Out blocks are its ports; signals are name/block/port."""
+    """A diagram inside a block. Its ports are In and Out blocks; its signals have paths name/block/port."""
 
     title: ClassVar[str] = "Subsystem"
 

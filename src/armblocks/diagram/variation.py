@@ -37,7 +37,9 @@ def with_parameters(diagram: Diagram, values: Mapping[str, object]) -> Diagram:
 
 
 def with_comments(diagram: Diagram, comments: Mapping[str, Comment | None]) -> Diagram:
-    """A copy with other comments of blocks, ``{"filter": "through", "plant/drag": "out", "gain": None}``.
+    """A copy of a diagram with blocks commented out or through.
+
+    Example of ``comments``: ``{"filter": "through", "plant/drag": "out", "gain": None}``.
 
     A block that is commented ``"out"`` takes no part in the model; its outputs are zeros of the same shapes.
     One that is commented ``"through"`` is replaced by wires from its inputs to its outputs. ``None`` removes

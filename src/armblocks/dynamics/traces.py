@@ -144,8 +144,8 @@ def trace_inertia(robot: Robot) -> TracedFunction:
 def trace_coriolis(robot: Robot) -> TracedFunction:
     """``C (n, n)``: ``C qd`` is the velocity torque without friction, and ``dM/dt - 2 C`` is skew.
 
-    The velocity torque is quadratic, ``c(q, qd) = C(q, qd) qd``; half its derivative by ``qd`` is the matrix
-    of Christoffel symbols (Siciliano, Sciavicco, Villani, Oriolo, *Robotics*, 7.1.2 and 7.2.1).
+    The velocity torque is quadratic, ``c(q, qd) = C(q, qd) qd``; half its derivative with respect to ``qd``
+    is the matrix of Christoffel symbols (Siciliano, Sciavicco, Villani, Oriolo, *Robotics*, 7.1.2 and 7.2.1).
     """
     tree = regrouped(KinematicTree.of(robot))
 

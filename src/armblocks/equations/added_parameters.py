@@ -28,8 +28,8 @@ class AddedParameter:
 def with_added_parameters(system: HybridSystem, added: tuple[AddedParameter, ...]) -> HybridSystem:
     """The same equations with parameters appended; at 0 they have no effect.
 
-    Changes of parameters that the system does not have are ignored. The derivative by an added parameter is
-    the directional derivative along its changes.
+    Changes of parameters that the system does not have are ignored. The derivative with respect to an added
+    parameter is the directional derivative along its changes.
     """
     old = system.parameters
     layout = Signature((*old.slots, *(entry.slot for entry in added)))

@@ -62,7 +62,7 @@ def elementary(name: str, *values: SX) -> SX:
 
 
 def _power(base: SX, exponent: SX) -> SX:
-    """``base**exponent``, whose derivative by the exponent has the factor ``log base``.
+    """``base**exponent``, whose derivative with respect to the exponent has the factor ``log base``.
 
     CasADi would evaluate that logarithm during differentiation if the base is a constant. Here the base is
     passed in a form that CasADi does not recognise as a constant.

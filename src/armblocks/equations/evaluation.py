@@ -39,8 +39,8 @@ class Point:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Jacobians:
-    """Derivatives of one function by time (m, 1), states (m, nx), discrete variables (m, nz), unknowns (m,
-    nw), and selected parameters (m, k)."""
+    """Derivatives of one function with respect to time (m, 1), states (m, nx), discrete variables (m, nz),
+    unknowns (m, nw), and selected parameters (m, k)."""
 
     t: Array
     x: Array

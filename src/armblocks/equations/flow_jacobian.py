@@ -1,4 +1,5 @@
-"""The exact derivative of a system's flow, and of its implicit equations, by states, unknowns and time."""
+"""The exact derivative of a system's flow, and of its implicit equations, with respect to states, unknowns
+and time."""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ from armblocks.equations.traced_function import TracedFunction
 
 @dataclass(frozen=True, eq=False)
 class FlowJacobian:
-    """Derivatives of ``F = (derivative, residual)`` by ``v = (x, w)`` and by time.
+    """Derivatives of ``F = (derivative, residual)`` with respect to ``v = (x, w)`` and time.
 
     ``function`` has the inputs of ``derivative``. Its outputs are ``J``, the structurally nonzero entries of
     ``dF/dv``, and ``T (nx + nw,)``, ``dF/dt``. Entry ``k`` is in row ``rows[k]`` and column ``columns[k]``.

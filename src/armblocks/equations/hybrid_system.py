@@ -109,7 +109,7 @@ class HybridSystem:
     signals: TracedFunction
     residual: TracedFunction
     residual_jacobian: TracedFunction
-    """Derivative of ``residual`` by ``w``."""
+    """Derivative of ``residual`` with respect to ``w``."""
     update: TracedFunction
     guards: TracedFunction
     """Guards: an event occurs where an entry crosses zero."""

@@ -1,4 +1,4 @@
-"""A system together with the derivatives of its signals by some of its parameters.
+"""A system together with the derivatives of its signals with respect to some of its parameters.
 
 For each chosen parameter ``p`` the state ``S = dx/dp`` is added, with ``S' = f_x S + f_z Z + f_w W + f_p``.
 ``Z = dz/dp`` changes at ticks by the derivative of ``update``, and ``W = dw/dp`` follows from the
@@ -28,12 +28,12 @@ from armblocks.errors import InputError
 
 MIXED = OWN + "mixed"
 """A discrete variable (2,): the first time (s; -1: never) at which events coincided whose times have
-different derivatives by a parameter, and the number of one of their guards, from 1."""
+different derivatives with respect to a parameter, and the number of one of their guards, from 1."""
 
 
 def parameters_read_by_index(system: HybridSystem) -> frozenset[str]:
-    """The parameters that are tables read by index. Derivatives by their entries are not available
-    (``table_reading``)."""
+    """The parameters that are tables read by index. Derivatives with respect to their entries are not
+    available (``table_reading``)."""
     functions = (system.derivative, system.signals, system.residual, system.update, system.guards)
     tables = {
         (index, index + count)
@@ -52,7 +52,8 @@ def parameters_read_by_index(system: HybridSystem) -> frozenset[str]:
 def sensitivity_system(
     system: HybridSystem, parameters: Sequence[str], outputs: Sequence[str]
 ) -> HybridSystem:
-    """The system with the derivatives of ``outputs`` (paths of signals) by ``parameters`` (paths) as signals.
+    """The system with the derivatives of ``outputs`` (paths of signals) with respect to ``parameters``
+    (paths) as signals.
 
     Raises ``UnknownNameError`` for unknown names. Raises ``InputError`` for a parameter that is a table read
     by index, that acts only through its integer part, or that moves an event at the start; also for implicit
@@ -152,12 +153,12 @@ class _Augmented:
         return names
 
     def rate(self, expression: SX, k: int) -> SX:
-        """The total derivative of an expression by parameter ``k``."""
+        """The total derivative of an expression with respect to parameter ``k``."""
         c = self.columns
         return c.along(expression, t=0.0, x=c.S[k], z=self.delays.Z[k], w=c.W[k], p=c.seeds[k])
 
     def widened(self, expression: SX) -> SX:
-        """The expression and its derivatives by all parameters in one column."""
+        """The expression and its derivatives with respect to all parameters in one column."""
         return vertcat(expression, *(self.rate(expression, k) for k in range(len(self.columns.names))))
 
     def start(self, traced: TracedFunction, letter: str) -> TracedFunction:

@@ -1,11 +1,11 @@
 """Sensitivities of delayed signals, and the arrival of their jumps.
 
-For ``y(t) = u(t - d)`` the derivative by a parameter is ``y_p = u_p(t - d) - u'(t - d) d_p``, so ``u_p``
-becomes another delayed signal. A jump of ``u`` at the time ``s`` arrives when ``t - d = s``. The derivative
-of the arrival time is ``(s_p + d_p) / (1 - d')``. Three more delayed signals describe the jump: the number of
-jumps, ``s_p`` of the last jump, and the value of ``u`` before it. A guard fires when the delayed number
-changes. If equations also read the derivative ``u'(t - d)``, then ``u''`` and the derivative before a jump
-are delayed too.
+For ``y(t) = u(t - d)`` the derivative with respect to a parameter is ``y_p = u_p(t - d) - u'(t - d) d_p``, so
+``u_p`` becomes another delayed signal. A jump of ``u`` at the time ``s`` arrives when ``t - d = s``. The
+derivative of the arrival time is ``(s_p + d_p) / (1 - d')``. Three more delayed signals describe the jump:
+the number of jumps, ``s_p`` of the last jump, and the value of ``u`` before it. A guard fires when the
+delayed number changes. If equations also read the derivative ``u'(t - d)``, then ``u''`` and the derivative
+before a jump are delayed too.
 
 Source: Bellen and Zennaro, Numerical Methods for Delay Differential Equations, 2003, chapter 2.
 """
@@ -145,7 +145,7 @@ class DelayedSensitivities:
         return delays
 
     def arrival(self, k: int) -> SX:
-        """The derivative by parameter ``k`` of the arrival time of the last jump, (n,)."""
+        """The derivative with respect to parameter ``k`` of the arrival time of the last jump, (n,)."""
         steady = if_else(self.delay_rate == 1.0, 0.0, self.delay_rate)
         return (self.delayed_p[k] + self.tau_p[k]) / (1.0 - steady)
 

@@ -105,7 +105,7 @@ class Instants:
         )
 
     def by_parameter(self, expression: SX, k: int) -> SX:
-        """The total derivative by parameter ``k`` with the present sensitivities."""
+        """The total derivative with respect to parameter ``k`` with the present sensitivities."""
         c = self.columns
         return c.along(expression, t=0.0, x=c.S[k], z=self.delays.Z[k], w=c.W[k], p=c.seeds[k])
 
@@ -155,8 +155,8 @@ class Instants:
         return vertcat(updated, *Z, *added.values())
 
     def _captured_by(self, updated: SX, k: int) -> SX:
-        """The derivative of an update by parameter ``k``; between the events of an instant, along the
-        instant."""
+        """The derivative of an update with respect to parameter ``k``; between the events of an instant,
+        along the instant."""
         c, instant = self.columns, self.open * self.instant_p[k]
         z = self.delays.Z[k] + self.delays.rate_along * instant
         return c.along(updated, t=instant, x=c.S[k], z=z, w=c.W[k], p=c.seeds[k])
@@ -225,8 +225,8 @@ class Instants:
         return corrected
 
     def _instants(self, own: SX, quiet: SX, sources: SX, arrived: SX) -> tuple[list[SX], SX]:
-        """The derivatives of this instant by the parameters, and the number (from 1) of a guard with
-        different derivatives, or 0."""
+        """The derivatives of this instant with respect to the parameters, and the number (from 1) of a guard
+        with different derivatives, or 0."""
         located = logic_and(logic_or(own != 0.0, quiet), self.located)
         marks = vertcat(located, SX.zeros(2), sources != 0.0, arrived != 0.0)
         # A guard that fired without a located zero was moved by a jump, perhaps by one at a fixed time.

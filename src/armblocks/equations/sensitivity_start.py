@@ -83,8 +83,8 @@ class _Start:
         return sorted(guards)
 
     def held_states(self, entries: slice) -> list[str]:
-        """The blocks with states whose derivative by these parameters is changed by the reset at the
-        start."""
+        """The blocks with states whose derivative with respect to these parameters is changed by the reset at
+        the start."""
         system = self.system
         t, x, z, w, p, e = system.reset.arguments
         after = vertcat(*system.reset.results)[: x.numel()]
@@ -113,7 +113,8 @@ class _Start:
         return rates_by_entry
 
     def _guards(self, x: Array, z: Array, entries: slice) -> tuple[Array, Array, Array]:
-        """The guards, their time derivatives, and their largest derivative by the parameters, each (ng,)."""
+        """The guards, their time derivatives, and their largest derivative with respect to the parameters,
+        each (ng,)."""
         t, states, discrete, w, p = self.system.guards.arguments
         g = vertcat(*self.system.guards.results)
         derivative = self.system.derivative

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.diagram import Diagram, flat_diagram, with_parameters
-from armblocks.diagram.mask_tuning import followers, mask_parameters, tunable_parameters
+from armblocks.diagram.mask_tuning import dependent_parameters, mask_parameters, tunable_parameters
 from armblocks.errors import InputError
 from armblocks.simulation import RunState, Samples, Simulation, SimulationResult
 
@@ -102,7 +102,10 @@ class DiagramRun:
         if tuned is None:
             masks = mask_parameters(self.diagram)
             follows = [
-                name for path in values if path in masks for name in followers(self.diagram, path).structural
+                name
+                for path in values
+                if path in masks
+                for name in dependent_parameters(self.diagram, path).structural
             ]
             why = f": '{follows[0]}', which depends on it, is not tunable" if follows else ""
             shown = ", ".join(f"'{path}'" for path in values)

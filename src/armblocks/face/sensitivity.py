@@ -1,4 +1,4 @@
-"""Sensitivities: derivatives of the signals of a run by its parameters."""
+"""Sensitivities: derivatives of the signals of a run with respect to its parameters."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SensitivityResult:
-    """A run with the derivatives of some of its signals by some parameters.
+    """A run with the derivatives of some of its signals with respect to some parameters.
 
     ``result[output, parameter]`` is d output / d parameter at ``time`` (N,) s: ``(N, *shape of the output)``
     for a parameter of one entry, else ``(N, *shape of the output, *shape of the parameter)``. One entry of a
@@ -74,7 +74,8 @@ def sensitivity(
     values: Mapping[str, object] | None = None,
     **settings: Unpack[RunSettings],
 ) -> SensitivityResult:
-    """Run a diagram together with the exact derivatives of ``outputs`` by tunable ``parameters``.
+    """Run a diagram together with the exact derivatives of ``outputs`` with respect to tunable
+    ``parameters``.
 
     Mask parameters are allowed; parameters that depend on them by formulas are included.
 

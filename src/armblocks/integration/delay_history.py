@@ -71,7 +71,7 @@ class DelayHistory:
         return reals[self.entry(row, line + 2)]
 
     def derivative(self, reals: Reals, row: Integer, line: Integer | int) -> Real:
-        """The derivative of the signal of a line in a row, by the time."""
+        """The derivative of the signal of a line in a row, with respect to time."""
         return reals[self.entry(row, line + (2 + self.count))]
 
     def first_rows(self, counts: Integers) -> Integers:

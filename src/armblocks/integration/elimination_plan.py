@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class JacobianPattern:
-    """The sparsity pattern of the derivatives of ``(f, g)`` by ``(x, w)``: entry k at rows[k], columns[k].
+    """The sparsity pattern of the derivatives of ``(f, g)`` with respect to ``(x, w)``: entry k at rows[k],
+    columns[k].
 
     The first ``states`` rows and columns are those of the flow, the rest those of the implicit equations.
     """

@@ -34,7 +34,7 @@ class RunPoint:
 
 @dataclass(frozen=True, kw_only=True)
 class Checkpoint:
-    """The arrays of a run before the step that its end shortened, and the name of the method."""
+    """The arrays of a run before its last step, which the stop time shortened, and the name of the method."""
 
     reals: Vector
     counts: Integers
@@ -43,7 +43,7 @@ class Checkpoint:
 
 def is_history(numbers: Vector, width: int) -> bool:
     """Whether an array can be a history of delayed signals with rows of ``width`` numbers: at least one
-    complete row, times that do not decrease, and each middle of a step behind its beginning."""
+    complete row, times that do not decrease, and the middle row of each step after its first row."""
     if not numbers.size or numbers.size % width:
         return False
     rows = numbers.reshape(-1, width)

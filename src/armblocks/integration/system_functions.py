@@ -19,7 +19,8 @@ def derivative(r: Routine, t: Reals, x: Reals, z: Reals, w: Reals, p: Reals, xd:
 
 @external
 def flow_jacobian(r: Routine, t: Reals, x: Reals, z: Reals, w: Reals, p: Reals, J: Reals, T: Reals) -> None:
-    """The entries of the derivatives of ``(f, g)`` by ``(x, w)``, and those by the time."""
+    """The entries of the derivatives of ``(f, g)`` with respect to ``(x, w)``, and those with respect to
+    time."""
 
 
 @external
@@ -29,7 +30,7 @@ def residual(r: Routine, t: Reals, x: Reals, z: Reals, w: Reals, p: Reals, g: Re
 
 @external
 def residual_jacobian(r: Routine, t: Reals, x: Reals, z: Reals, w: Reals, p: Reals, J: Reals) -> None:
-    """The derivatives of ``g`` by ``w``, row by row."""
+    """The derivatives of ``g`` with respect to ``w``, row by row."""
 
 
 @external

@@ -111,7 +111,7 @@ def html_table(
     caption: str, heads: Sequence[tuple[str, str]], rows: Sequence[str], *, words: bool = False
 ) -> str:
     """A table with a caption and headed columns (title, unit); ``words``: columns of text, not of numbers."""
-    kind = ' class="said"' if words else ""
+    kind = ' class="words"' if words else ""
     head = "".join(
         f'<th scope="col">{title}' + (f'<span class="unit">{unit}</span>' if unit else "") + "</th>"
         for title, unit in heads

@@ -79,7 +79,7 @@ def write_files(
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise FormatError(
-                f"the folder of '{sink.settings.file}' cannot be made ({error.strerror or error})",
+                f"the folder of '{sink.settings.file}' cannot be created ({error.strerror or error})",
                 where=str(target),
                 fix="choose another folder or change its permissions",
             ) from error

@@ -74,7 +74,7 @@ def test_file_names_that_some_systems_cannot_store_are_refused(
 
 
 def test_a_folder_that_cannot_be_created_raises_an_error(folder: ProjectFolder) -> None:
-    with pytest.raises(ArmblocksError, match=r"the folder '.*inside.json' cannot be made"):
+    with pytest.raises(ArmblocksError, match=r"the folder '.*inside.json' cannot be created"):
         folder.write("inside.json/a.json", b"{}")
 
 

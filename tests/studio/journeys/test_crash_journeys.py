@@ -18,7 +18,7 @@ from conftest import Studio, new_context
 
 @dataclass(frozen=True, kw_only=True)
 class Crash:
-    """A studio after a crash, and the pages that have seen it."""
+    """A studio after a crash, and the pages that were open during it."""
 
     studio: Studio
     """The restarted studio, in the same folder."""
@@ -42,25 +42,25 @@ def crash(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterato
     faults: list[str] = []
     context.on("weberror", lambda error: faults.append(str(error.error)))
     context.on("console", lambda line: faults.append(line.text) if line.type == "error" else None)
-    drawing, robot, left = (context.new_page() for _ in range(3))
-    for page in (drawing, robot, left):
+    drawing, robot, closed = (context.new_page() for _ in range(3))
+    for page in (drawing, robot, closed):
         page.goto(old.address)
         page.locator(".react-flow__node").first.wait_for()
-    draw_and_leave(left)
+    draw_and_leave(closed)
     new_diagram(drawing)
     add(drawing, "sine wave")
     expect(block(drawing, "Sine Wave")).to_be_visible()
     robot.get_by_role("button", name="Menu").click()
     robot.get_by_role("menuitem", name="New robot").click()
-    lengthen(robot, "link1", "0.75")
+    set_length(robot, "link1", "0.75")
     expect(robot.locator(".robot-editor").get_by_label("changed", exact=True)).to_be_visible()
     old.kill()
     overwritten = edit_from_outside(old.folder / "lost.json")
     for page in (drawing, robot):
-        expect(silence(page)).to_be_visible()
+        expect(outage_message(page)).to_be_visible()
     axe(drawing)
     add(drawing, "gain")  # queued in the page
-    lengthen(robot, "link2", "0.25")  # queued in the page, and preserved across its reload
+    set_length(robot, "link2", "0.25")  # queued in the page, and preserved across its reload
     studio = Studio(old.folder, "van_der_pol_pid")
     yield Crash(studio=studio, before=old, drawing=drawing, robot=robot, overwritten=overwritten)
     context.close()
@@ -83,12 +83,12 @@ def length(page: Page, link: str) -> Locator:
     return page.locator(".robot-editor").get_by_role("textbox", name=f"a of {link}", exact=True)
 
 
-def lengthen(page: Page, link: str, value: str) -> None:
+def set_length(page: Page, link: str, value: str) -> None:
     length(page, link).fill(value)
     length(page, link).press("Enter")
 
 
-def silence(page: Page) -> Locator:
+def outage_message(page: Page) -> Locator:
     """The message that the page shows while the studio is unreachable."""
     return page.get_by_text("The studio does not answer")
 
@@ -97,7 +97,7 @@ def test_edits_survive_a_killed_server_and_continue_in_the_same_page(crash: Cras
     page = crash.drawing
     assert crash.studio.address == crash.before.address
     expect(block(page, "Gain")).to_be_visible()
-    expect(silence(page)).to_be_hidden()
+    expect(outage_message(page)).to_be_hidden()
     expect(block(page, "Sine Wave")).to_be_visible()
     page.reload()
     expect(page.locator(".react-flow__node")).to_have_count(2)

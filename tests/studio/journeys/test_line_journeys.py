@@ -46,14 +46,14 @@ class Session:
         self.studio.process.send_signal(signal.SIGSTOP)
 
     def go_on(self) -> None:
-        expect(silence(self.page)).to_be_visible()
+        expect(outage_message(self.page)).to_be_visible()
         self.page.wait_for_timeout(OUTAGE_MS)
         self.studio.process.send_signal(signal.SIGCONT)
-        expect(silence(self.page)).to_be_hidden()
+        expect(outage_message(self.page)).to_be_hidden()
 
     def kill(self) -> None:
         self.studio.kill()
-        expect(silence(self.page)).to_be_visible()
+        expect(outage_message(self.page)).to_be_visible()
 
     def start_again(self) -> None:
         self.studio = Studio(self.folder, "van_der_pol_pid")
@@ -72,7 +72,7 @@ class Session:
         return {name: [place["x"], place["y"]] for name, place in document["layout"].items()}
 
 
-def silence(page: Page) -> Locator:
+def outage_message(page: Page) -> Locator:
     return page.get_by_text("The studio does not answer")
 
 
@@ -124,7 +124,7 @@ def test_a_drag_across_a_server_restart_ends_where_the_block_is_released(
     session.kill()
     page.mouse.move(x + 60, y + 40, steps=4)
     session.start_again()
-    expect(silence(page)).to_be_hidden()
+    expect(outage_message(page)).to_be_hidden()
     page.mouse.move(x + 160, y + 80, steps=4)
     page.mouse.up()
     expect(page.locator(".title")).to_have_text("untitled •")

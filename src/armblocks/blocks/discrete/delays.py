@@ -34,7 +34,7 @@ from armblocks.diagram import (
     sample_time_parameter,
     shape_of,
 )
-from armblocks.diagram.signs import FaceSign, Words, raised, stairs
+from armblocks.diagram.signs import FaceSign, Words, stairs, superscript
 from armblocks.equations import Shape
 from armblocks.errors import InputError
 
@@ -123,7 +123,7 @@ class Delay(Block):
     sample_time: ArrayLike = sample_time_parameter()
 
     def face_sign(self) -> FaceSign:
-        return Words(f"z{raised(-self.length)}")
+        return Words(f"z{superscript(-self.length)}")
 
     def input_ports(self) -> tuple[Port, ...]:
         return (INPUT,)

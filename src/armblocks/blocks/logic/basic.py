@@ -66,7 +66,7 @@ class RelationalOperator(Block):
         return Words(_RELATIONS[self.relation])
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u1", "the left side"), Port("u2", "the right side"))
+        return (Port("u1", "the left operand"), Port("u2", "the right operand"))
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "1 or 0"),)
@@ -139,13 +139,13 @@ class CompareToConstant(Block):
 
     relation: str = parameter("<=", choices=tuple(_RELATIONS), doc="the relation")
     zero_crossing: bool = zero_crossing_parameter()
-    constant: ArrayLike = parameter(3.0, kind=ParameterKind.ARRAY, doc="the right side")
+    constant: ArrayLike = parameter(3.0, kind=ParameterKind.ARRAY, doc="the right operand")
 
     def face_sign(self) -> FaceSign:
         return Words(f"{_RELATIONS[self.relation]} {value_text(self.constant)}")
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "the left side"),)
+        return (Port("u", "the left operand"),)
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "1 or 0"),)
@@ -176,7 +176,7 @@ class CompareToZero(Block):
         return Words(f"{_RELATIONS[self.relation]} 0")
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "the left side"),)
+        return (Port("u", "the left operand"),)
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "1 or 0"),)
@@ -436,9 +436,9 @@ def _truth(x: Signals, name: str) -> SX:
 
 
 def _sides(relation: str, shape: Shape) -> tuple[Condition, ...]:
-    """The conditions of a relation on the difference of left and right side; equality needs two."""
-    above = Condition("above", shape, "1 where the left side is greater", closed=False)
-    below = Condition("below", shape, "1 where the left side is less", closed=False)
+    """The conditions of a relation on the difference of left and right operand; equality needs two."""
+    above = Condition("above", shape, "1 where the left operand is greater", closed=False)
+    below = Condition("below", shape, "1 where the left operand is less", closed=False)
     if relation in (">", "<="):
         return (above,)
     return (below,) if relation in ("<", ">=") else (above, below)

@@ -48,7 +48,7 @@ _PULSES = driver("SineWave", frequency=2.0)
 
 @dataclass(frozen=True, kw_only=True)
 class EdgeDetection(Block):
-    """Edge detection: y(k) = 1 if the input changed from u(k-1) to u(k) in the chosen way, else 0.
+    """Edge detection: y(k) = 1 if the chosen edge occurs between u(k-1) and u(k), else 0.
 
     Simulink has one block for each edge: Detect Change, Detect Increase, Detect Decrease, Detect Rise
     Positive, Detect Rise Nonnegative, Detect Fall Negative, Detect Fall Nonpositive.
@@ -109,7 +109,7 @@ class SRFlipFlop(Block):
     sample_time: ArrayLike = sample_time_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("S", "sets"), Port("R", "resets"))
+        return (Port("S", "sets Q"), Port("R", "resets Q"))
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("Q", "the state"), Port("not_Q", "1 - Q; 0 while both inputs are true"))
@@ -216,10 +216,10 @@ class JKFlipFlop(Block):
     sample_time: ArrayLike = sample_time_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("J", "sets"), Port("CLK", "the clock", shape=()), Port("K", "resets"))
+        return (Port("J", "sets Q"), Port("CLK", "the clock", shape=()), Port("K", "resets Q"))
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("Q", "the state"), Port("not_Q", "its opposite"))
+        return (Port("Q", "the state"), Port("not_Q", "the negation of Q"))
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
         shape = broadcast({"J": inputs["J"], "K": inputs["K"]})

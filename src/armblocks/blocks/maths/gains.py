@@ -23,7 +23,7 @@ from armblocks.diagram import (
     parameter,
     sample_time_parameter,
 )
-from armblocks.diagram.signs import FaceSign, Outline, Words, swing
+from armblocks.diagram.signs import FaceSign, Outline, Words, sine_curve
 from armblocks.errors import InputError
 
 _OPERATIONS: Mapping[str, Callable[[SX, SX], SX]] = {
@@ -95,7 +95,7 @@ class SineWaveFunction(Block):
     """A sine of an input: y = amplitude sin(frequency u + phase) + bias."""
 
     title: ClassVar[str] = "Sine Wave Function"
-    sign: ClassVar[FaceSign] = swing(1.0)
+    sign: ClassVar[FaceSign] = sine_curve(1.0)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The input is a time that runs twice as fast.", inputs={"u": driver("Ramp", slope=2.0)}
     )

@@ -70,7 +70,7 @@ class ProductOfElements(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Extremum(Block):
-    """The least or the greatest element and its index: y = u(index), index from 1.
+    """The minimum or maximum of all elements, and its index: y = u(index), index from 1.
 
     If several elements are equal, the index is that of the first. Indices of a matrix are in column-major
     order.
@@ -94,7 +94,7 @@ class Extremum(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (
-            Port("y", "the least or the greatest element", shape=()),
+            Port("y", "the minimum or maximum", shape=()),
             Port("index", "its index, from 1", shape=()),
         )
 

@@ -237,7 +237,7 @@ class MatrixPower(Block):
 class Reshape(Block):
     """The same elements in another shape, in column-major order as in MATLAB.
 
-    ``vector`` (n,), ``column`` (n, 1), ``row`` (1, n), or ``matrix`` (rows, n / rows).
+    The new shape is ``vector`` (n,), ``column`` (n, 1), ``row`` (1, n), or ``matrix`` (rows, n / rows).
     """
 
     title: ClassVar[str] = "Reshape"

@@ -288,7 +288,8 @@ class ArmPlant(Block):
             values["contact"] = rest.contact if self.stops == "hard" else contact
         happened = dot(vertcat(*e.values()), vertcat(*e.values())) > 0.0
         after = {name: if_else(happened, value, x[name]) for name, value in values.items()}
-        # At rest the speed is 0 for all parameter values, so its derivatives by parameters are 0 too.
+        # At rest the speed is 0 for all parameter values, so its derivatives with respect to parameters are 0
+        # too.
         rests = logic_and(rest.mode == 0.0, x["qd"] == 0.0)
         return {**after, "qd": if_else(logic_and(rests, logic_not(happened)), 0.0, after["qd"])}
 

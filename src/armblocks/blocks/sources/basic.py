@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from armblocks.blocks.elementwise import parameters_shape
 from armblocks.diagram import Block, ParameterKind, Port, Shapes, Signals, WorkedExample, parameter, shape_of
-from armblocks.diagram.signs import FaceSign, Words, graph, swing
+from armblocks.diagram.signs import FaceSign, Words, graph, sine_curve
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,7 +125,7 @@ class SineWave(Block):
     """A sine of time: y = amplitude sin(frequency t + phase) + bias."""
 
     title: ClassVar[str] = "Sine Wave"
-    sign: ClassVar[FaceSign] = swing(1.0)
+    sign: ClassVar[FaceSign] = sine_curve(1.0)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A sine of 2 rad/s with bias 1.",
         parameters={"amplitude": 2.0, "frequency": 2.0, "bias": 1.0},

@@ -34,7 +34,7 @@ class CounterLimited(Block):
     )
     sampled: ClassVar[bool] = True
 
-    upper: int = parameter(7, minimum=0, doc="the greatest count")
+    upper: int = parameter(7, minimum=0, doc="the maximum count")
     sample_time: ArrayLike = sample_time_parameter(1.0)
 
     def output_ports(self) -> tuple[Port, ...]:

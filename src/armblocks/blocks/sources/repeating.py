@@ -31,14 +31,14 @@ from armblocks.diagram import (
     sample_time_parameter,
     shape_of,
 )
-from armblocks.diagram.signs import FaceSign, graph, pulses, stairs, swing
+from armblocks.diagram.signs import FaceSign, graph, pulses, sine_curve, stairs
 from armblocks.errors import InputError
 
 _ROUNDED = 1.0 + 1e-14  # k * period / period may be slightly less than k
 
 
 _WAVES = {
-    "sine": swing(2.0),
+    "sine": sine_curve(2.0),
     "square": pulses((0.5, 0.5)),
     "sawtooth": graph((0, 0.5), (0.25, 0), (0.25, 1), (0.75, 0), (0.75, 1), (1, 0.5)),
 }

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armblocks.blocks.elementwise import parameters_shape
 from armblocks.blocks.interpolation import weights
-from armblocks.blocks.long_tables import inputs_with, interval_of, is_long, is_spline, line
+from armblocks.blocks.long_tables import inputs_with, interpolated, interval_of, is_long, is_spline
 from armblocks.blocks.splines import spline_corners, with_derivatives
 from armblocks.blocks.table_axes import ascending_positions
 from armblocks.diagram import (
@@ -26,7 +26,7 @@ from armblocks.diagram import (
     parameter,
     shape_of,
 )
-from armblocks.diagram.signs import FaceSign, Words, graph, swing
+from armblocks.diagram.signs import FaceSign, Words, graph, sine_curve
 from armblocks.equations import last_at_or_below, read_entry
 from armblocks.errors import InputError
 
@@ -112,7 +112,7 @@ class Chirp(Block):
     """
 
     title: ClassVar[str] = "Chirp Signal"
-    sign: ClassVar[FaceSign] = swing(1.2, 1.6)
+    sign: ClassVar[FaceSign] = sine_curve(1.2, 1.6)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The frequency rises from 0.1 Hz to 1 Hz within ten seconds.",
         parameters={"target_time": 10.0},
@@ -210,7 +210,7 @@ class FromTable(Block):
             signal = sum((weight * row(k) for k, weight in corners), SX(0.0))
         else:
             inside = t if self.outside == "linear" else fmin(fmax(t, first), last)
-            signal = line(inside, times, interval_of(t, times), row)
+            signal = interpolated(inside, times, interval_of(t, times), row)
         return if_else(logic_and(t >= first, t <= last), signal, 0.0) if self.outside == "zero" else signal
 
     @property

@@ -48,7 +48,7 @@ class If(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         chosen = [
-            Port(f"if{number}", f"1 where '{text}' is the first that is true", "", ())
+            Port(f"if{number}", f"1 where '{text}' is the first true condition", "", ())
             for number, text in enumerate(self._texts(), start=1)
         ]
         return (*chosen, Port("else", "1 where no condition is true", "", ()))

@@ -277,7 +277,7 @@ class Delta2Tr(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class PoseIntegration(Block):
-    """The integral of a twist, a pose: p' = v and Q' = 1/2 w Q (world axes), or p' = R v and Q' = 1/2 Q w.
+    """The pose of a frame from its twist: p' = v, Q' = 1/2 w Q (world axes), or p' = R v, Q' = 1/2 Q w.
 
     V is (v; w) of the frame's origin: in world axes like ``jacob0``, in body axes like ``jacobe``. The states
     are the position and a quaternion Q. The pose is that of Q / |Q|, so that its rotation matrix is always
@@ -286,7 +286,7 @@ class PoseIntegration(Block):
 
     title: ClassVar[str] = "Pose Integration"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A frame with constant twist in body axes moves on a screw.",
+        shows="A frame with constant twist in body axes performs a screw motion.",
         inputs={"V": driver("Constant", value=(1.0, 0.0, 0.2, 0.0, 0.0, 1.0))},
         shown=(driver("T2xyz").by(T="T").at("x"), driver("T2xyz").by(T="T").at("z")),
     )

@@ -136,7 +136,7 @@ class ProjectFolder:
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise FormatError(
-                f"the folder '{path.parent}' cannot be made ({error.strerror})",
+                f"the folder '{path.parent}' cannot be created ({error.strerror})",
                 where=relative,
                 fix="choose another folder",
             ) from error
@@ -192,7 +192,8 @@ class ProjectFolder:
                 yield (Path(folder) / name).relative_to(self.root).as_posix()
 
     def robot_path(self, name: str, shipped: tuple[str, ...]) -> str:
-        """Return the argument of ``load_robot`` for a robot named by a page; raise for files elsewhere."""
+        """Return the argument of ``load_robot`` for a robot named by a page; raise an error for other
+        files."""
         if name in shipped:
             return name
         if Path(name).suffix.lower() not in READABLE:

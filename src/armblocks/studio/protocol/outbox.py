@@ -9,9 +9,9 @@ from collections.abc import Awaitable, Callable
 Payload = str | bytes
 """A message as JSON, or a frame of samples."""
 CONGESTED_BYTES = 4 * 2**20
-"""Above this queue size, samples of a run are added only as fast as the page receives them, bytes."""
+"""Queue size in bytes above which samples of a run are added only as fast as the page receives them."""
 MAX_BYTES = 64 * 2**20
-"""Above this queue size the connection is closed; the page reconnects when it is responsive again, bytes."""
+"""Queue size in bytes above which the connection is closed. A responsive page reconnects later."""
 
 
 class Outbox:

@@ -1,8 +1,8 @@
 """The terminal log of the studio's server: locations of errors, without secrets.
 
 Users copy terminal output into bug reports, so it contains no secrets except the login link that ``armblocks
-studio`` prints, and no file contents. Of an exception only type and traceback are logged; its message may
-quote file contents.
+studio`` prints, and no file contents. For an exception, only its type and traceback are logged, because its
+message may quote file contents.
 """
 
 from __future__ import annotations

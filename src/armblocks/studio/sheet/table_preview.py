@@ -61,7 +61,8 @@ def _cell(values: NDArray[np.float64] | None, row: int) -> str:
 
 
 def _curves(table: TimeTable | None) -> tuple[list[float], list[list[float]], tuple[float, float]]:
-    """Times and values for a plot, with all extremes, and the least and greatest distance of two times."""
+    """Times and values for a plot, with all extremes, and the minimum and maximum difference of successive
+    times."""
     if table is None:
         return [], [], (0.0, 0.0)
     rows = np.asarray(table)
