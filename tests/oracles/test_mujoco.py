@@ -21,16 +21,16 @@ def mujoco_model(robot: Robot) -> mujoco.MjModel:
     spec.compiler.balanceinertia = False
     base = spec.worldbody.add_body(name="base", pos=robot.base.p, quat=quaternion(robot.base.R))
     bodies = {None: base}
-    waiting = list(robot.links)
-    while waiting:
-        link = next(link for link in waiting if link.parent in bodies)
-        waiting.remove(link)
+    remaining = list(robot.links)
+    while remaining:
+        link = next(link for link in remaining if link.parent in bodies)
+        remaining.remove(link)
         # One body at the joint, with its zero at q = 0, and one at the frame of the link.
         T = link.before @ link.joint.motion(link.joint.offset)
         moving = bodies[link.parent].add_body(name=f"{link.name} joint", pos=T.p, quat=quaternion(T.R))
         if link.joint.moves:
-            turning = isinstance(link.joint, Revolute)
-            kind = mujoco.mjtJoint.mjJNT_HINGE if turning else mujoco.mjtJoint.mjJNT_SLIDE
+            is_revolute = isinstance(link.joint, Revolute)
+            kind = mujoco.mjtJoint.mjJNT_HINGE if is_revolute else mujoco.mjtJoint.mjJNT_SLIDE
             armature = link.motor.reflected_inertia if link.motor else 0.0
             moving.add_joint(name=link.name, type=kind, axis=link.joint.axis, armature=armature)
         body = moving.add_body(name=link.name, pos=link.after.p, quat=quaternion(link.after.R))
@@ -47,11 +47,11 @@ def test_agrees_with_mujoco(robot: Robot):
     assert not inertia_findings(robot)
     model = mujoco_model(robot)
     data = mujoco.MjData(model)
-    place = np.array([model.joint(name).dofadr[0] for name in robot.joint_names])
+    indices = np.array([model.joint(name).dofadr[0] for name in robot.joint_names])
     smooth = robot.nofriction()
     for q, qd, qdd in random_states(robot, 2):
-        data.qpos[place], data.qvel[place], data.qacc[place] = q, qd, qdd
+        data.qpos[indices], data.qvel[indices], data.qacc[indices] = q, qd, qdd
         mujoco.mj_inverse(model, data)
         tau = evaluate(smooth, "rne", q, qd, qdd)
         # MuJoCo diagonalises inertias and rotates by quaternions.
-        assert_allclose(tau, data.qfrc_inverse[place], rtol=0, atol=1e-11 * np.abs(tau).max())
+        assert_allclose(tau, data.qfrc_inverse[indices], rtol=0, atol=1e-11 * np.abs(tau).max())

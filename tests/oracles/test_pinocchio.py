@@ -16,16 +16,16 @@ def pinocchio_model(robot: Robot) -> tuple[pin.Model, pin.Data, int, np.ndarray]
     world = pin.SE3(robot.base.matrix)
     links: dict[str | None, tuple[int, pin.SE3]] = {None: (0, world)}
     # Depth first: Pinocchio assumes that the joints of a branch have consecutive numbers.
-    waiting = [link for link in robot.links if link.parent is None]
-    while waiting:
-        link = waiting.pop()
-        waiting += [child for child in robot.links if child.parent == link.name]
+    remaining = [link for link in robot.links if link.parent is None]
+    while remaining:
+        link = remaining.pop()
+        remaining += [child for child in robot.links if child.parent == link.name]
         parent, carried = links[link.parent]
         placement = carried * pin.SE3(link.before.matrix)
         if link.joint.moves:
             axis = np.array(link.joint.axis)
-            turning = isinstance(link.joint, Revolute)
-            kind = pin.JointModelRevoluteUnaligned if turning else pin.JointModelPrismaticUnaligned
+            is_revolute = isinstance(link.joint, Revolute)
+            kind = pin.JointModelRevoluteUnaligned if is_revolute else pin.JointModelPrismaticUnaligned
             # The offset is part of the placement, so that both robots have the same q.
             placement = placement * pin.SE3(link.joint.motion(link.joint.offset).matrix)
             index = model.addJoint(parent, kind(axis), placement, link.name)
@@ -42,16 +42,16 @@ def pinocchio_model(robot: Robot) -> tuple[pin.Model, pin.Data, int, np.ndarray]
         pin.Frame("tool", carrier, 0, at_link * pin.SE3(robot.tool.matrix), pin.FrameType.OP_FRAME)
     )
     model.gravity.linear = np.array(robot.gravity)
-    place = np.array([model.joints[model.getJointId(name)].idx_v for name in robot.joint_names])
+    indices = np.array([model.joints[model.getJointId(name)].idx_v for name in robot.joint_names])
     armature = np.zeros(model.nv)
-    armature[place] = [motor.reflected_inertia if motor else 0.0 for motor in robot.motors]
+    armature[indices] = [motor.reflected_inertia if motor else 0.0 for motor in robot.motors]
     model.armature = armature
-    return model, model.createData(), tool, place
+    return model, model.createData(), tool, indices
 
 
 @pytest.mark.parametrize("robot", LAW_ROBOTS.values(), ids=LAW_ROBOTS.keys())
 def test_agrees_with_pinocchio(robot: Robot):
-    model, data, tool, place = pinocchio_model(robot)
+    model, data, tool, indices = pinocchio_model(robot)
     smooth = robot.nofriction()
 
     def close(actual: np.ndarray, expected: np.ndarray, tolerance: float = 1e-12) -> None:
@@ -61,14 +61,14 @@ def test_agrees_with_pinocchio(robot: Robot):
     for q, qd, qdd in random_states(robot):
         state = [np.empty(robot.n) for _ in range(3)]
         for ours, theirs in zip((q, qd, qdd), state):
-            theirs[place] = ours
-        close(evaluate(smooth, "rne", q, qd, qdd), pin.rnea(model, data, *state)[place])
+            theirs[indices] = ours
+        close(evaluate(smooth, "rne", q, qd, qdd), pin.rnea(model, data, *state)[indices])
         M = np.array(pin.crba(model, data, state[0]))
-        close(evaluate(robot, "inertia", q), M[np.ix_(place, place)])
+        close(evaluate(robot, "inertia", q), M[np.ix_(indices, indices)])
         C = np.array(pin.computeCoriolisMatrix(model, data, state[0], state[1]))
-        close(evaluate(robot, "coriolis", q, qd) @ qd, (C @ state[1])[place])
-        close(evaluate(robot, "gravload", q), pin.computeGeneralizedGravity(model, data, state[0])[place])
-        accelerations = np.array(pin.aba(model, data, *state))[place]
+        close(evaluate(robot, "coriolis", q, qd) @ qd, (C @ state[1])[indices])
+        close(evaluate(robot, "gravload", q), pin.computeGeneralizedGravity(model, data, state[0])[indices])
+        accelerations = np.array(pin.aba(model, data, *state))[indices]
         condition = np.linalg.cond(M)
         tolerance = max(1e-12, 10 * condition * np.finfo(float).eps)
         close(evaluate(smooth, "accel", q, qd, qdd), accelerations, tolerance)
@@ -77,8 +77,8 @@ def test_agrees_with_pinocchio(robot: Robot):
         close(evaluate(robot, "fkine", q), data.oMf[tool].homogeneous)
         J0 = pin.getFrameJacobian(model, data, tool, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
         Je = pin.getFrameJacobian(model, data, tool, pin.ReferenceFrame.LOCAL)
-        close(evaluate(robot, "jacob0", q), np.array(J0)[:, place])
-        close(evaluate(robot, "jacobe", q), np.array(Je)[:, place])
+        close(evaluate(robot, "jacob0", q), np.array(J0)[:, indices])
+        close(evaluate(robot, "jacobe", q), np.array(Je)[:, indices])
 
 
 def test_centre_of_mass_and_energies_agree_for_a_robot_without_fixed_base_links(puma560: Robot):

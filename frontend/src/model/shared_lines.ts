@@ -6,8 +6,8 @@ const DASH_PX = 7
 const SAME_LINE = 1 / 2000
 
 /**
- * The dashes of traces that lie on each other: they take turns along the line, so that each is visible.
- * `null` for a trace that lies on no other. `range`: of the vertical axis, in the unit of the values.
+ * The dashes of traces that coincide: the traces alternate along the line, so that each is visible.
+ * `null` for a trace that coincides with no other. `range`: of the vertical axis, in the unit of the values.
  */
 export function sharedDashes([, ...columns]: PlotColumns, range: number): (number[] | null)[] {
   const groups: number[][] = []
@@ -25,7 +25,7 @@ export function sharedDashes([, ...columns]: PlotColumns, range: number): (numbe
   return dashes
 }
 
-/** The dash pattern of one of several lines that take turns. */
+/** The dash pattern of one of several lines that alternate. */
 function dashOf(order: number, count: number): number[] {
   return order === 0
     ? [DASH_PX, (count - 1) * DASH_PX]

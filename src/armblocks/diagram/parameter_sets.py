@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from armblocks.diagram.diagram import Diagram
-from armblocks.diagram.mask_tuning import followers
+from armblocks.diagram.mask_tuning import dependent_parameters
 from armblocks.diagram.names import MAX_NAME_LENGTH, check_printable, folded
 from armblocks.diagram.parameter import Parameter, ParameterKind, Value
 from armblocks.diagram.variation import check_settable, found_block, with_parameters
@@ -74,7 +74,7 @@ def is_tunable(diagram: Diagram, path: str) -> bool:
         if any(rule.name == parameter for rule in block.parameters()):
             return any(rule.name == parameter and rule.tunable for rule in block.inputs_of_the_run())
     try:
-        return not followers(diagram, path).structural
+        return not dependent_parameters(diagram, path).structural
     except UnknownNameError:  # in a commented subsystem
         return False
 

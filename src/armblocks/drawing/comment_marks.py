@@ -18,7 +18,8 @@ _BACKGROUNDS = (Tone.SURFACE, Tone.PAGE, Tone.SUNKEN)
 def commented_marks(marks: Sequence[Mark], box: Box, comment: str) -> list[Mark]:
     """The drawing of a commented block.
 
-    A block that is commented out has a percent sign, one that is commented through the wires that replace it.
+    A percent sign marks a block that is commented out. A block that is commented through shows the wires that
+    replace it.
     """
     grey = [_greyed(mark) for mark in marks]
     if comment == "out":

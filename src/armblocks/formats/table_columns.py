@@ -200,7 +200,7 @@ def table_of(
         raise FormatError(
             "the file has no columns of numbers",
             where=source,
-            fix="one column of times, one or more of values",
+            fix="give the file one column of times and one or more of values",
         )
     times = seconds_of(file.column(key, source), source)
     if columns:
@@ -215,7 +215,7 @@ def table_of(
         raise InputError(
             f"the file has only the times '{key}': no other column has {len(times)} numbers",
             where=source,
-            allowed="one column of times, one or more of values of the same length",
+            allowed="one column of times, and one or more columns of values of the same length",
             fix="choose columns of numbers, with as many rows as the times",
         )
     for column in chosen:
@@ -239,7 +239,9 @@ def seconds_of(column: Column, source: str) -> NDArray[np.float64]:
     times = np.asarray(values * factor / divisor)
     _check_gaps(column, source)
     steps = np.diff(times)
-    third = np.append(False, (steps[1:] == 0.0) & (steps[:-1] == 0.0))  # a time for the third time
+    third = np.append(
+        False, (steps[1:] == 0.0) & (steps[:-1] == 0.0)
+    )  # a time that occurs for the third time
     invalid = np.flatnonzero((steps < 0.0) | third)
     if invalid.size:
         row = int(invalid[0]) + 1

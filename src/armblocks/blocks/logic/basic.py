@@ -279,7 +279,7 @@ class CombinatorialLogic(Block):
     """A truth table: the conditions are the binary digits of a row number, and y is that row.
 
     For conditions (u1, …, um) the row is 1 + u1 2^(m-1) + … + um, of 2^m rows. A table of one column gives
-    a scalar. The default is AND of two.
+    a scalar. The default is the AND of two conditions.
     """
 
     title: ClassVar[str] = "Combinatorial Logic"

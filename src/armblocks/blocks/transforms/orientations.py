@@ -150,7 +150,7 @@ class T2eul(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Quaternion2T(Block):
-    """The rotation by a quaternion (s, x, y, z) of any length: T = T(u / |u|)."""
+    """The pose with the rotation of a quaternion (s, x, y, z), which need not be normalised."""
 
     title: ClassVar[str] = "Quaternion to Pose"
     sign: ClassVar[FaceSign] = Words("q→T")
