@@ -150,6 +150,7 @@ const COMMANDS: Command[] = [
   { title: 'Take the tour', run: openTour },
   { title: 'All commands by name', keys: 'Ctrl+K', run: () => showDialog('commands') },
   { title: 'All keys', keys: '?', run: () => showDialog('keys') },
+  { title: 'Print the list of keys', run: () => showDialog('keys', 'print') },
 ]
 
 /** The command for the pressed keys, among the commands of the sheet or among all others. */

@@ -1,42 +1,65 @@
-import { Kbd, Modal, Table } from '@mantine/core'
-import { Fragment } from 'react'
+import './shortcuts.css'
+import { Button, Kbd, Modal } from '@mantine/core'
+import { IconPrinter } from '@tabler/icons-react'
+import { useEffect } from 'react'
 import { commands } from './commands'
 import { showDialog, useDialogs } from './dialogs'
 import { KEYS } from './key_list'
+import { keyGroups } from './model/key_groups'
 
-/** The list of all keys, by the place where they are handled. */
+/** `showDialog('keys', PRINT)` opens the key map and prints it. */
+const PRINT = 'print'
+const OPENING_MS = 400
+
+/** The key map: all keys by the place where they are handled, in two columns; it can be printed. */
 export function Shortcuts() {
   const opened = useDialogs((s) => s.open === 'keys')
-  const commandKeys = commands().flatMap(({ keys, title }): [string, string][] =>
-    keys ? [[keys, title]] : [],
-  )
+  const toPrint = useDialogs((s) => s.typed === PRINT)
+  useEffect(() => {
+    if (!opened || !toPrint) return
+    const timer = setTimeout(() => print(), OPENING_MS)
+    return () => clearTimeout(timer)
+  }, [opened, toPrint])
   return (
-    <Modal opened={opened} onClose={() => showDialog(null)} title={<b>Keys</b>} size="lg">
-      <Table className="keys" aria-label="Keys">
-        {[{ title: 'Commands', keys: commandKeys }, ...KEYS].map(({ title, keys }) => (
-          <Fragment key={title}>
-            <Table.Thead>
-              <Table.Tr>
-                <Table.Th colSpan={2} scope="rowgroup">
-                  {title}
-                </Table.Th>
-              </Table.Tr>
-            </Table.Thead>
-            <Table.Tbody>
+    <Modal
+      opened={opened}
+      onClose={() => showDialog(null)}
+      title={
+        <span className="key-map-title">
+          <b>Keys</b>
+          <Button
+            size="compact-sm"
+            variant="default"
+            leftSection={<IconPrinter size={14} />}
+            onClick={() => print()}
+          >
+            Print
+          </Button>
+        </span>
+      }
+      size={940}
+      yOffset="6vh"
+      classNames={{ root: 'key-map-dialog' }}
+    >
+      <div className="key-map" role="group" aria-label="Keys">
+        {keyGroups(commands(), KEYS).map(({ title, keys }) => (
+          <section key={title}>
+            <h3>{title}</h3>
+            <dl>
               {keys.map(([combinations, effect]) => (
-                <Table.Tr key={combinations}>
-                  <Table.Td className="ways">
+                <div key={combinations}>
+                  <dt>
                     {combinations.split(', ').map((combination) => (
                       <Kbd key={combination}>{combination}</Kbd>
                     ))}
-                  </Table.Td>
-                  <Table.Td>{effect}</Table.Td>
-                </Table.Tr>
+                  </dt>
+                  <dd>{effect}</dd>
+                </div>
               ))}
-            </Table.Tbody>
-          </Fragment>
+            </dl>
+          </section>
         ))}
-      </Table>
+      </div>
     </Modal>
   )
 }

@@ -211,3 +211,18 @@ def test_axe_finds_no_violations_in_light_and_dark_themes(page: Page) -> None:
             page.keyboard.press("Escape")
             expect(dialog).to_be_hidden()
             expect(block(page, "PID")).to_be_focused()  # the focus returns to the block
+
+
+def test_the_list_of_keys_is_printed_black_on_white_without_the_page(page: Page) -> None:
+    page.keyboard.press("Escape")
+    page.keyboard.press("?")
+    keys = page.get_by_role("group", name="Keys")
+    expect(keys.get_by_role("heading", name="Commands of the sheet")).to_be_visible()
+    page.emulate_media(media="print", color_scheme="dark")
+    expect(page.locator(".top-bar")).to_be_hidden()
+    expect(page.get_by_role("button", name="Print")).to_be_hidden()
+    expect(keys.get_by_text("Run or continue")).to_have_css("color", "rgb(0, 0, 0)")
+    expect(keys).to_have_css("column-count", "2")
+    page.emulate_media(media="screen", color_scheme="light")
+    page.keyboard.press("Escape")
+    expect(keys).to_be_hidden()
