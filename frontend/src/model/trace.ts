@@ -5,6 +5,9 @@ import type { RunSamples } from './run_samples'
 export interface Trace {
   /** Identifies the line, independently of the other displayed lines. */
   key: string
+  /** The recorded signal and the index of its element. */
+  channel: string
+  element: number
   label: string
   /** The signal and the entry in the label: a number, or a name such as that of a joint. */
   stem: string
@@ -40,6 +43,8 @@ export function tracesOf(samples: RunSamples, paths: { path: string; label: stri
         const entry = single ? '' : (recorded.channel.entries[element] ?? String(element + 1))
         return {
           key: `${path} ${element}`,
+          channel: recorded.channel.name,
+          element,
           label: single ? name : `${name} ${entry}`,
           stem: name,
           entry,
@@ -55,6 +60,16 @@ export function tracesOf(samples: RunSamples, paths: { path: string; label: stri
       })
     })
     .slice(0, MAX_TRACES)
+}
+
+/** The traces of two charts; those of the second have the colours and dashes that they have in the first. */
+export function sameTones(first: Trace[], second: Trace[]): [Trace[], Trace[]] {
+  const known = new Map(first.map((trace) => [trace.key, trace]))
+  const tones = (trace: Trace): Trace => {
+    const { tone, dash } = known.get(trace.key) ?? trace
+    return { ...trace, tone, dash }
+  }
+  return [first, second.map(tones)]
 }
 
 /** The columns of a plot: common times, and the values of each trace. */

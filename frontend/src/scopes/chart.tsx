@@ -17,6 +17,26 @@ import { XyPlot } from './xy_plot'
 /** Number of letters of a name that the legend always shows. */
 const SHORT_NAME = 8
 
+/** Hidden traces and the visible range of values, which two charts may share. */
+export interface ChartState {
+  hidden: ReadonlySet<string>
+  toggle: (key: string) => void
+  values: Values | null
+  setValues: (values: Values | null) => void
+}
+
+export function useChartState(): ChartState {
+  const [hidden, setHidden] = useState<ReadonlySet<string>>(new Set())
+  const [values, setValues] = useState<Values | null>(null)
+  const toggle = (key: string) =>
+    setHidden((previous) => {
+      const next = new Set(previous)
+      if (!next.delete(key)) next.add(key)
+      return next
+    })
+  return { hidden, toggle, values, setValues }
+}
+
 /** A plot with its title, legend (a click hides a trace), export menu and table of measures. */
 export function Chart({
   title,
@@ -24,6 +44,8 @@ export function Chart({
   isXy = false,
   view,
   band,
+  shared,
+  companions,
 }: {
   title: string
   traces: Trace[]
@@ -31,18 +53,15 @@ export function Chart({
   /** The block whose signals are shown. */
   view?: string
   band?: number
+  /** The state of this chart and of another one with equal axes, and the traces of that chart. */
+  shared?: ChartState
+  companions?: Trace[]
 }) {
-  const [hidden, setHidden] = useState<ReadonlySet<string>>(new Set())
-  const [values, setValues] = useState<Values | null>(null)
+  const own = useChartState()
+  const { hidden, toggle, values, setValues } = shared ?? own
   const hasMeasures = useWindow((s) => s.measuring || s.cursors !== null) && !isXy
   const handle = useRef<PlotHandle>(null)
   const { stem, names } = shortened(traces)
-  const toggle = (key: string) =>
-    setHidden((previous) => {
-      const next = new Set(previous)
-      if (!next.delete(key)) next.add(key)
-      return next
-    })
   const menus = useMenuHandlers((at) =>
     openMenu(title, at, [
       { title: 'Show all values', enabled: values !== null, run: () => setValues(null) },
@@ -84,6 +103,7 @@ export function Chart({
             values={values}
             onValues={setValues}
             {...(band === undefined ? {} : { band })}
+            {...(companions ? { companions } : {})}
           />
         )}
         {hasMeasures && <MeasureTable traces={traces.filter(({ key }) => !hidden.has(key))} />}

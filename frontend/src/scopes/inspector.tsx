@@ -1,23 +1,32 @@
 import '../mantine_later.css'
-import { ActionIcon, Checkbox, NativeSelect, Switch, TextInput, Tooltip } from '@mantine/core'
+import { ActionIcon, Checkbox, NativeSelect, TextInput, Tooltip } from '@mantine/core'
 import { IconSearch, IconTrash } from '@tabler/icons-react'
 import { useEffect, useMemo, useState } from 'react'
 import { create } from 'zustand'
 import { valueText } from '../inspector/value_text'
 import { useRuns, type StoredRun } from '../run/runs'
 import { useStudio } from '../store'
-import { Chart } from './chart'
+import { Chart, useChartState } from './chart'
 import { difference, largestDifference } from '../model/difference'
 import { withUnit } from './quantity'
-import { PlotTools } from './scopes'
-import { DASHES, MAX_TRACES, tracesOf, type Trace } from '../model/trace'
+import { Grid, PlotTools } from './scopes'
+import { DASHES, MAX_TRACES, sameTones, tracesOf, type Trace } from '../model/trace'
+
+/** Runs in one plot, the difference of two of them, or two plots with equal axes. */
+type View = 'overlay' | 'difference' | 'side by side'
+
+const VIEWS = [
+  { value: 'overlay', label: 'Overlay' },
+  { value: 'difference', label: 'Difference' },
+  { value: 'side by side', label: 'Side by side' },
+]
 
 interface InspectorState {
   signals: ReadonlySet<string>
   /** Hidden runs; new runs are visible. */
   hidden: ReadonlySet<string>
   search: string
-  comparing: boolean
+  view: View
   baseline: string
   compared: string
   tolerance: number
@@ -27,7 +36,7 @@ export const useInspectorState = create<InspectorState>(() => ({
   signals: new Set(),
   hidden: new Set(),
   search: '',
-  comparing: false,
+  view: 'overlay',
   baseline: '',
   compared: '',
   tolerance: 1e-6,
@@ -74,7 +83,7 @@ function changesOf({ trialValues, tunings }: StoredRun): string[] {
 
 function RunList({ runs }: { runs: StoredRun[] }) {
   const hidden = useInspectorState((s) => s.hidden)
-  const comparing = useInspectorState((s) => s.comparing)
+  const view = useInspectorState((s) => s.view)
   const displayedRun = useStudio((s) => s.run?.run)
   const { rename, remove } = useRuns.getState()
   return (
@@ -82,15 +91,17 @@ function RunList({ runs }: { runs: StoredRun[] }) {
       <header>
         Runs
         {runs.length > 1 && (
-          <Switch
+          <NativeSelect
             size="xs"
-            label="Difference"
-            checked={comparing}
-            onChange={() => useInspectorState.setState((s) => ({ comparing: !s.comparing }))}
+            w={112}
+            aria-label="View"
+            data={VIEWS}
+            value={view}
+            onChange={(event) => useInspectorState.setState({ view: event.currentTarget.value as View })}
           />
         )}
       </header>
-      {comparing && runs.length > 1 && <Comparison runs={runs} />}
+      {view !== 'overlay' && runs.length > 1 && <Comparison runs={runs} />}
       {[...runs].reverse().map((run) => (
         <div key={run.key} className="kept-run">
           <Checkbox
@@ -151,7 +162,7 @@ function comparedRuns(runs: StoredRun[], baseline: string, compared: string): [S
 }
 
 function Comparison({ runs }: { runs: StoredRun[] }) {
-  const { baseline, compared, tolerance } = useInspectorState()
+  const { baseline, compared, tolerance, view } = useInspectorState()
   const [a, b] = comparedRuns(runs, baseline, compared)
   const [typed, setTyped] = useState(String(tolerance))
   const data = runs.map(({ key, name }) => ({ value: key, label: name }))
@@ -172,24 +183,27 @@ function Comparison({ runs }: { runs: StoredRun[] }) {
         value={b.key}
         onChange={(event) => useInspectorState.setState({ compared: event.currentTarget.value })}
       />
-      <TextInput
-        size="xs"
-        label="Tolerance"
-        classNames={{ input: 'typed' }}
-        value={typed}
-        error={invalid && 'a number, 0 or more'}
-        onChange={(event) => {
-          const text = event.currentTarget.value
-          setTyped(text)
-          if (text.trim() && Number(text) >= 0) useInspectorState.setState({ tolerance: Number(text) })
-        }}
-      />
+      {view === 'difference' && (
+        <TextInput
+          size="xs"
+          label="Tolerance"
+          classNames={{ input: 'typed' }}
+          value={typed}
+          error={invalid && 'a number, 0 or more'}
+          onChange={(event) => {
+            const text = event.currentTarget.value
+            setTyped(text)
+            if (text.trim() && Number(text) >= 0) useInspectorState.setState({ tolerance: Number(text) })
+          }}
+        />
+      )}
     </div>
   )
 }
 
 function SignalList({ runs }: { runs: StoredRun[] }) {
-  const { signals, search, comparing, baseline, compared, tolerance } = useInspectorState()
+  const { signals, search, view, baseline, compared, tolerance } = useInspectorState()
+  const comparing = view === 'difference'
   const names = useMemo(() => [...new Set(runs.flatMap(({ samples }) => samples.names))].sort(), [runs])
   const matches = names.filter((name) => name.toLowerCase().includes(search.toLowerCase()))
   const [a, b] = comparing && runs.length > 1 ? comparedRuns(runs, baseline, compared) : []
@@ -220,7 +234,7 @@ function SignalList({ runs }: { runs: StoredRun[] }) {
                 checked={signals.has(name)}
                 onChange={() => useInspectorState.setState((s) => ({ signals: toggled(s.signals, name) }))}
               />
-              <span className="signal-name">{runs.at(-1)!.samples.title(name)}</span>
+              <span className="listed-signal">{runs.at(-1)!.samples.title(name)}</span>
               {difference && (
                 <span className={difference.largest <= tolerance ? 'apart numbers' : 'apart beyond numbers'}>
                   {difference.largest <= tolerance ? '✓' : '✗'} {withUnit(difference.largest, unit, 3)}
@@ -238,7 +252,8 @@ function SignalList({ runs }: { runs: StoredRun[] }) {
 }
 
 function InspectorPlot({ runs }: { runs: StoredRun[] }) {
-  const { signals, hidden, comparing, baseline, compared, tolerance } = useInspectorState()
+  const { signals, hidden, view, baseline, compared, tolerance } = useInspectorState()
+  const comparing = view === 'difference' && runs.length > 1
   const paths = useMemo(() => [...signals].map((path) => ({ path, label: '' })), [signals])
   // Initially the inspector shows the first signal.
   useEffect(() => {
@@ -248,7 +263,7 @@ function InspectorPlot({ runs }: { runs: StoredRun[] }) {
       useInspectorState.setState({ signals: new Set([path]) })
   }, [runs])
   const traces = useMemo((): Trace[] => {
-    if (comparing && runs.length > 1) {
+    if (comparing) {
       const [a, b] = comparedRuns(runs, baseline, compared)
       return tracesOf(a.samples, paths).map((trace) => {
         const separator = trace.key.lastIndexOf(' ')
@@ -256,6 +271,7 @@ function InspectorPlot({ runs }: { runs: StoredRun[] }) {
         return {
           ...trace,
           key: `${a.key} ${b.key} ${trace.key}`,
+          channel: '', // a difference has no trigger level
           label: `Δ ${trace.label}`,
           read: () => difference(a.samples, b.samples, path, element),
         }
@@ -280,13 +296,56 @@ function InspectorPlot({ runs }: { runs: StoredRun[] }) {
       .slice(0, MAX_TRACES)
   }, [runs, hidden, paths, comparing, baseline, compared])
   if (!signals.size) return <p className="empty">Tick the signals to be shown.</p>
+  if (view === 'side by side' && runs.length > 1)
+    return <SideBySide runs={comparedRuns(runs, baseline, compared)} paths={paths} />
   return (
-    <div className="scopes">
+    <Grid count={1}>
       <Chart
         title={comparing ? 'Difference' : 'Signals'}
         traces={traces}
         {...(comparing ? { band: tolerance } : {})}
       />
-    </div>
+    </Grid>
+  )
+}
+
+/** Smallest width of one of two charts with measures beside each other, px. */
+const MIN_MEASURED = 280
+
+/** Two runs in two charts with the same axes, hidden traces, cursors and colours. */
+function SideBySide({
+  runs: [a, b],
+  paths,
+}: {
+  runs: [StoredRun, StoredRun]
+  paths: { path: string; label: string }[]
+}) {
+  const shared = useChartState()
+  const [left, right] = useMemo(
+    () => sameTones(tracesOf(a.samples, paths), tracesOf(b.samples, paths)),
+    [a.samples, b.samples, paths],
+  )
+  const chart = (run: StoredRun, traces: Trace[], companions: Trace[]) =>
+    traces.length ? (
+      <Chart
+        key={`${a.key} ${b.key} ${run.key}`}
+        title={run.name}
+        traces={traces}
+        shared={shared}
+        companions={companions}
+      />
+    ) : (
+      <figure className="chart">
+        <figcaption>
+          <b>{run.name}</b>
+        </figcaption>
+        <p className="empty">This run has none of these signals.</p>
+      </figure>
+    )
+  return (
+    <Grid count={2} measuredWidth={MIN_MEASURED}>
+      {chart(a, left, right)}
+      {chart(b, right, left)}
+    </Grid>
   )
 }

@@ -20,6 +20,7 @@ import { listenOnPlot, listenOnValueAxis, type Values } from './plot_gestures'
 import { colour } from './plot_marks'
 import { MIN_PX, plotOptions } from './plot_options'
 import { displayUnit, useUnits, type DisplayUnit } from './quantity'
+import { useTrigger } from './trigger'
 import { visibleTimes, useWindow } from './window'
 
 /** Number of samples per pixel above which only minimum and maximum are drawn. */
@@ -59,9 +60,17 @@ export class LivePlot {
     private readonly traces: Trace[],
     band: number | undefined,
     private readonly valueRange: { readonly current: ValueRange },
+    /** Traces of another plot whose value axis is to be the same. */
+    private readonly companions: Trace[] = [],
   ) {
     this.plot = new uPlot(
-      plotOptions(element, traces, () => this.unit, band),
+      plotOptions(
+        element,
+        traces,
+        () => this.unit,
+        () => this.unitFactor,
+        band,
+      ),
       [[], ...traces.map(() => [])] as uPlot.AlignedData,
       element,
     )
@@ -131,7 +140,9 @@ export class LivePlot {
       useUnits.getState().radians,
       String(this.valueRange.current.values),
     ].join(' ')
+    const { on, at: triggerTime, level } = useTrigger.getState()
     const lineKey = [
+      on && `${triggerTime} ${level}`,
       useCursor.getState().time,
       String(useWindow.getState().cursors),
       useRuns.getState().runs.at(-1)?.tunings.length,
@@ -166,11 +177,18 @@ export class LivePlot {
     [from, to]: [number, number],
   ): boolean {
     const { plot, traces, columns, range } = this
-    const axisUnit = axisDisplayUnit(traces, columns)
+    const width = Math.max(Math.floor(plot.bbox.width / devicePixelRatio), 10)
+    const others = this.companions.length
+      ? plotData(this.companions, from, to, width, undefined).columns
+      : null
+    const axisUnit = axisDisplayUnit(
+      [...traces, ...this.companions],
+      [columns[0], ...columns.slice(1), ...(others?.slice(1) ?? [])],
+    )
     const requestedRange = this.valueRange.current.values
     const requiredRange: [number, number] = requestedRange
       ? [requestedRange[0] * axisUnit.factor, requestedRange[1] * axisUnit.factor]
-      : rangeOf(columns, axisUnit.factor, from, to)
+      : rangeOf(others ? [columns, others] : [columns], axisUnit.factor, from, to)
     const sameFactor = axisUnit.factor === this.unitFactor
     const fitsRange = appendsOnly && requiredRange[0] >= range[0] && requiredRange[1] <= range[1]
     if (
@@ -272,21 +290,17 @@ function scaled(data: PlotColumns, unitFactor: number): PlotColumns {
 }
 
 /** Minimum and maximum of the visible values, with a margin. */
-function rangeOf(
-  [time, ...columns]: PlotColumns,
-  unitFactor: number,
-  from: number,
-  to: number,
-): [number, number] {
+function rangeOf(plots: PlotColumns[], unitFactor: number, from: number, to: number): [number, number] {
   let low = Infinity
   let high = -Infinity
-  for (const column of columns)
-    for (let k = 0; k < time.length; k++) {
-      const value = column[k]
-      if (typeof value !== 'number' || !(time[k]! >= from && time[k]! <= to)) continue
-      if (value < low) low = value
-      if (value > high) high = value
-    }
+  for (const [time, ...columns] of plots)
+    for (const column of columns)
+      for (let k = 0; k < time.length; k++) {
+        const value = column[k]
+        if (typeof value !== 'number' || !(time[k]! >= from && time[k]! <= to)) continue
+        if (value < low) low = value
+        if (value > high) high = value
+      }
   return withMargin(low * unitFactor, high * unitFactor)
 }
 

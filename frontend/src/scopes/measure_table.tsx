@@ -55,7 +55,7 @@ export function MeasureTable({ traces }: { traces: Trace[] }) {
           )}
         </p>
       )}
-      <table className="numbers">
+      <table className={measuring ? 'numbers all-measures' : 'numbers'}>
         <thead>
           <tr>
             <th scope="col">signal</th>
@@ -117,15 +117,22 @@ function Row({
   const { factor, unit } = displayUnit(trace.unit, largest)
   return (
     <tr>
-      <th scope="row">
+      <th scope="row" title={trace.label}>
         <i style={{ background: `var(--${trace.tone})` }} />
         {trace.label}
         {unit && <span className="unit"> {unit}</span>}
       </th>
       {(cursors ? [a, b, b - a] : [a]).map((value, k) => (
-        <td key={k}>{formatNumber(value * factor)}</td>
+        <td key={k} data-label={cursors ? 'ABΔ'[k] : ''}>
+          {formatNumber(value * factor)}
+        </td>
       ))}
-      {measured && ROWS.map(([name]) => <td key={name}>{measureText(measured, name, factor)}</td>)}
+      {measured &&
+        ROWS.map(([name, head]) => (
+          <td key={name} data-label={head}>
+            {measureText(measured, name, factor)}
+          </td>
+        ))}
     </tr>
   )
 }

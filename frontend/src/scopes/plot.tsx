@@ -18,24 +18,28 @@ interface Props extends ValueRange {
   handle?: React.RefObject<PlotHandle | null>
   /** A band about zero: the tolerance of a difference. */
   band?: number
+  /** Traces of another plot whose value axis is to be the same. */
+  companions?: Trace[]
 }
 
 /** Traces over time. All time plots share zoom, measuring cursors and the displayed time. */
-export function Plot({ traces, hidden, title, handle, band, values, onValues }: Props) {
+export function Plot({ traces, hidden, title, handle, band, companions, values, onValues }: Props) {
   const container = useRef<HTMLDivElement>(null)
   const valueRange = useRef({ values, onValues })
   valueRange.current = { values, onValues }
   const scheme = useComputedColorScheme('light')
   const visibleTraces = traces.filter(({ key }) => !hidden.has(key))
   const tracesKey = visibleTraces.map(({ key, tone, dash }) => `${key} ${tone} ${dash.join()}`).join('\n')
+  const visibleCompanions = companions?.filter(({ key }) => !hidden.has(key))
+  const companionsKey = visibleCompanions?.map(({ key }) => key).join('\n')
   useEffect(() => {
     const element = container.current
     if (!element) return
-    const plot = new LivePlot(element, visibleTraces, band, valueRange)
+    const plot = new LivePlot(element, visibleTraces, band, valueRange, visibleCompanions)
     if (handle) handle.current = { figure: () => plot.figure(title) }
     return () => plot.destroy()
     // eslint-disable-next-line react-hooks/exhaustive-deps
-  }, [tracesKey, scheme, title, band])
+  }, [tracesKey, companionsKey, scheme, title, band])
   useEffect(scheduleFrame, [values])
   return (
     <div

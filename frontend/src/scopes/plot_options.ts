@@ -10,12 +10,14 @@ const FONT = '11px "Inter Variable", system-ui, sans-serif'
 export const MIN_PX = 60
 
 /**
- * The uPlot options of the traces; `unit` is the label of the vertical axis, `band` a band about zero.
+ * The uPlot options of the traces; `unit` and `unitFactor` are those of the vertical axis, `band` a band
+ * about zero.
  */
 export function plotOptions(
   element: HTMLElement,
   traces: Trace[],
   unit: () => string,
+  unitFactor: () => number,
   band: number | undefined,
 ): uPlot.Options {
   const axis = {
@@ -70,7 +72,7 @@ export function plotOptions(
     ],
     hooks: {
       drawClear: [(u) => band !== undefined && drawBand(u, band)],
-      draw: [(u) => drawLines(u)],
+      draw: [(u) => drawLines(u, traces, unitFactor())],
       setSelect: [
         (u) => {
           if (u.select.width < CLICK_PX) return

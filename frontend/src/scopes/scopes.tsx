@@ -2,6 +2,7 @@ import { ActionIcon, Tooltip } from '@mantine/core'
 import {
   IconAngle,
   IconArrowsHorizontal,
+  IconBolt,
   IconRulerMeasure,
   IconTableOptions,
   IconZoomIn,
@@ -18,6 +19,8 @@ import { useStudio } from '../store'
 import { Chart } from './chart'
 import { useUnits } from './quantity'
 import { tracesOf } from '../model/trace'
+import { toggleTrigger, useTrigger } from './trigger'
+import { TriggerBar } from './trigger_bar'
 import { toggleCursors, useWindow, zoomBy } from './window'
 
 /** All Scopes, XY Graphs and logged signals of the run, side by side. */
@@ -39,12 +42,15 @@ export function Scopes() {
     )
   return (
     <div className="scopes-panel">
-      <PlotTools />
-      <Grid count={views.length}>
-        {views.map((view) => (
-          <ScopeChart key={`${run}${view.block}${view.signals.join()}`} run={run} view={view} />
-        ))}
-      </Grid>
+      <PlotTools hasTrigger />
+      <div className="scopes-beside-tools">
+        <TriggerBar />
+        <Grid count={views.length}>
+          {views.map((view) => (
+            <ScopeChart key={`${run}${view.block}${view.signals.join()}`} run={run} view={view} />
+          ))}
+        </Grid>
+      </div>
     </div>
   )
 }
@@ -53,10 +59,18 @@ export function Scopes() {
 const MEASURED = 560
 
 /** The charts in rows that fill the panel; the charts of an incomplete last row are wider. */
-function Grid({ count, children }: { count: number; children: React.ReactNode }) {
+export function Grid({
+  count,
+  measuredWidth = MEASURED,
+  children,
+}: {
+  count: number
+  measuredWidth?: number
+  children: React.ReactNode
+}) {
   const { ref, width, height } = useElementSize()
   const measured = useWindow((s) => s.measuring || s.cursors !== null)
-  const { columns, rowHeight } = scopeGrid(count, width, height, measured ? MEASURED : undefined)
+  const { columns, rowHeight } = scopeGrid(count, width, height, measured ? measuredWidth : undefined)
   const style = { '--columns': columns, '--row': `${Math.floor(rowHeight)}px` } as React.CSSProperties
   return (
     <div className="scopes" ref={ref} style={style}>
@@ -82,7 +96,8 @@ function ScopeChart({ run, view }: { run: string; view: SinkView }) {
 }
 
 /** The tools for all time plots. */
-export function PlotTools() {
+export function PlotTools({ hasTrigger = false }: { hasTrigger?: boolean }) {
+  const triggered = useTrigger((s) => s.on)
   const zoomed = useWindow((s) => s.range !== null)
   const cursors = useWindow((s) => s.cursors !== null)
   const measuring = useWindow((s) => s.measuring)
@@ -109,6 +124,9 @@ export function PlotTools() {
         pressed={measuring}
         onClick={() => useWindow.setState({ measuring: !measuring })}
       />
+      {!!hasTrigger && (
+        <PlotTool label="Trigger" icon={IconBolt} pressed={triggered} onClick={toggleTrigger} />
+      )}
       <PlotTool
         label={radians ? 'Angles in degrees' : 'Angles in radians'}
         icon={IconAngle}

@@ -63,7 +63,7 @@ class DeadTime:
 
     @property
     def count(self) -> int:
-        """Number of delayed scalars."""
+        """Of delayed scalars."""
         return self.indices.size
 
     @cached_property

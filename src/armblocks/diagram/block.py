@@ -222,11 +222,11 @@ class Block(ABC):
     # --------------------------------------------------------------------------------------------
 
     def input_ports(self) -> tuple[Port, ...]:
-        """The input ports, in order."""
+        """Inputs, in order."""
         return ()
 
     def output_ports(self) -> tuple[Port, ...]:
-        """The output ports, in order."""
+        """Outputs, in order."""
         return ()
 
     def bus_inputs(self) -> tuple[str, ...]:

@@ -129,7 +129,13 @@ def test_two_runs_are_compared(opened: Opened) -> None:
     expect(page.locator(".kept-run")).to_have_count(2)
     expect(page.locator(".kept-run").first).to_contain_text("lag.time_constant = 0.5")
     expect(page.locator(".kept-run").last).not_to_contain_text("time_constant")
-    page.get_by_role("switch", name="Difference").check(force=True)
+    page.get_by_role("combobox", name="View").select_option("Side by side")
+    charts = page.locator(".signal-inspector .chart")
+    expect(charts).to_have_count(2)
+    expect(charts.locator("figcaption b")).to_have_text([re.compile("Run"), re.compile("Run")])
+    one, other = (saved_picture(page, chart) for chart in charts.all())
+    assert one == other, "both charts have the same axes"
+    page.get_by_role("combobox", name="View").select_option("Difference")
     model = lag_model("compared")
     one, other = ab.simulate(model), ab.simulate(model, parameters={"lag.time_constant": 0.5})
     apart = np.abs(other["lag/y"] - one["lag/y"])
@@ -207,6 +213,15 @@ def test_parameter_sets_are_saved_applied_and_compared(opened: Opened, studio: S
     assert kept.blocks["lag"].parameter_value("time_constant") == 0.1
 
 
+def saved_picture(page: Page, chart: Locator) -> list[str]:
+    """The labels of the axes of a chart."""
+    with page.expect_download() as downloading:
+        chart.get_by_role("button", name=re.compile("^Export")).click()
+        page.get_by_role("menuitem", name="Picture as SVG").click()
+    svg = ElementTree.fromstring(Path(downloading.value.path()).read_bytes())
+    return [text for text in svg.itertext() if re.fullmatch(r"[−\d.]+", text)]
+
+
 def saved(page: Page, scope: str, entry: str) -> bytes:
     """The exported file of a scope."""
     page.get_by_role("button", name=f"Export {scope}", exact=True).click()
@@ -246,6 +261,36 @@ def test_scope_measurements_equal_the_closed_form(opened: Opened) -> None:
     np.testing.assert_allclose([at["A"], at["B"], at["Δ"]], [a, b, b - a], rtol=2e-3)
     page.get_by_role("button", name="lag", exact=True).click()
     expect(table.locator("tbody tr")).to_have_count(1)
+
+
+def test_a_triggered_scope_shows_the_window_about_each_crossing(opened: Opened) -> None:
+    builder = ab.DiagramBuilder("triggered", settings=ab.SimulationOptions(stop_time=10.0))
+    pulse = builder.add("pulse", ab.blocks.PulseGenerator(period=4.0, delay=1.003))
+    builder.add("scope", ab.blocks.Scope(), builder.add("lag", ab.blocks.FirstOrderLag(), pulse))
+    page = opened(builder.build())
+    run(page)
+    page.get_by_role("button", name="Trigger", exact=True).click()
+    bar = page.get_by_role("group", name="Trigger")
+    bar.get_by_role("combobox", name="Trigger on").select_option(label="pulse")
+    for field, text in (("Level", "0.5"), ("Window", "0.5"), ("Trigger at", "25")):
+        bar.get_by_role("textbox", name=field).fill(text)
+    # Jumps through the level trigger once, at their exact times.
+    expect(bar.locator(".shown-trigger")).to_contain_text("3 of 3 at 9.00300 s")
+    bar.get_by_role("button", name="Previous trigger").click()
+    expect(bar.locator(".shown-trigger")).to_contain_text("2 of 3 at 5.00300 s")
+    svg = ElementTree.fromstring(saved(page, "scope", "Picture as SVG"))
+    ticks = [number(text) for text in svg.itertext() if re.fullmatch(r"[\d.]+", text) and "." in text]
+    assert min(tick for tick in ticks if tick > 2) >= 4.878
+    assert max(ticks) <= 5.378
+    # The first order lag reaches 0.3 a known time after the step.
+    bar.get_by_role("combobox", name="Trigger on").select_option(label="lag")
+    bar.get_by_role("textbox", name="Level").fill("0.3")
+    bar.get_by_role("combobox", name="Mode").select_option("single")
+    expect(bar.locator(".shown-trigger")).to_contain_text(f"Trigger at {1.003 - math.log(0.7):.4f}"[:-1])
+    bar.get_by_role("textbox", name="Window").fill("0")
+    assert bar.get_by_role("textbox", name="Window").get_attribute("aria-invalid") == "true"
+    page.get_by_role("button", name="Trigger", exact=True).click()
+    expect(bar).to_have_count(0)
 
 
 def test_scope_exports_contain_all_samples_and_jumps(opened: Opened) -> None:

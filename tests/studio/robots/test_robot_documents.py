@@ -67,13 +67,13 @@ class Client:
 
 
 def run_scenario(folder: Path, scenario: Callable[[Client], Awaitable[None]]) -> None:
-    async def main() -> None:
+    async def going() -> None:
         client = Client(folder)
         await client.hub.welcome(client.page)
         await scenario(client)
         client.hub.close()
 
-    asyncio.run(main())
+    asyncio.run(going())
 
 
 def packed(data: bytes) -> str:
