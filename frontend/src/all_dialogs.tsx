@@ -1,6 +1,7 @@
 import './mantine_later.css'
 import { ConnectDialog } from './canvas/connect_dialog'
 import { DroppedTableDialog } from './canvas/dropped_table_dialog'
+import { SubsystemPreview } from './canvas/subsystem_preview'
 import { ContextMenu } from './context_menu'
 import { CommandPalette } from './command_palette'
 import { CloseDialog } from './documents/close_dialog'
@@ -21,6 +22,7 @@ export function AllDialogs() {
   return (
     <>
       <ContextMenu />
+      <SubsystemPreview />
       <BlockDialog />
       <MaskDialog />
       <Configuration />

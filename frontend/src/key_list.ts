@@ -30,7 +30,7 @@ export const KEYS: KeyGroup[] = [
   },
   {
     title: 'With the mouse on the sheet',
-    sources: ['canvas/pointer_drag.ts'],
+    sources: ['canvas/pointer_drag.ts', 'canvas/subsystem_preview.tsx'],
     keys: [
       ['Shift+drag', 'Disconnect a block and connect its neighbours'],
       ['Ctrl+drag, right drag', 'Duplicate blocks at the pointer; from a line: branch'],
@@ -43,7 +43,8 @@ export const KEYS: KeyGroup[] = [
       ['double click on the empty sheet', 'Add a block'],
       ['middle button', 'Move the sheet'],
       ['Ctrl+wheel', 'Zoom'],
-      ['Esc', 'Cancel the copy or the branch'],
+      ['rest on a subsystem', 'Show a picture of the sheet inside; also with the keyboard focus'],
+      ['Esc', 'Cancel the copy or the branch; close the picture'],
     ],
   },
   {

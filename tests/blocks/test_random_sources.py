@@ -54,7 +54,7 @@ def reference(seed: int, element: int, count: int) -> list[float]:
     return numbers
 
 
-def drawn(block: Block, count: int, period: float = 0.001) -> np.ndarray:
+def outputs(block: Block, count: int, period: float = 0.001) -> np.ndarray:
     """Return the outputs at the first ticks, computed by native code."""
     builder = DiagramBuilder("d")
     builder.add("noise", block)
@@ -65,13 +65,13 @@ def drawn(block: Block, count: int, period: float = 0.001) -> np.ndarray:
 def test_the_generator_agrees_with_mrg32k3a_to_the_last_bit() -> None:
     block = UniformRandomNumber(minimum=[0.0, 0.0, 0.0], seed=54321, sample_time=0.001)
     expected = [reference(54321, element, 2000) for element in range(3)]
-    assert drawn(block, 2000).T.tolist() == expected
+    assert outputs(block, 2000).T.tolist() == expected
     # the first numbers of L'Ecuyer's program with its default seed
     assert reference(0, 0, 3) == pytest.approx([0.127011122, 0.318527565, 0.309186015], abs=1e-9)
 
 
 def test_each_matrix_element_has_its_own_stream_row_by_row() -> None:
-    values = drawn(UniformRandomNumber(minimum=np.zeros((2, 2)), seed=7, sample_time=0.001), 5)
+    values = outputs(UniformRandomNumber(minimum=np.zeros((2, 2)), seed=7, sample_time=0.001), 5)
     for element in range(4):
         assert values[:, element // 2, element % 2].tolist() == reference(7, element, 5)
 
@@ -89,7 +89,7 @@ def test_the_normal_quantile_agrees_with_scipy() -> None:
 @pytest.mark.parametrize("seed", [0, 1, 2, 65535])
 def test_normal_numbers_are_normally_distributed_and_uncorrelated(seed: int) -> None:
     count = 20_000
-    values = drawn(RandomNumber(mean=3.0, variance=4.0, seed=seed, sample_time=0.001), count)
+    values = outputs(RandomNumber(mean=3.0, variance=4.0, seed=seed, sample_time=0.001), count)
     normal = (values - 3.0) / 2.0
     assert abs(normal.mean()) < 3.3 / np.sqrt(count)
     assert abs(normal.var() - 1.0) < 3.3 * np.sqrt(2.0 / count)
@@ -102,14 +102,14 @@ def test_normal_numbers_are_normally_distributed_and_uncorrelated(seed: int) -> 
 
 def test_streams_are_independent() -> None:
     count = 20_000
-    one, two = drawn(RandomNumber(mean=[0.0, 0.0], seed=3, sample_time=0.001), count).T
-    other = drawn(RandomNumber(seed=4, sample_time=0.001), count)
+    one, two = outputs(RandomNumber(mean=[0.0, 0.0], seed=3, sample_time=0.001), count).T
+    other = outputs(RandomNumber(seed=4, sample_time=0.001), count)
     for left, right in ((one, two), (one, other), (two, other)):
         assert abs(np.mean(left * right)) < 3.3 / np.sqrt(count)
 
 
 def test_uniform_numbers_are_uniformly_distributed() -> None:
-    values = drawn(UniformRandomNumber(minimum=-2.0, maximum=5.0, seed=9, sample_time=0.001), 20_000)
+    values = outputs(UniformRandomNumber(minimum=-2.0, maximum=5.0, seed=9, sample_time=0.001), 20_000)
     assert -2.0 < values.min() < -1.99 < 4.99 < values.max() < 5.0
     assert stats.kstest((values + 2.0) / 7.0, "uniform").pvalue > 1e-3
 

@@ -41,7 +41,7 @@ class Disk:
         return Disk(root)
 
 
-def going(scenario: Callable[[], Coroutine[Any, Any, None]]) -> None:
+def run_async(scenario: Callable[[], Coroutine[Any, Any, None]]) -> None:
     asyncio.run(scenario())
 
 

@@ -24,7 +24,7 @@ def run_scenario(
     """Let a page send requests to a hub; return the events that it received. ``runs``: models may run."""
     received: Events = []
 
-    async def going() -> None:
+    async def main() -> None:
         hub = Hub(ProjectFolder(folder))
 
         async def hear(text: str) -> None:
@@ -51,5 +51,5 @@ def run_scenario(
         await scenario(hub, ask, received)
         hub.close()
 
-    asyncio.run(going())
+    asyncio.run(main())
     return received

@@ -3,7 +3,7 @@ import { inNaturalOrder } from '../../src/model/natural_order'
 import { recoverable } from '../../src/model/recoverable'
 import type { Recovery } from '../../src/protocol'
 
-test('numbers in names count as numbers', () => {
+test('numbers in names are sorted by their values', () => {
   const names = ['b1039', 'b39', 'b4', 'B5', 'a', 'Scope 10', 'Scope 9']
   expect(inNaturalOrder(names, (name) => name)).toEqual([
     'a',

@@ -63,7 +63,7 @@ class DeadTime:
 
     @property
     def count(self) -> int:
-        """Of delayed scalars."""
+        """Number of delayed scalars."""
         return self.indices.size
 
     @cached_property

@@ -102,7 +102,7 @@ def shown_poles(system: StateSpaceModel) -> Complex:
 
 
 def shown_zeros(system: StateSpaceModel) -> Complex:
-    """:meth:`LinearSystem.zeros`; likewise."""
+    """:meth:`LinearSystem.zeros`, without rounding errors about 0, 1, the axes and the unit circle."""
     matrices = zero_pencil(system.A, system.B, system.C, system.D)
     if matrices is None:
         return np.empty(0, dtype=np.complex128)

@@ -1,7 +1,8 @@
 """External resets with Simulink's names: when a trigger signal resets the states of a block.
 
-``rising``: the trigger becomes positive. ``falling``: it stops being positive. ``either``: both. ``level``:
-it is not 0, or has just become 0; the states are held until then. ``level hold``: it is not 0.
+``rising``: the trigger becomes positive. ``falling``: it stops being positive. ``either``: both events.
+``level``: the trigger is not 0, or has just become 0. ``level hold``: the trigger is not 0. The states are
+held while the trigger is not 0.
 """
 
 from __future__ import annotations
@@ -19,7 +20,9 @@ EXTERNAL_RESETS = ("none", *EDGES, *LEVELS)
 INITIAL_SOURCES = ("internal", "external", "external at resets")
 """Source of the initial value: the parameter; a port; or the parameter at the start and a port at resets."""
 
-SEEN = State("seen", (), "sign of the trigger at the previous tick: 1 or 0; -1 before the first tick")
+PREVIOUS_SIGN = State(
+    "seen", (), "sign of the trigger at the previous tick: 1 or 0; -1 before the first tick"
+)
 """The state of a sampled block that holds the previous sign of its trigger."""
 
 
@@ -50,7 +53,7 @@ def side_of(external_reset: str, trigger: SX) -> SX:
 
 
 def fires_at_tick(external_reset: str, trigger: SX, previous_side: SX) -> SX:
-    """Whether a sampled block is reset at this tick; ``previous_side`` is the state ``SEEN``."""
+    """Whether a sampled block is reset at this tick; ``previous_side`` is the state ``PREVIOUS_SIGN``."""
     side = side_of(external_reset, trigger)
     rises, falls = logic_and(side, previous_side == 0.0), logic_and(side == 0.0, previous_side == 1.0)
     fires = {

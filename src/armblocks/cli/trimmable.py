@@ -26,7 +26,7 @@ def print_trimmable(system: HybridSystem, start: OperatingPoint, model: str, con
     """Tables of the names with their values at the ``start``, and example commands."""
     console.print(f"{system.name}: names for trim", style=STRONG)
     if not system.states.size:
-        console.print("There are no states, hence no equilibrium conditions.")
+        console.print("There are no states and therefore no equilibrium conditions.")
     _print_slots("state", "--fix, --moving, --guess, --bound", system.states, start.states, console)
     _print_slots("parameter", "--free, --guess, --bound", system.parameters, start.parameters, console)
     _print_slots("signal", "--output", system.signals_layout, start.signals, console)

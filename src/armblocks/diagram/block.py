@@ -222,11 +222,11 @@ class Block(ABC):
     # --------------------------------------------------------------------------------------------
 
     def input_ports(self) -> tuple[Port, ...]:
-        """Inputs, in order."""
+        """The input ports, in order."""
         return ()
 
     def output_ports(self) -> tuple[Port, ...]:
-        """Outputs, in order."""
+        """The output ports, in order."""
         return ()
 
     def bus_inputs(self) -> tuple[str, ...]:

@@ -29,7 +29,7 @@ def flatten_hierarchy(diagram: Diagram) -> FlatForm:
 
 
 def flat_diagram(diagram: Diagram) -> Diagram:
-    """The flat diagram alone; a diagram without virtual blocks itself."""
+    """The flat diagram; a diagram without virtual blocks is returned unchanged."""
     return flatten_hierarchy(diagram).diagram
 
 

@@ -1,4 +1,6 @@
-"""The schedule of a system with clocks, events, delays or implicit equations. A piece ends at an instant.
+"""The schedule of a system with clocks, events, delays or implicit equations.
+
+The integration is divided into pieces, each of which ends at an instant.
 
 At an instant (a tick, an event, a breakpoint, the start) the loop does the following, in native code:
 
@@ -178,8 +180,8 @@ class Instants(Schedule):
             self.frame.leave_unless(finite, Status.NON_FINITE)
 
     def passed_until(self, time: Real, spacing: Real) -> Real:
-        """Grid points up to the returned time count as passed: one within rounding after a tick is the
-        tick."""
+        """The time up to which grid points are passed. A grid point that follows a tick within rounding
+        errors coincides with the tick."""
         return fma(spacing, 1e-9, time)
 
     def fixed_step_end(self, time: Real, new_time: Real) -> Real:

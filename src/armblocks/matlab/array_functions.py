@@ -94,7 +94,7 @@ def number_of_elements(number: float) -> int:
     if not (number >= 0 and number == number // 1):
         raise MismatchError(f"{number:g} is not a number of elements")
     if number > MAX_ELEMENTS:
-        raise MismatchError(f"an array would have {number:g} elements; the most are {MAX_ELEMENTS}")
+        raise MismatchError(f"an array would have {number:g} elements; at most {MAX_ELEMENTS} are allowed")
     return int(number)
 
 
@@ -112,7 +112,7 @@ def range_of(first: float, step: float, last: float) -> NDArray[np.float64]:
     """``first:step:last``: the elements are first + k step. Raises :class:`MismatchError`."""
     steps = (last - first) / step if step else math.nan
     if not (math.isfinite(step) and math.isfinite(steps)):
-        raise MismatchError("the steps go away from the last number")
+        raise MismatchError("the steps do not lead to the last number")
     # As in MATLAB: a last number within rounding belongs to the range, and the upper half of the elements is
     # counted from the end (MathWorks, "How does the COLON operator work?").
     tolerance = 2.0 * 2.0**-52 * max(abs(first), abs(last))

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from crashed_disk import Disk, carry_out, going
+from crashed_disk import Disk, carry_out, run_async
 
 from armblocks.errors import ArmblocksError, FormatError, InputError
 from armblocks.formats import diagram_to_bytes, load_robot
@@ -88,7 +88,7 @@ def test_recovered_edits_have_their_undo_and_redo_history(disk: Disk, tmp_path: 
             open_file.document.redo()
         assert content(recovered) == content(open_file)
 
-    going(scenario)
+    run_async(scenario)
 
 
 def test_a_long_journal_is_replayed_from_its_last_snapshot(disk: Disk, tmp_path: Path) -> None:
@@ -111,7 +111,7 @@ def test_a_long_journal_is_replayed_from_its_last_snapshot(disk: Disk, tmp_path:
         assert content(recovered) == content(open_file)
         assert recovered.document.diagram.blocks["gain"].parameter_value("gain") == 149.0
 
-    going(scenario)
+    run_async(scenario)
 
 
 def test_a_journal_cut_anywhere_recovers_the_complete_edits_before_the_cut(
@@ -146,7 +146,7 @@ def test_a_journal_cut_anywhere_recovers_the_complete_edits_before_the_cut(
                     assert recovered is not None
                     assert content(recovered) == states[applied]
 
-    going(scenario)
+    run_async(scenario)
 
 
 def test_an_edit_repeated_after_a_crash_is_applied_once(disk: Disk, tmp_path: Path) -> None:
@@ -160,7 +160,7 @@ def test_an_edit_repeated_after_a_crash_is_applied_once(disk: Disk, tmp_path: Pa
         assert after.perform(recovered, change("two", add("gain 2")))
         assert sorted(recovered.document.diagram.blocks) == ["gain", "gain 2"]
 
-    going(scenario)
+    run_async(scenario)
 
 
 def test_a_page_finds_its_document_after_a_server_restart(disk: Disk) -> None:
@@ -182,7 +182,7 @@ def test_a_page_finds_its_document_after_a_server_restart(disk: Disk) -> None:
         with pytest.raises(ArmblocksError, match="there is no such file"):
             documents.attach("c" * 16, path="gone.json")
 
-    going(scenario)
+    run_async(scenario)
 
 
 def test_a_file_newer_than_the_journal_is_kept_beside_the_recovered_file(disk: Disk, tmp_path: Path) -> None:
@@ -208,7 +208,7 @@ def test_a_file_newer_than_the_journal_is_kept_beside_the_recovered_file(disk: D
         assert not recovered.document.dirty
         assert after.recoverable.offers() == []
 
-    going(scenario)
+    run_async(scenario)
 
 
 def test_a_recovered_diagram_does_not_overwrite_a_newer_file(disk: Disk, tmp_path: Path) -> None:
@@ -226,7 +226,7 @@ def test_a_recovered_diagram_does_not_overwrite_a_newer_file(disk: Disk, tmp_pat
         with pytest.raises(ArmblocksError, match="the file has changed on the disk"):
             await after.save(recovered, "", overwrite=False)
 
-    going(scenario)
+    run_async(scenario)
 
 
 def test_a_recovery_is_discarded_only_on_request(disk: Disk, tmp_path: Path) -> None:
@@ -245,7 +245,7 @@ def test_a_recovery_is_discarded_only_on_request(disk: Disk, tmp_path: Path) -> 
             await after.recover(document_messages.Recover(document=open_file.key, action="open"))
         assert second.documents().recoverable.offers() == []
 
-    going(scenario)
+    run_async(scenario)
 
 
 def test_saved_diagrams_leave_no_journal(disk: Disk) -> None:
@@ -260,7 +260,7 @@ def test_saved_diagrams_leave_no_journal(disk: Disk) -> None:
         documents.end()
         assert list(disk.state_folder.journals.iterdir()) == []
 
-    going(scenario)
+    run_async(scenario)
 
 
 @pytest.mark.filterwarnings("ignore::armblocks.errors.InertiaWarning")
@@ -288,7 +288,7 @@ def test_a_missing_robot_file_is_reported_and_the_journal_remains(disk: Disk, tm
         assert recovered.document.dirty
         assert [path.suffix for path in second.state_folder.journals.iterdir()] == [".unread"]
 
-    going(scenario)
+    run_async(scenario)
 
 
 def test_a_disk_error_in_the_journal_does_not_prevent_edits(
@@ -313,7 +313,7 @@ def test_a_disk_error_in_the_journal_does_not_prevent_edits(
         recovered = disk.as_after_a_crash(tmp_path / "second").documents().attach(open_file.key)
         assert content(recovered) == content(open_file)
 
-    going(scenario)
+    run_async(scenario)
 
 
 def test_pages_are_notified_of_a_disk_error_in_the_journal(
@@ -345,7 +345,7 @@ def test_pages_are_notified_of_a_disk_error_in_the_journal(
         assert events == [False]
         watching.cancel()
 
-    going(scenario)
+    run_async(scenario)
 
 
 def test_a_disk_error_in_a_save_leaves_the_diagram_and_the_journal(
@@ -372,7 +372,7 @@ def test_a_disk_error_in_a_save_leaves_the_diagram_and_the_journal(
         await documents.save(open_file, "", overwrite=False)
         assert not open_file.document.dirty
 
-    going(scenario)
+    run_async(scenario)
 
 
 def test_an_unreadable_journal_is_not_overwritten(disk: Disk) -> None:
@@ -387,7 +387,7 @@ def test_an_unreadable_journal_is_not_overwritten(disk: Disk) -> None:
         assert journal.read_bytes() == b"nothing that is a journal"
         assert [offer.document for offer in documents.recoverable.offers()] == [key]
 
-    going(scenario)
+    run_async(scenario)
 
 
 def test_a_defect_during_replay_keeps_the_edits_before_it(
@@ -412,7 +412,7 @@ def test_a_defect_during_replay_keeps_the_edits_before_it(
         assert offer.missing == "the last 2 edits could not be repeated: armblocks has a defect (KeyError)"
         assert sorted(after.attach(open_file.key).document.diagram.blocks) == ["b0", "b1"]
 
-    going(scenario)
+    run_async(scenario)
 
 
 def test_a_deleted_or_renamed_file_is_reported_and_its_content_remains(
@@ -448,4 +448,4 @@ def test_a_deleted_or_renamed_file_is_reported_and_its_content_remains(
         assert disk.project.exists("a.json")
         watching.cancel()
 
-    going(scenario)
+    run_async(scenario)

@@ -149,3 +149,28 @@ def test_a_dragged_block_snaps_to_a_straight_line_and_alt_turns_it_off(sheet: Pa
     sheet.mouse.up()
     sheet.keyboard.up("Alt")
     wait_until(sheet, lambda: abs(levels()[0] - levels()[1]) > 1)
+
+
+def test_a_subsystem_shows_a_picture_of_its_sheet_while_the_pointer_rests(sheet: Page) -> None:
+    select_block(sheet, "PID")
+    sheet.keyboard.press("Control+g")
+    expect(block(sheet, "Subsystem")).to_be_visible()
+    x, y = middle(block(sheet, "Subsystem"))
+    preview = sheet.locator(".subsystem-preview")
+    sheet.mouse.move(x, y, steps=2)
+    expect(preview.locator("img")).to_have_js_property("complete", True)
+    expect(preview).to_have_css("opacity", "1")
+    assert preview.locator("img").evaluate("picture => picture.naturalWidth") > 0
+    sheet.keyboard.press("Escape")
+    expect(preview).to_be_hidden()
+    expect(block(sheet, "Subsystem")).to_have_class(
+        re.compile("selected")
+    )  # Escape has closed the picture only
+    sheet.mouse.move(5, 5)
+    sheet.mouse.move(x, y, steps=2)
+    expect(preview).to_be_visible()
+    sheet.mouse.down()
+    expect(preview).to_be_hidden()
+    sheet.mouse.move(x + 40, y + 40, steps=4)
+    sheet.mouse.up()
+    expect(sheet.get_by_role("button", name="Undo move Subsystem (Ctrl+Z)")).to_be_enabled()

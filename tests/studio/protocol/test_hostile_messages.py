@@ -231,7 +231,7 @@ def test_every_kind_of_message_answers_hostile_values_with_an_error(folder: Path
     async def hear_bytes(data: bytes) -> None:
         raise AssertionError("samples arrived without a run")
 
-    async def going() -> None:
+    async def main() -> None:
         hub = Hub(ProjectFolder(folder))
         page = Page(hear, hear_bytes)
         await hub.welcome(page)
@@ -270,7 +270,7 @@ def test_every_kind_of_message_answers_hostile_values_with_an_error(folder: Path
         assert (await send({"kind": "ping"}))["fault"] is None
         hub.close()
 
-    asyncio.run(going())
+    asyncio.run(main())
     assert defects == []
     assert sorted(path.name for path in folder.parent.iterdir()) == ["project", "secret.json"]
     assert (folder.parent / "secret.json").read_text() == "SECRET"

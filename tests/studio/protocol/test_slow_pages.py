@@ -51,21 +51,21 @@ class Listener:
         return reply["value"]
 
 
-def with_pages(folder: Path, going: Callable[[Hub, Listener, Listener], Awaitable[None]]) -> None:
-    async def whole() -> None:
+def with_pages(folder: Path, scenario: Callable[[Hub, Listener, Listener], Awaitable[None]]) -> None:
+    async def main() -> None:
         hub, lively, frozen = Hub(ProjectFolder(folder)), Listener(), Listener()
         lively.listens.set()
         for listener in (lively, frozen):
             await hub.welcome(listener.page)
         try:
-            await going(hub, lively, frozen)
+            await scenario(hub, lively, frozen)
         finally:
             for listener in (lively, frozen):
                 hub.leave(listener.page)
                 listener.sending.cancel()
             hub.close()
 
-    asyncio.run(whole())
+    asyncio.run(main())
 
 
 def of_runs(listener: Listener) -> list[str | bytes]:
@@ -77,7 +77,7 @@ def test_a_page_suspended_during_a_run_delays_nobody_and_gets_all_messages_later
 ) -> None:
     monkeypatch.setattr(outbox_module, "CONGESTED_BYTES", 20_000)
 
-    async def going(hub: Hub, lively: Listener, frozen: Listener) -> None:
+    async def scenario(hub: Hub, lively: Listener, frozen: Listener) -> None:
         document = await lively.ask(hub, 1, "open_shipped", document_kind="diagram", name="falling_pendulum")
         request = {"kind": "attach", "document": document, "document_kind": "diagram"}
         attach = {"number": 1, "request": request}
@@ -94,7 +94,7 @@ def test_a_page_suspended_during_a_run_delays_nobody_and_gets_all_messages_later
         await frozen.until("run_progress", run=run, state="done")
         assert of_runs(frozen) == of_runs(lively)
 
-    with_pages(tmp_path, going)
+    with_pages(tmp_path, scenario)
 
 
 def test_the_connection_of_an_unresponsive_page_is_closed(
@@ -102,7 +102,7 @@ def test_the_connection_of_an_unresponsive_page_is_closed(
 ) -> None:
     monkeypatch.setattr(outbox_module, "MAX_BYTES", 1_000_000)
 
-    async def going(hub: Hub, lively: Listener, frozen: Listener) -> None:
+    async def scenario(hub: Hub, lively: Listener, frozen: Listener) -> None:
         document = await lively.ask(hub, 1, "open_shipped", document_kind="diagram", name="kr180model")
         attach = {"kind": "attach", "document": document, "document_kind": "diagram"}
         for number in range(100):
@@ -116,4 +116,4 @@ def test_the_connection_of_an_unresponsive_page_is_closed(
         assert frozen.outbox._size == 0  # pyright: ignore[reportPrivateUsage]
         await lively.ask(hub, 2, "change", document=document, key="1", edit={"kind": "arrange"})
 
-    with_pages(tmp_path, going)
+    with_pages(tmp_path, scenario)

@@ -67,13 +67,13 @@ class Client:
 
 
 def run_scenario(folder: Path, scenario: Callable[[Client], Awaitable[None]]) -> None:
-    async def going() -> None:
+    async def main() -> None:
         client = Client(folder)
         await client.hub.welcome(client.page)
         await scenario(client)
         client.hub.close()
 
-    asyncio.run(going())
+    asyncio.run(main())
 
 
 def packed(data: bytes) -> str:

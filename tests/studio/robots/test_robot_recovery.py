@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from crashed_disk import Disk, carry_out, going
+from crashed_disk import Disk, carry_out, run_async
 
 from armblocks.errors import ArmblocksError, FormatError, InputError
 from armblocks.formats import load_robot, write_robot
@@ -90,22 +90,22 @@ def test_recovered_robot_edits_have_their_undo_and_redo_history(
         if seed % 3 == 0:
             await robots.save(open_file, "arms/mine.json", overwrite=False)
         carry_out(robots, open_file, requests(seed + 1000, 40))
-        back = disk.as_after_a_crash(tmp_path / "second").robots().attach(open_file.key)
-        assert content(back) == content(open_file)
-        assert back.document.version == open_file.document.version
-        assert back.document.dirty == open_file.document.dirty
-        assert (back.path, back.origin) == (open_file.path, open_file.origin)
-        while back.document.undo_title:  # up to the start of the journal
-            assert back.document.undo_title == open_file.document.undo_title
-            back.document.undo()
+        recovered = disk.as_after_a_crash(tmp_path / "second").robots().attach(open_file.key)
+        assert content(recovered) == content(open_file)
+        assert recovered.document.version == open_file.document.version
+        assert recovered.document.dirty == open_file.document.dirty
+        assert (recovered.path, recovered.origin) == (open_file.path, open_file.origin)
+        while recovered.document.undo_title:  # up to the start of the journal
+            assert recovered.document.undo_title == open_file.document.undo_title
+            recovered.document.undo()
             open_file.document.undo()
-            assert content(back) == content(open_file)
+            assert content(recovered) == content(open_file)
         while open_file.document.redo_title:
-            back.document.redo()
+            recovered.document.redo()
             open_file.document.redo()
-        assert content(back) == content(open_file)
+        assert content(recovered) == content(open_file)
 
-    going(scenario)
+    run_async(scenario)
 
 
 def test_a_snapshot_within_a_gesture_does_not_split_its_undo_step(
@@ -120,13 +120,13 @@ def test_a_snapshot_within_a_gesture_does_not_split_its_undo_step(
             robots.perform(open_file, cell(str(number), "link2", "a", text, "one cell"))
             if open_file.snapshot is not None:
                 await open_file.snapshot
-        back = disk.as_after_a_crash(tmp_path / "second").robots().attach(open_file.key)
-        assert back.robot.links[1].dh is not None
-        assert back.robot.links[1].dh.a == 1.25
-        back.document.undo()
-        assert back.robot == load_robot("puma560")
+        recovered = disk.as_after_a_crash(tmp_path / "second").robots().attach(open_file.key)
+        assert recovered.robot.links[1].dh is not None
+        assert recovered.robot.links[1].dh.a == 1.25
+        recovered.document.undo()
+        assert recovered.robot == load_robot("puma560")
 
-    going(scenario)
+    run_async(scenario)
 
 
 def test_unsaved_robots_are_offered_and_do_not_overwrite_a_newer_file(disk: Disk, tmp_path: Path) -> None:
@@ -140,8 +140,8 @@ def test_unsaved_robots_are_offered_and_do_not_overwrite_a_newer_file(disk: Disk
             documents.new(), document_messages.Change(document="", key="1", edit=ArrangeBlocks())
         )
         second = disk.as_after_a_crash(tmp_path / "second")
-        theirs = write_robot(load_robot("kr180"))
-        second.project.path("arm.json").write_bytes(theirs)
+        newer_content = write_robot(load_robot("kr180"))
+        second.project.path("arm.json").write_bytes(newer_content)
         after = second.robots()
         (offer,) = after.recoverable.offers()
         assert (offer.kind, offer.path, offer.disk, offer.edits, offer.parts) == (
@@ -152,16 +152,16 @@ def test_unsaved_robots_are_offered_and_do_not_overwrite_a_newer_file(disk: Disk
             6,
         )
         assert [offer.kind for offer in second.documents().recoverable.offers()] == ["diagram"]
-        back = await after.recover(document_messages.Recover(document=open_file.key, action="keep_both"))
-        assert back is not None
-        assert back.path is not None
-        assert back.path.startswith("arm recovered 20")
-        assert back.robot.links[0].mass == 7
-        assert second.project.read("arm.json") == theirs
+        recovered = await after.recover(document_messages.Recover(document=open_file.key, action="keep_both"))
+        assert recovered is not None
+        assert recovered.path is not None
+        assert recovered.path.startswith("arm recovered 20")
+        assert recovered.robot.links[0].mass == 7
+        assert second.project.read("arm.json") == newer_content
         with pytest.raises(ArmblocksError, match="there is no robot to recover named"):
             await after.recover(document_messages.Recover(document=open_file.key, action="open"))
 
-    going(scenario)
+    run_async(scenario)
 
 
 def test_a_robot_edit_repeated_after_a_crash_is_applied_once(disk: Disk, tmp_path: Path) -> None:
@@ -171,14 +171,14 @@ def test_a_robot_edit_repeated_after_a_crash_is_applied_once(disk: Disk, tmp_pat
         robots.perform(open_file, cell("one", "link1", "a", "2"))
         robots.perform(open_file, document_messages.Undo(document="", key="two"))
         after = disk.as_after_a_crash(tmp_path / "second").robots()
-        back = after.attach(open_file.key)
-        assert not after.perform(back, cell("one", "link1", "a", "2"))
-        assert not after.perform(back, document_messages.Undo(document="", key="two"))
-        assert after.perform(back, document_messages.Redo(document="", key="three"))
-        assert back.robot.links[0].dh is not None
-        assert back.robot.links[0].dh.a == 2
+        recovered = after.attach(open_file.key)
+        assert not after.perform(recovered, cell("one", "link1", "a", "2"))
+        assert not after.perform(recovered, document_messages.Undo(document="", key="two"))
+        assert after.perform(recovered, document_messages.Redo(document="", key="three"))
+        assert recovered.robot.links[0].dh is not None
+        assert recovered.robot.links[0].dh.a == 2
 
-    going(scenario)
+    run_async(scenario)
 
 
 def test_a_page_finds_its_robot_after_a_server_restart(disk: Disk) -> None:
@@ -195,7 +195,7 @@ def test_a_page_finds_its_robot_after_a_server_restart(disk: Disk) -> None:
         assert robots.attach("e" * 16, origin="kr180").robot == load_robot("kr180")
         assert robots.attach("d" * 16).robot == opened.robot
 
-    going(scenario)
+    run_async(scenario)
 
 
 def test_a_dropped_robot_is_journaled_before_its_first_edit(disk: Disk, tmp_path: Path) -> None:
@@ -205,10 +205,10 @@ def test_a_dropped_robot_is_journaled_before_its_first_edit(disk: Disk, tmp_path
         assert open_file.document.dirty
         with pytest.raises(InputError, match="has unsaved edits"):
             robots.close(open_file, discard=False)
-        back = disk.as_after_a_crash(tmp_path / "second").robots().attach(open_file.key)
-        assert back.robot == load_robot("kr180")
+        recovered = disk.as_after_a_crash(tmp_path / "second").robots().attach(open_file.key)
+        assert recovered.robot == load_robot("kr180")
 
-    going(scenario)
+    run_async(scenario)
 
 
 def test_reloading_a_changed_robot_file_is_one_undo_step(disk: Disk, tmp_path: Path) -> None:
@@ -219,7 +219,7 @@ def test_reloading_a_changed_robot_file_is_one_undo_step(disk: Disk, tmp_path: P
             robots.reload(open_file)
         await robots.save(open_file, "arm.json", overwrite=False)
         robots.perform(open_file, cell("1", "link1", "a", "2"))
-        mine = open_file.robot
+        before = open_file.robot
         disk.project.write("arm.json", write_robot(load_robot("kr180")))
         with pytest.raises(FormatError, match="the file has changed on the disk since it was opened"):
             await robots.save(open_file, "", overwrite=False)
@@ -228,11 +228,11 @@ def test_reloading_a_changed_robot_file_is_one_undo_step(disk: Disk, tmp_path: P
             robots.reload(open_file, "reload")
         assert open_file.robot == load_robot("kr180")
         assert not open_file.document.dirty
-        back = disk.as_after_a_crash(tmp_path / "second").robots().attach(open_file.key)
-        back.document.undo()
-        assert back.robot == mine
+        recovered = disk.as_after_a_crash(tmp_path / "second").robots().attach(open_file.key)
+        recovered.document.undo()
+        assert recovered.robot == before
 
-    going(scenario)
+    run_async(scenario)
 
 
 def test_a_page_does_not_overwrite_a_cell_changed_by_another_page(disk: Disk) -> None:
@@ -253,4 +253,4 @@ def test_a_page_does_not_overwrite_a_cell_changed_by_another_page(disk: Disk) ->
             open_file, cell("5", "link1", "a", "4", author="me", base=2)
         )  # after seeing the change
 
-    going(scenario)
+    run_async(scenario)

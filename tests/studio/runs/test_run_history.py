@@ -121,7 +121,7 @@ class Listener:
 
 
 def test_a_run_in_a_process_is_tuned_rewound_and_finished() -> None:
-    async def going() -> None:
+    async def main() -> None:
         received = Listener()
         run = RunProcess("r", "d", Worker(), received.notify)
         source = diagram_to_bytes(load_diagram("van_der_pol_pid", BLOCKS), load_robot).decode()
@@ -156,4 +156,4 @@ def test_a_run_in_a_process_is_tuned_rewound_and_finished() -> None:
             run.obey(run_messages.Control(run="r", action="back"))
         run.end()
 
-    asyncio.run(going())
+    asyncio.run(main())

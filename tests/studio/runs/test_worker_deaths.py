@@ -74,7 +74,7 @@ class Client:
 
 
 def run_scenario(folder: Path, scenario: Callable[[Client], Awaitable[None]]) -> None:
-    async def going() -> None:
+    async def main() -> None:
         client = Client(folder)
         await client.hub.welcome(client.page)
         try:
@@ -82,7 +82,7 @@ def run_scenario(folder: Path, scenario: Callable[[Client], Awaitable[None]]) ->
         finally:
             client.hub.close()
 
-    asyncio.run(going())
+    asyncio.run(main())
 
 
 def in_worker(monkeypatch: pytest.MonkeyPatch, start_worker: Callable[[Connection], None]) -> None:

@@ -16,15 +16,15 @@ from armblocks.studio.runs import workers
 from armblocks.studio.runs.workers import Worker, Workers
 
 
-def with_workers(going: Callable[[Workers], Awaitable[None]]) -> None:
-    async def whole() -> None:
+def with_workers(scenario: Callable[[Workers], Awaitable[None]]) -> None:
+    async def main() -> None:
         pool = Workers(pause=0.0)
         try:
-            await going(pool)
+            await scenario(pool)
         finally:
             pool.end()
 
-    asyncio.run(whole())
+    asyncio.run(main())
 
 
 async def waiting_worker(pool: Workers) -> Worker:
@@ -35,7 +35,7 @@ async def waiting_worker(pool: Workers) -> Worker:
 
 
 def test_the_next_worker_is_started_while_one_is_in_use() -> None:
-    async def going(pool: Workers) -> None:
+    async def scenario(pool: Workers) -> None:
         first = await pool.take()
         ready = await waiting_worker(pool)
         second = await pool.take()
@@ -44,11 +44,11 @@ def test_the_next_worker_is_started_while_one_is_in_use() -> None:
         first.end()
         second.end()
 
-    with_workers(going)
+    with_workers(scenario)
 
 
 def test_a_worker_that_died_while_waiting_is_not_used() -> None:
-    async def going(pool: Workers) -> None:
+    async def scenario(pool: Workers) -> None:
         pool.prepare()
         dead = await waiting_worker(pool)
         assert dead.process.pid is not None
@@ -59,16 +59,16 @@ def test_a_worker_that_died_while_waiting_is_not_used() -> None:
         assert replacement.process.is_alive()
         replacement.end()
 
-    with_workers(going)
+    with_workers(scenario)
 
 
 def test_taking_a_worker_starts_a_delayed_one_at_once() -> None:
-    async def going(pool: Workers) -> None:
+    async def scenario(pool: Workers) -> None:
         pool.prepare(after=3600.0)
         assert pool._next is None  # pyright: ignore[reportPrivateUsage]
         (await pool.take()).end()
 
-    with_workers(going)
+    with_workers(scenario)
 
 
 def test_a_failed_process_start_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -77,12 +77,12 @@ def test_a_failed_process_start_is_reported(monkeypatch: pytest.MonkeyPatch) -> 
 
     monkeypatch.setattr(workers, "Worker", refused)
 
-    async def going(pool: Workers) -> None:
+    async def scenario(pool: Workers) -> None:
         with pytest.raises(SimulationError, match="no process for the run could be started") as failed:
             await pool.take()
         assert failed.value.fix == "close other programs, and run the model again"
 
-    with_workers(going)
+    with_workers(scenario)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere every worker imports for itself")

@@ -7,7 +7,7 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
-from crashed_disk import Disk, going
+from crashed_disk import Disk, run_async
 from sheet_edits import MAKERS, random_edit
 
 from armblocks.errors import ArmblocksError
@@ -73,7 +73,7 @@ def test_random_edits_are_undone_redone_and_recovered_from_the_journal(tmp_path:
                 assert one.redo_title == ""
                 assert content(one) == end
 
-    going(scenario)
+    run_async(scenario)
     for kind in MAKERS:
         assert applied[kind] >= MIN_EDITS, (kind, applied)
     assert inner > SEEDS
@@ -87,4 +87,4 @@ def test_random_edits_are_reproducible_from_the_seed(seed: int, tmp_path: Path) 
         document = Disk(tmp_path).documents().open_shipped("puma560_servos").document
         assert random_edit(document, random.Random(seed)) == random_edit(document, random.Random(seed))
 
-    going(scenario)
+    run_async(scenario)

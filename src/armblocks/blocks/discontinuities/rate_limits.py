@@ -177,7 +177,7 @@ class RateLimiterContinuous(RateLimiting):
 class RateLimiterDynamic(RateLimiting):
     """A rate limiter whose limits are signals: y = u while falling <= u' <= rising, else y' equals the limit.
 
-    It works as the Rate Limiter (continuous). If ``falling`` exceeds ``rising``, no rate satisfies both
+    It behaves like the Rate Limiter (continuous). If ``falling`` exceeds ``rising``, no rate satisfies both
     limits, and y moves towards u at the active limit.
     """
 

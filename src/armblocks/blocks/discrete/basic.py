@@ -14,7 +14,7 @@ from casadi import SX, fmax, fmin, if_else, logic_or
 from numpy.typing import ArrayLike
 
 from armblocks.blocks.external_resets import (
-    SEEN,
+    PREVIOUS_SIGN,
     external_reset_parameter,
     fires_at_tick,
     initial_source_parameter,
@@ -101,7 +101,7 @@ class DiscreteIntegrator(Block):
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         x = State("x", self.output_shapes(inputs)["y"], "the sum")
-        return (x, SEEN) if self._has_resets else (x,)
+        return (x, PREVIOUS_SIGN) if self._has_resets else (x,)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         share = {"forward_euler": 0.0, "backward_euler": 1.0, "trapezoidal": 0.5}[self.method]

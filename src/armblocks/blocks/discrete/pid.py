@@ -110,10 +110,10 @@ class DiscretePID(SampledPidBlock):
     """Sampled PID: y = limit(P u + i + N (D u - f)), i(k+1) = i + T I u, f(k+1) = f + T N (D u - f).
 
     This is Simulink's Discrete PID Controller with forward Euler rules. The integral and the filter may each
-    use ``backward_euler`` or ``trapezoidal`` instead. Where the output is limited, ``clamping`` stops the
-    integral while it would drive the output further beyond the limit, and ``back_calculation`` adds T Kb (y -
-    unlimited y) to it. ``tracking`` adds T Kt (tracking - y). A reset happens at the first tick after the
-    trigger has crossed zero.
+    use ``backward_euler`` or ``trapezoidal`` instead. While the output is limited, ``clamping`` stops an
+    integral that would drive the output further beyond the limit. ``back_calculation`` adds T Kb (y -
+    unlimited y) to the integral. ``tracking`` adds T Kt (tracking - y). A reset happens at the first tick
+    after the trigger has crossed zero.
     """
 
     title: ClassVar[str] = "Discrete PID Controller"

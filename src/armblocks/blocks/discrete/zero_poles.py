@@ -38,7 +38,7 @@ class DiscreteZeroPole(SectionsByRoots):
     """A sampled transfer function: y = gain (z - z1) … (z - zm) / ((z - p1) … (z - pn)) u, m <= n.
 
     Complex zeros and poles come in conjugate pairs, as complex numbers in Python and as rows (real,
-    imaginary) in files. Initially at rest.
+    imaginary) in files. The block is initially at rest.
     """
 
     title: ClassVar[str] = "Discrete Zero-Pole"

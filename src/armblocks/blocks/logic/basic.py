@@ -55,7 +55,7 @@ class RelationalOperator(Block):
 
     title: ClassVar[str] = "Relational Operator"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="1 while the sine is at most 0.5.",
+        shows="The output is 1 while the sine is at most 0.5.",
         inputs={"u1": driver("SineWave"), "u2": driver("Constant", value=0.5)},
     )
 
@@ -91,7 +91,7 @@ class LogicalOperator(Block):
 
     title: ClassVar[str] = "Logical Operator"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="1 while both pulses are 1.",
+        shows="The output is 1 while both pulses are 1.",
         inputs={
             "u1": driver("PulseGenerator", period=4.0).named("slow"),
             "u2": driver("PulseGenerator", period=1.0).named("fast"),
@@ -133,7 +133,7 @@ class CompareToConstant(Block):
     title: ClassVar[str] = "Compare To Constant"
     broadcast_parameters: ClassVar[tuple[str, ...]] = ("constant",)
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="1 while the sine is above 0.5.",
+        shows="The output is 1 while the sine is above 0.5.",
         parameters={"relation": ">", "constant": 0.5},
     )
 
@@ -166,7 +166,7 @@ class CompareToZero(Block):
 
     title: ClassVar[str] = "Compare To Zero"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="1 while the sine is not above 0.",
+        shows="The output is 1 while the sine is not above 0.",
     )
 
     relation: str = parameter("<=", choices=tuple(_RELATIONS), doc="the relation")
@@ -201,7 +201,7 @@ class IntervalTest(Block):
     title: ClassVar[str] = "Interval Test"
     sign: ClassVar[FaceSign] = graph((0, 0), (0.3, 0), (0.3, 1), (0.7, 1), (0.7, 0), (1, 0))
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="1 while the sine is between -0.5 and 0.5.",
+        shows="The output is 1 while the sine is between -0.5 and 0.5.",
     )
 
     lower: ArrayLike = parameter(-0.5, kind=ParameterKind.ARRAY, finite=False, doc="the lower end")
@@ -239,7 +239,7 @@ class IntervalTestDynamic(Block):
     title: ClassVar[str] = "Interval Test Dynamic"
     sign: ClassVar[FaceSign] = graph((0, 0), (0.3, 0), (0.3, 1), (0.7, 1), (0.7, 0), (1, 0))
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="1 while the sine is between two limits, of which the upper one rises.",
+        shows="The output is 1 while the sine is between two limits, of which the upper one rises.",
         inputs={
             "upper": driver("Ramp", slope=0.1),
             "u": driver("SineWave"),
@@ -341,7 +341,7 @@ class TruthTable(Block):
 
     title: ClassVar[str] = "Truth Table"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="2 while the slow pulse is 1, else 1 while the fast one is 1, else 0.",
+        shows="The output is 2 while the slow pulse is 1, else 1 while the fast pulse is 1, else 0.",
         parameters={
             "decisions": ((1.0, -1.0), (0.0, 1.0), (-1.0, -1.0)),
             "actions": ((2.0,), (1.0,), (0.0,)),

@@ -58,7 +58,7 @@ class EdgeDetection(Block):
     broadcast_parameters: ClassVar[tuple[str, ...]] = ("initial",)
     sampled: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="1 at each tick at which the sine has become positive.",
+        shows="The output is 1 at each tick at which the sine has become positive.",
         parameters={"sample_time": 0.1},
         inputs={"u": _PULSES},
     )

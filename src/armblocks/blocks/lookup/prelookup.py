@@ -108,7 +108,7 @@ class InterpolationUsingPrelookup(Block):
 
     title: ClassVar[str] = "Interpolation Using Prelookup"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The curve, with the interval and the fraction from a Prelookup.",
+        shows="A curve; the index of the interval and the fraction come from a Prelookup block.",
         parameters={"table": (0.0, 3.0, 1.0, 2.0)},
         inputs={
             "k1": driver("Prelookup", positions=(0.0, 2.0, 5.0, 10.0))

@@ -128,7 +128,7 @@ class Sign(Block):
     title: ClassVar[str] = "Sign"
     sign: ClassVar[FaceSign] = graph((0, 0), (0.5, 0), (0.5, 1), (1, 1))
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="1 while the sine is positive, -1 while it is negative.",
+        shows="The output is 1 while the sine is positive, -1 while it is negative.",
     )
 
     zero_crossing: bool = zero_crossing_parameter()

@@ -98,7 +98,7 @@ class Netlist:
 
     @property
     def where(self) -> str:
-        """The diagram, for messages."""
+        """The text that identifies the diagram in messages."""
         return f"diagram '{self.top.name}'"
 
     def remaining(self) -> dict[str, Block]:
@@ -112,7 +112,7 @@ class Netlist:
         ]
 
     def label(self, path: str) -> str:
-        """A block, for messages."""
+        """The text that identifies a block in messages."""
         return f"block '{path}' ({self.blocks[path].title})"
 
     def with_replaced(self, replaced: Mapping[str, Replacements]) -> Netlist:
