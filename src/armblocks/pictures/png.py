@@ -32,5 +32,4 @@ def picture_pixels(
     width, height = round(picture.width * scale), round(picture.height * scale)
     renderer = RendererAgg(width, height, 72.0)
     Painter(renderer, height, theme, scale).picture(picture)
-    pixels = cast("NDArray[np.uint8]", np.asarray(renderer.buffer_rgba()))
-    return np.ascontiguousarray(pixels[:, :, :3])
+    return cast("NDArray[np.uint8]", np.asarray(renderer.buffer_rgba()))[:, :, :3]
