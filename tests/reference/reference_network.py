@@ -179,7 +179,7 @@ class Network:
                 target[:] = source
 
         def update_modes() -> bool:
-            if held():
+            if held() or not block.on:
                 return False
             feed()
             self._read_histories(block)

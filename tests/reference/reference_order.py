@@ -132,7 +132,8 @@ class EvaluationOrder:
             hard = set[Node]()
             for mode in block.modes:
                 hard |= self._inputs_of(block, block.needs("mode", mode.name))
-            return hard, set()
+            gate = self.gates.get(name, {})
+            return hard, {("out", ref.block, ref.port) for key, ref in gate.items() if key == "?on"}
         soft: set[Node] = {("modes", name, "")} if getattr(block, "modes", ()) else set()
         gate = self.gates.get(name, {})
         if block.clock is not None or block.block.sampled:

@@ -104,6 +104,12 @@ def _contents() -> Diagram:
     for states in ("held", "reset"):
         enabled = EnabledSubsystem(diagram=_around(Integrator()), states_when_enabling=states)
         b.add(f"enabled {states}", enabled, u, above)
+    for name, hysteresis in (
+        ("relay", Relay(on_point=-0.5, off_point=-1.0)),
+        ("play", Backlash(initial=-1.0)),
+    ):
+        # Disabled at the start, where the consistent mode differs from the initial one.
+        b.add(f"enabled {name}", EnabledSubsystem(diagram=_around(hysteresis)), x, above)
     b.add("both", EnabledTriggeredSubsystem(diagram=_around(Gain())), x, v, above)
     loose = b.add("second play", Backlash(width=0.2, initial=-1.0), b.add("play", Backlash(initial=1.0), x))
     b.add("hit play", HitCrossing(offset=-0.05), loose)

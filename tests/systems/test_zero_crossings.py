@@ -18,9 +18,11 @@ from armblocks.blocks import (
     CompareToConstant,
     CompareToZero,
     Constant,
+    DeadZone,
     Derivative,
     Extremum,
     Gain,
+    HitCrossing,
     Integrator,
     IntervalTest,
     JointStops,
@@ -36,6 +38,7 @@ from armblocks.blocks import (
     Product,
     Ramp,
     RelationalOperator,
+    Relay,
     Rounding,
     Sign,
     SineWave,
@@ -47,6 +50,7 @@ from armblocks.blocks import (
 )
 from armblocks.diagram import Block, Diagram, DiagramBuilder, trace_diagram
 from armblocks.equations import SimulationOptions
+from armblocks.errors import SimulationError
 from armblocks.integration.system import compile_system
 from armblocks.simulation import SimulationResult, simulate
 from compiled_diagrams import compiled
@@ -525,3 +529,26 @@ def test_modes_are_consistent_when_a_run_continues_with_other_parameters() -> No
     later = simulate(compiled, longer, {"above.constant": 2.8}, initial_state=first.final_state)
     assert later["above/y"].tolist() == [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0]
     assert later["time/y"][-1] == pytest.approx(1.7, abs=1e-9)
+
+
+@pytest.mark.parametrize("solver", ["rk45", "rodas5p", "rk4"])
+@pytest.mark.parametrize("block", [HitCrossing(offset=-0.5), Relay(on_point=0.7)])
+def test_a_run_ends_if_rounding_decides_the_sign_of_a_guard(block: Block, solver: str) -> None:
+    """The dead zone has no width, so its output minus its input is -0.5 up to rounding. The search for an
+    event in a step of ten units in the last place never ended."""
+    builder = DiagramBuilder("d")
+    sine = SineWave(amplitude=1.4424198862237227, frequency=math.pi, phase=0.09497253091345148, bias=-0.5)
+    u = builder.add("u", sine)
+    zone = builder.add("zone", DeadZone(start=0.5, end=0.5), u)
+    constant = builder.add("constant", Sum(signs="+-"), zone, u)
+    port = block.output_ports()[0].name
+    builder.add("integral", Integrator(), builder.add("block", block, constant)[port])
+    step = 0.01 if solver == "rk4" else None
+    try:
+        result = simulate(
+            compiled(builder.build()), SimulationOptions(stop_time=10.0, solver=solver, step=step)
+        )
+    except SimulationError as error:
+        assert "events without end" in str(error) or "extremely short steps" in str(error)
+    else:
+        np.testing.assert_allclose(result["constant/y"], -0.5, atol=1e-15)

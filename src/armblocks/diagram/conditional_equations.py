@@ -46,7 +46,7 @@ def conditional(features: Features, gate: Collection[str], *, clocked: bool, tic
     if FIRE in gate and features.sampled:
         gated = executed_when_fired(gated)
     if RESTART in gate:
-        gated = restarted(gated, own.equations[SlotKind.MODE], clocked=clocked)
+        gated = restarted(gated, clocked=clocked)
     if ON in gate and features.modes:
         gated = with_consistent_modes(gated)
     return gated
@@ -116,14 +116,15 @@ def executed_when_fired(features: Features) -> Features:
     return features.with_equations({SlotKind.RESET: fired, SlotKind.UPDATE: lambda at: {}})
 
 
-def restarted(features: Features, modes: Equation, *, clocked: bool) -> Features:
+def restarted(features: Features, *, clocked: bool) -> Features:
     """With states and modes that are reset at a restart, and guards that are silent until its instant ends.
 
-    ``modes`` gives the modes of the block regardless of its control. ``clocked``: the block works at the
-    ticks of a clock. After a restart by a tick, discrete states keep their values after the tick; continuous
-    states and modes are reset.
+    Modes are reset as at the start of a run: to their consistent values, to 0 while the control is off.
+    ``clocked``: the block works at the ticks of a clock. After a restart by a tick, discrete states keep
+    their values after the tick; continuous states and modes are reset.
     """
     resets, updates = features.equations[SlotKind.RESET], features.equations[SlotKind.UPDATE]
+    modes = features.equations[SlotKind.MODE]
     ticked = {state.name for state in features.discrete} if clocked else set[str]()
 
     def reset(at: Arguments) -> Signals:

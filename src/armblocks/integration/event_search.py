@@ -87,6 +87,8 @@ class EventSearch:
         it."""
         f, r, workspace = self.frame, self.frame.r, self.frame.workspace
         end = f.new_time.value
+        limit = r.real(end)
+        """The end of the search: the end of the step, or the earliest time at which a guard has fired."""
         low.value = time
         next_length = f.reals.after(Scalar.WINDOW)
         unknown = next_length[0] == float("inf")
@@ -97,18 +99,19 @@ class EventSearch:
             a = low.value
             middle = fma(0.5, length.value, a)
             reached = a + length.value
-            # The window takes the rest of the step if the rest is shorter than half a window, or if rounding
+            # The window takes the rest of the search if that is shorter than half a window, or if rounding
             # makes the middle of the window equal to one of its ends.
-            whole = fma(0.5, length.value, reached) >= end
+            whole = fma(0.5, length.value, reached) >= limit.value
             apart = (middle > a) & (middle < reached)
             whole = whole | ~apart
-            middle = select(whole, fma(0.5, end - a, a), middle)
-            reached = select(whole, end, reached)
+            middle = select(whole, fma(0.5, limit.value - a, a), middle)
+            reached = select(whole, limit.value, reached)
             length.value = reached - a
             divisible = apart & (length.value > shortest)
             high.value = middle
             with r.unless(self.count_fired_at(middle, time, h) == 0):
                 found.leave_unless(divisible)
+                limit.value = middle
                 length.value = middle - a
                 window.again()
             f.copy(workspace.guards, workspace.guards_middle, self.guards)
@@ -133,7 +136,7 @@ class EventSearch:
             low.value = reached
             next_length[0] = 2.0 * next_length[0]
             length.value = next_length[0]
-            window.again_unless(reached >= end)
+            window.again_unless(reached >= limit.value)
 
     def count_fired_at(self, instant: Real, time: Real, h: Real) -> Integer:
         """The number of guards that have fired at a time within the step."""
