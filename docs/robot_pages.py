@@ -66,4 +66,4 @@ def _robot(name: str) -> Iterator[str]:
             )
         )
     if any(any(row[1:]) for row in rows):
-        yield from table(("joint", "range", "greatest speed", "greatest torque"), rows)
+        yield from table(("joint", "range", "maximum speed", "maximum torque"), rows)

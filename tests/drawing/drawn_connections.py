@@ -1,4 +1,4 @@
-"""The lines of a diagram at its places, and the connections that a reader infers from them."""
+"""The routed lines of a diagram, and the connections that a reader infers from them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Routed = tuple[dict[PortRef, list[PortRef]], list[Net], list[RoutedNet], list[Ob
 
 
 def routed(diagram: Diagram) -> Routed:
-    """Targets by source, nets, their lines, and the blocks in the way."""
+    """Targets by source, nets, their lines, and the obstacles."""
     placed = boxes(diagram)
     nets, wires = wire_nets(diagram.connections, drawn_bends(diagram), placed)
     obstacles = [obstacle(box) for box in placed.values()]
@@ -38,9 +38,9 @@ def connections_in_the_drawing(diagram: Diagram) -> tuple[Mapping[str, str], Map
     wires, _, nets, _ = routed(diagram)
     placed = boxes(diagram)
     ports = {
-        f"{name}/{spot.name}": Port(name, spot.x, spot.y, (way * spot.dx, way * spot.dy), way == 1)
+        f"{name}/{spot.name}": Port(name, spot.x, spot.y, (sign * spot.dx, sign * spot.dy), sign == 1)
         for name, box in placed.items()
-        for spots, way in ((box.inputs, -1), (box.outputs, 1))
+        for spots, sign in ((box.inputs, -1), (box.outputs, 1))
         for spot in spots
     }
     labels: dict[str, str] = {}

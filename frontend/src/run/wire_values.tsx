@@ -133,7 +133,7 @@ export function WireValues({ selectedEdge }: { selectedEdge: WireEdgeType | unde
 const LABEL_HEIGHT = 14
 const SMALLEST_LABEL = 24
 
-/** Position and greatest width of the value at an output. */
+/** Position and maximum width of the value at an output. */
 function labelStyle(
   { block, port }: ReturnType<typeof outputs>[number],
   obstacles: readonly Rectangle[],

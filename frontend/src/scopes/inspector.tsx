@@ -226,7 +226,7 @@ function SignalList({ runs }: { runs: StoredRun[] }) {
               key={name}
               title={
                 difference &&
-                `greatest difference ${withUnit(difference.largest, unit)} at ${withUnit(difference.at, 's')}`
+                `maximum difference ${withUnit(difference.largest, unit)} at ${withUnit(difference.at, 's')}`
               }
             >
               <input

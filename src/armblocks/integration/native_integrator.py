@@ -95,12 +95,12 @@ class NativeIntegrator:
 
         ``start`` is the state ``(n,)`` at ``samples[0]``, or a point. ``samples`` (N,) s, strictly ascending:
         the recorded times; the last one is the default of ``stop``. ``breakpoints`` (nb,) s, in any order: a
-        step ends exactly on each one inside the run. Before it ``f`` is evaluated at most at the last double
-        before it, and after it the integration restarts. ``step`` s: grid of a fixed-step method (its times
-        are ``k step``); ``rtol``, ``atol``, ``max_step`` s: for adaptive methods. With a ``checkpoint`` the
-        run continues from there, with the results of the run that wrote it. With ``detect_stiffness`` it
-        pauses where a method for stiff systems, or an explicit method again, is faster
-        (:attr:`Integration.other_method_faster`). ``span`` s: approximate length of the run, for the
+        step ends exactly on each one inside the run. Before a breakpoint, ``f`` is evaluated no later than
+        the last double before it; after it the integration restarts. ``step`` s: grid of a fixed-step method
+        (its times are ``k step``); ``rtol``, ``atol``, ``max_step`` s: for adaptive methods. With a
+        ``checkpoint`` the run continues from there, with the results of the run that wrote it. With
+        ``detect_stiffness`` it pauses where a method for stiff systems, or an explicit method again, is
+        faster (:attr:`Integration.other_method_faster`). ``span`` s: approximate length of the run, for the
         resolution of events near time 0 (default: ``stop``). ``jumps``: maximum number of rows for both sides
         of the instants; 0: they are not recorded. Arguments are not checked.
         """

@@ -99,7 +99,7 @@ def tool_table(summary: MotionSummary) -> str:
     return (
         html_table("Position of the tool in the world", heads, rows)
         + f"<p>Path length {table_number(summary.tool_path_length, 5)} m, "
-        f"greatest speed {table_number(summary.tool_speed_peak)} m/s.</p>"
+        f"maximum speed {table_number(summary.tool_speed_peak)} m/s.</p>"
     )
 
 

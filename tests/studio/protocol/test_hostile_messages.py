@@ -180,10 +180,10 @@ def requests(document: str, robot: str) -> list[dict[str, Any]]:
     ]
 
 
-def spoilt(request: dict[str, Any]) -> Iterator[dict[str, Any]]:
+def with_hostile_values(request: dict[str, Any]) -> Iterator[dict[str, Any]]:
     """Yield variants of the request: one value, at any depth, is replaced by a hostile one or removed."""
 
-    def places(value: Any, path: tuple[Any, ...]) -> Iterator[tuple[Any, ...]]:
+    def value_paths(value: Any, path: tuple[Any, ...]) -> Iterator[tuple[Any, ...]]:
         if path:
             yield path
         members: Any = ()
@@ -192,9 +192,9 @@ def spoilt(request: dict[str, Any]) -> Iterator[dict[str, Any]]:
         elif isinstance(value, list):
             members = list(enumerate(value))[:1]  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
         for name, inner in members:
-            yield from places(inner, (*path, name))
+            yield from value_paths(inner, (*path, name))
 
-    for path in places(request, ()):
+    for path in value_paths(request, ()):
         if path == ("kind",):
             continue
         for hostile in HOSTILE:
@@ -249,17 +249,17 @@ def test_every_kind_of_message_answers_hostile_values_with_an_error(folder: Path
         robot = (await send({"kind": "open", "path": "arm.json"}))["value"][0]
         assert {request["kind"] for request in requests("", "")} == set(messages_of(Request))
         opening = {"kind": "open_shipped", "document_kind": "diagram", "name": "van_der_pol_pid"}
-        for place in range(len(requests("", ""))):
+        for index in range(len(requests("", ""))):
             document = (await send(opening))["value"]
-            request = requests(document, robot)[place]
+            request = requests(document, robot)[index]
             values = {"kind": "save_parameter_set", "name": "soft", "values": {"PID.P": 1.0}}
             await send({"kind": "change", "document": document, "edit": values})
-            await send({"kind": "save", "document": document, "path": f"{place}.json"})
+            await send({"kind": "save", "document": document, "path": f"{index}.json"})
             fault = (await send(request))["fault"]
             nothing_to = ("scene", "pose", "robot_of_block", "undo", "redo")
             if document in request.values() and request["kind"] not in nothing_to:
                 assert fault is None, fault
-            for bad in spoilt(request):
+            for bad in with_hostile_values(request):
                 fault = (await send(bad))["fault"]
                 if fault is not None:
                     assert fault["what"], bad

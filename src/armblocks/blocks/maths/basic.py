@@ -42,7 +42,7 @@ class Gain(Block):
     outline: ClassVar[Outline] = Outline.TRIANGLE
     broadcast_parameters: ClassVar[tuple[str, ...]] = ("gain",)
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="Half the sine.",
+        shows="The output is half of the sine.",
         parameters={"gain": 0.5},
         inputs={"u": driver("SineWave")},
     )

@@ -152,7 +152,7 @@ KINEMATICS: tuple[Column[Link], ...] = (
     Column(
         name="speed",
         title="speed",
-        doc="greatest joint speed; empty if unknown",
+        doc="maximum joint speed; empty if unknown",
         quantity=Quantity.RATE,
         unit="rad/s, m/s",
         optional=True,
@@ -164,7 +164,7 @@ KINEMATICS: tuple[Column[Link], ...] = (
     Column(
         name="torque",
         title="torque",
-        doc="greatest torque (force) at the joint, after the gear; empty if unknown",
+        doc="maximum torque (force) at the joint, after the gear; empty if unknown",
         unit="N m",
         optional=True,
         group="Greatest",

@@ -15,11 +15,11 @@ from armblocks.spatial import Transform
 from armblocks.studio.protocol.messages.robots import Readings
 
 SINGULAR = 1e-6
-"""Ratio of smallest to greatest singular value below which the arm is called singular."""
+"""Ratio of the minimum to the maximum singular value below which the arm is called singular."""
 NEARLY = 0.02
 """Ratio below which joint speeds exceed fifty times the tool speed."""
 _NAMED_FRACTION = 0.1
-"""Fraction of the greatest entry above which a joint or a direction is named."""
+"""Fraction of the largest entry above which a joint or a direction is named."""
 
 
 def readings(arm: Arm, q: Sequence[float], qd: Sequence[float], qdd: Sequence[float]) -> Readings:
