@@ -88,7 +88,8 @@ class EventSearch:
         f, r, workspace = self.frame, self.frame.r, self.frame.workspace
         end = f.new_time.value
         limit = r.real(end)
-        """The end of the search: the end of the step, or the earliest time at which a guard has fired."""
+        """The latest end of the present window: the end of the step, or the first time after the start of
+        the window at which a guard is known to fire."""
         low.value = time
         next_length = f.reals.after(Scalar.WINDOW)
         unknown = next_length[0] == float("inf")
@@ -99,7 +100,7 @@ class EventSearch:
             a = low.value
             middle = fma(0.5, length.value, a)
             reached = a + length.value
-            # The window takes the rest of the search if that is shorter than half a window, or if rounding
+            # The window extends to the limit if the rest is shorter than half a window, or if rounding
             # makes the middle of the window equal to one of its ends.
             whole = fma(0.5, length.value, reached) >= limit.value
             apart = (middle > a) & (middle < reached)
@@ -134,9 +135,10 @@ class EventSearch:
             r.call(self.functions.store_signs, f.reals, r.constant_boolean(False))
             f.copy(workspace.guards, workspace.guards_before, self.guards)
             low.value = reached
+            limit.value = end
             next_length[0] = 2.0 * next_length[0]
             length.value = next_length[0]
-            window.again_unless(reached >= limit.value)
+            window.again_unless(reached >= end)
 
     def count_fired_at(self, instant: Real, time: Real, h: Real) -> Integer:
         """The number of guards that have fired at a time within the step."""
