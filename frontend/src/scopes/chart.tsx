@@ -1,5 +1,5 @@
 import { ActionIcon, Menu } from '@mantine/core'
-import { IconArrowsVertical, IconDownload } from '@tabler/icons-react'
+import { IconArrowsVertical, IconAspectRatio, IconDownload } from '@tabler/icons-react'
 import { useRef, useState } from 'react'
 import { useMenuHandlers, openMenu, type Entries } from '../context_menu_state'
 import { useRuns } from '../run/runs'
@@ -11,8 +11,8 @@ import { Plot, type PlotHandle } from './plot'
 import type { Values } from './plot_gestures'
 import { useUnits } from './quantity'
 import type { Trace } from '../model/trace'
-import { toggleCursors, useWindow } from './window'
-import { XyPlot } from './xy_plot'
+import { toggleCursors, useWindow, visibleTimes } from './window'
+import { equalAxes, XyPlot } from './xy_plot'
 
 /** Number of letters of a name that the legend always shows. */
 const SHORT_NAME = 8
@@ -61,39 +61,38 @@ export function Chart({
   const { hidden, toggle, values, setValues } = shared ?? own
   const hasMeasures = useWindow((s) => s.measuring || s.cursors !== null) && !isXy
   const handle = useRef<PlotHandle>(null)
-  const { stem, names } = shortened(traces)
+  const { axesMayBeEqual, equal, setEqual } = useEqualAxes(traces)
+  const exports = () =>
+    exportEntries(
+      title,
+      traces,
+      traces.filter(({ key }) => !hidden.has(key)),
+      isXy,
+      () => handle.current?.figure(),
+    )
   const menus = useMenuHandlers((at) =>
     openMenu(title, at, [
-      { title: 'Show all values', enabled: values !== null, run: () => setValues(null) },
+      ...(isXy
+        ? [{ title: 'Equal axes', checked: equal, enabled: axesMayBeEqual, run: () => setEqual(!equal) }]
+        : [{ title: 'Show all values', enabled: values !== null, run: () => setValues(null) }]),
       ...(isXy ? [] : [...plotEntries(), ...traceEntries(traces, hidden, toggle)]),
       ...(view ? blockEntry(view) : []),
       null,
-      ...exportEntries(title, traces, () => handle.current?.figure()),
+      ...exports(),
     ]),
   )
   return (
     <figure className={hasMeasures ? 'chart measured' : 'chart'} data-view={view} {...menus}>
       <figcaption>
         <b>{title}</b>
-        <span className="legend">
-          {!isXy && stem && <span className="stem">{stem}</span>}
-          {!isXy &&
-            traces.map((trace, k) => (
-              <LegendEntry
-                key={trace.key}
-                trace={trace}
-                name={names[k]!}
-                hidden={hidden.has(trace.key)}
-                toggle={() => toggle(trace.key)}
-              />
-            ))}
-        </span>
+        <span className="legend">{!isXy && <Legend traces={traces} hidden={hidden} toggle={toggle} />}</span>
         {values && <ShowAllValues title={title} show={() => setValues(null)} />}
-        <Exports title={title} traces={traces} figure={() => handle.current?.figure()} />
+        {isXy && axesMayBeEqual && <EqualAxes equal={equal} title={title} set={setEqual} />}
+        <Exports title={title} entries={exports} />
       </figcaption>
       <div className="with-measures">
         {isXy ? (
-          <XyPlot traces={traces} title={title} handle={handle} />
+          <XyPlot traces={traces} title={title} equal={equal} handle={handle} />
         ) : (
           <Plot
             traces={traces}
@@ -126,6 +125,38 @@ function ShowAllValues({ title, show }: { title: string; show: () => void }) {
     >
       <IconArrowsVertical size={13} />
     </ActionIcon>
+  )
+}
+
+/** Whether both axes of an XY graph have the same scale: initially, if the signals have the same unit. */
+function useEqualAxes(traces: Trace[]) {
+  const { possible, usual } = equalAxes(traces)
+  const [chosen, setEqual] = useState<boolean | null>(null)
+  return { axesMayBeEqual: possible, equal: possible && (chosen ?? usual), setEqual }
+}
+
+interface LegendProps {
+  traces: Trace[]
+  hidden: ReadonlySet<string>
+  toggle: (key: string) => void
+}
+
+/** The names of the traces, after that of their common signal. */
+function Legend({ traces, hidden, toggle }: LegendProps) {
+  const { stem, names } = shortened(traces)
+  return (
+    <>
+      {stem && <span className="stem">{stem}</span>}
+      {traces.map((trace, k) => (
+        <LegendEntry
+          key={trace.key}
+          trace={trace}
+          name={names[k]!}
+          hidden={hidden.has(trace.key)}
+          toggle={() => toggle(trace.key)}
+        />
+      ))}
+    </>
   )
 }
 
@@ -163,13 +194,26 @@ function LegendEntry({ trace: { label, tone, dash }, name, hidden, toggle }: Leg
   )
 }
 
-interface ExportsProps {
-  title: string
-  traces: Trace[]
-  figure: () => ReturnType<PlotHandle['figure']> | undefined
+/** The button that gives both axes of an XY graph the same scale. */
+function EqualAxes({ equal, title, set }: { equal: boolean; title: string; set: (equal: boolean) => void }) {
+  return (
+    <ActionIcon
+      className="all-values"
+      variant={equal ? 'light' : 'subtle'}
+      color={equal ? 'accent' : 'gray'}
+      size="xs"
+      aria-label={`Equal axes of ${title}`}
+      aria-pressed={equal}
+      title={equal ? 'Fill the panel' : 'Same scale for both axes'}
+      onClick={() => set(!equal)}
+    >
+      <IconAspectRatio size={13} />
+    </ActionIcon>
+  )
 }
 
-function Exports({ title, traces, figure }: ExportsProps) {
+function Exports({ title, entries }: { title: string; entries: () => Action[] }) {
+  useWindow((s) => s.range !== null)
   return (
     <Menu position="bottom-end" shadow="md">
       <Menu.Target>
@@ -178,7 +222,7 @@ function Exports({ title, traces, figure }: ExportsProps) {
         </ActionIcon>
       </Menu.Target>
       <Menu.Dropdown>
-        {exportEntries(title, traces, figure).map(({ title: entryTitle, run }) => (
+        {entries().map(({ title: entryTitle, run }) => (
           <Menu.Item key={entryTitle} onClick={run}>
             {entryTitle}
           </Menu.Item>
@@ -188,18 +232,36 @@ function Exports({ title, traces, figure }: ExportsProps) {
   )
 }
 
-/** The ways to save a chart. */
-function exportEntries(title: string, traces: Trace[], figure: ExportsProps['figure']) {
+interface Action {
+  title: string
+  run: () => void
+}
+
+/** The ways to save a chart: all samples, those that are shown, and the picture that is shown. */
+function exportEntries(
+  title: string,
+  traces: Trace[],
+  shown: Trace[],
+  isXy: boolean,
+  figure: () => Figure | undefined,
+): Action[] {
   const stride = useRuns.getState().runs.at(-1)?.stride ?? 1
   const withFigure = (save: (figure: Figure) => void) => () => {
     const now = figure()
     if (now) save(now)
   }
+  const rows = stride > 1 ? `xtremes of every ${stride} samples` : ''
+  const isPart = !isXy && (useWindow.getState().range !== null || shown.length < traces.length)
   return [
-    {
-      title: stride > 1 ? `Extremes of every ${stride} samples as CSV` : 'Samples as CSV',
-      run: () => saveCsv(title, traces),
-    },
+    { title: `${rows ? `E${rows}` : 'Samples'} as CSV`, run: () => saveCsv(title, traces) },
+    ...(isPart
+      ? [
+          {
+            title: `Shown ${rows ? `e${rows}` : 'samples'} as CSV`,
+            run: () => saveCsv(title, shown, visibleTimes()),
+          },
+        ]
+      : []),
     { title: 'Picture as PNG', run: withFigure((now) => void savePng(now)) },
     { title: 'Picture as SVG', run: withFigure(saveSvg) },
   ]

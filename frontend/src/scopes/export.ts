@@ -1,4 +1,5 @@
 import { paint, svgOf, type Figure } from './figure'
+import { firstAfter, firstNotBefore } from '../model/time_index'
 import type { Trace } from '../model/trace'
 
 const PNG_SCALE = 2
@@ -28,22 +29,24 @@ export async function savePng(figure: Figure): Promise<void> {
 const quoted = (text: string) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text)
 
 /**
- * Every recorded sample of the traces, in SI units; traces of another run have a separate time column.
+ * The recorded samples of the traces, in SI units, all of them or those of a range of times; traces of
+ * another run have a separate time column.
  */
-export function csvOf(traces: Trace[]): string {
+export function csvOf(traces: Trace[], range: [number, number] = [-Infinity, Infinity]): string {
   const columns: { name: string; values: Float64Array }[] = []
   let previousTime: Float64Array | undefined
   for (const { label, unit, read } of traces) {
     const samples = read()
     if (!samples) continue
+    const [begin, end] = [firstNotBefore(samples.time, range[0]), firstAfter(samples.time, range[1])]
     if (
       !previousTime ||
       previousTime.length !== samples.time.length ||
       previousTime.buffer !== samples.time.buffer
     )
-      columns.push({ name: 'time [s]', values: samples.time })
+      columns.push({ name: 'time [s]', values: samples.time.subarray(begin, end) })
     previousTime = samples.time
-    columns.push({ name: unit ? `${label} [${unit}]` : label, values: samples.values })
+    columns.push({ name: unit ? `${label} [${unit}]` : label, values: samples.values.subarray(begin, end) })
   }
   const rows = Math.max(0, ...columns.map(({ values }) => values.length))
   const lines = [columns.map(({ name }) => quoted(name)).join(',')]
@@ -52,6 +55,6 @@ export function csvOf(traces: Trace[]): string {
   return `${lines.join('\n')}\n`
 }
 
-export function saveCsv(name: string, traces: Trace[]): void {
-  download(`${name || 'plot'}.csv`, new Blob([csvOf(traces)], { type: 'text/csv' }))
+export function saveCsv(name: string, traces: Trace[], range?: [number, number]): void {
+  download(`${name || 'plot'}.csv`, new Blob([csvOf(traces, range)], { type: 'text/csv' }))
 }

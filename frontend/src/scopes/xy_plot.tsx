@@ -13,15 +13,21 @@ import type { Trace } from '../model/trace'
 const MAX_POINTS = 20_000
 
 /** The second trace over the first, with a mark at the displayed time. */
-function figureOf([xTrace, yTrace]: Trace[], title: string, width: number, height: number): Figure {
+function figureOf(
+  [xTrace, yTrace]: Trace[],
+  title: string,
+  width: number,
+  height: number,
+  equal: boolean,
+): Figure {
   const x = xTrace?.read()?.values ?? new Float64Array(0)
   const y = yTrace?.read()?.values ?? new Float64Array(0)
   const largest = (values: Float64Array) =>
     values.reduce((greatest, value) => Math.max(greatest, Math.abs(value)), 0)
-  const equal = Boolean(xTrace?.unit) && xTrace?.unit === yTrace?.unit
-  const commonLargest = Math.max(largest(x), largest(y))
-  const readX = displayUnit(xTrace?.unit ?? '', equal ? commonLargest : largest(x))
-  const readY = displayUnit(yTrace?.unit ?? '', equal ? commonLargest : largest(y))
+  // Signals of the same unit have the same prefix, so that equal axes have equal scales.
+  const commonLargest = xTrace?.unit === yTrace?.unit ? Math.max(largest(x), largest(y)) : undefined
+  const readX = displayUnit(xTrace?.unit ?? '', commonLargest ?? largest(x))
+  const readY = displayUnit(yTrace?.unit ?? '', commonLargest ?? largest(y))
   // For a long run every k-th point and the last one are drawn.
   const stride = Math.max(1, Math.ceil(x.length / MAX_POINTS))
   const count = Math.ceil(x.length / stride)
@@ -56,13 +62,22 @@ function figureOf([xTrace, yTrace]: Trace[], title: string, width: number, heigh
   }
 }
 
+/** Whether the axes of two signals can have the same scale, and whether they initially have it. */
+export function equalAxes([x, y]: Trace[]): { possible: boolean; usual: boolean } {
+  const possible = x?.unit === y?.unit
+  return { possible, usual: possible && Boolean(x?.unit) }
+}
+
 export function XyPlot({
   traces,
   title,
+  equal,
   handle,
 }: {
   traces: Trace[]
   title: string
+  /** Whether both axes have the same scale. */
+  equal: boolean
   handle: React.RefObject<PlotHandle | null>
 }) {
   const canvas = useRef<HTMLCanvasElement>(null)
@@ -84,17 +99,17 @@ export function XyPlot({
       drawnState = state
       element.width = width * devicePixelRatio
       element.height = height * devicePixelRatio
-      paint(figureOf(traces, '', width, height), element, devicePixelRatio)
+      paint(figureOf(traces, '', width, height, equal), element, devicePixelRatio)
     }
     const unsubscribe = onFrame(frame)
     const observer = new ResizeObserver(scheduleFrame)
     observer.observe(container)
-    handle.current = { figure: () => figureOf(traces, title, 520, 480) }
+    handle.current = { figure: () => figureOf(traces, title, 520, 480, equal) }
     return () => {
       unsubscribe()
       observer.disconnect()
     }
-  }, [traces, title, scheme, handle])
+  }, [traces, title, scheme, handle, equal])
   return (
     <div
       className="plot xy"

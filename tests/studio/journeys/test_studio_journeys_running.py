@@ -304,6 +304,17 @@ def test_scope_exports_contain_all_samples_and_jumps(opened: Opened) -> None:
     picture = ElementTree.fromstring(saved(page, "scope", "Picture as SVG"))
     assert {"scope", "gain", "lag", "Time, s"} <= {text.text for text in picture.iter() if text.text}
     assert saved(page, "scope", "Picture as PNG").startswith(b"\x89PNG")
+    # After a zoom, and with a hidden trace, the part that is shown can be saved.
+    page.get_by_role("button", name="Zoom in (wheel)").click()
+    page.get_by_role("button", name="gain", exact=True).click()
+    rows = list(csv.reader(io.StringIO(saved(page, "scope", "Shown samples as CSV").decode())))
+    assert rows[0] == ["time [s]", "lag"]
+    np.testing.assert_array_equal(np.array(rows[1:], dtype=float), expected[expected[:, 0] >= 5.0][:, [0, 2]])
+    picture = ElementTree.fromstring(saved(page, "scope", "Picture as SVG"))
+    texts = {text.text for text in picture.iter() if text.text}
+    assert "gain" not in texts
+    assert "0" not in texts, "the time axis begins at 5 s"
+    page.get_by_role("button", name="Show the whole run").click()
 
 
 def test_a_click_logs_a_wire_and_pins_its_value(opened: Opened) -> None:
