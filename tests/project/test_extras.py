@@ -94,7 +94,9 @@ def test_the_core_runs_without_the_extras_and_names_missing_libraries(tmp_path: 
     assert completed.returncode == 2, completed.stderr
     assert "the library 'starlette' is not installed; it is needed for the studio" in completed.stderr
     assert 'pip install "armblocks[studio]"' in completed.stderr
-    assert 'for PNG figures and Parquet, too: pip install "armblocks[figures,data]"' in completed.stdout
+    assert (
+        'To write PNG figures and Parquet as well: pip install "armblocks[figures,data]"' in completed.stdout
+    )
     written = {path.name for path in (tmp_path / "report").iterdir()}
     assert written == {"report.html", "diagram.svg", "data.csv", "figures"}
     assert {path.suffix for path in (tmp_path / "report" / "figures").iterdir()} == {".svg"}

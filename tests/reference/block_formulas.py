@@ -188,7 +188,10 @@ def broken_formulas(diagram: Diagram, actual: Any, t: np.ndarray) -> dict[str, t
 def contradictions(
     formula: Formula, block: Block, inputs: Inputs, t: np.ndarray, y: np.ndarray
 ) -> tuple[int, float, float] | None:
-    """Return the first row whose output no input within ``BORDER`` of the recorded one gives."""
+    """Return the first row whose output contradicts the formula for all inputs near the recorded ones.
+
+    Inputs are near if they differ by at most ``BORDER``.
+    """
     rank = y.ndim
     wide = {name: _spread(value, rank) for name, value in inputs.items()}
     t = t.reshape((-1,) + (1,) * (rank - 1))

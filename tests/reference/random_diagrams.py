@@ -109,7 +109,7 @@ def built(nodes: Sequence[Node], name: str) -> Diagram:
     return builder.build()
 
 
-class Maker:
+class RecipeGenerator:
     """Generates one diagram from a seed."""
 
     def __init__(self, seed: int, size: int = 10) -> None:
@@ -123,24 +123,25 @@ class Maker:
         return Recipe(nodes, float(self.random.choice([1.0, 2.0, 3.0])))
 
     def level(
-        self, size: int, depth: int, sources: Sequence[Signal] = (), calm: bool = False
+        self, size: int, depth: int, sources: Sequence[Signal] = (), for_trigger: bool = False
     ) -> tuple[Node, ...]:
-        """Generate the nodes of one level. ``calm``: only blocks that a triggered subsystem may have."""
+        """Generate the nodes of one level. ``for_trigger``: only blocks that a triggered
+        subsystem may have."""
         self_nodes: list[Node] = []
         signals = list(sources)
-        loops = [] if calm or self.random.random() < 0.4 else self.begin_feedback(self_nodes, signals)
+        loops = [] if for_trigger or self.random.random() < 0.4 else self.begin_feedback(self_nodes, signals)
         if not sources:
             for _ in range(int(self.random.integers(1, 4))):
                 self.add(self_nodes, signals, *self.source())
         for _ in range(size):
             if depth < 2 and self.random.random() < 0.1 and len(signals) > 1:
                 self.subsystem(self_nodes, signals, depth)
-            elif not calm and self.random.random() < 0.02:
+            elif not for_trigger and self.random.random() < 0.02:
                 self.ball(self_nodes, signals)
             elif self.random.random() < 0.05:
                 self.comparison(self_nodes, signals)
             else:
-                self.block(self_nodes, signals, calm)
+                self.block(self_nodes, signals, for_trigger)
         return self.end_feedback(self_nodes, signals, loops)
 
     # -- parts ---------------------------------------------------------------------------------------------
@@ -246,13 +247,13 @@ class Maker:
     def period(self) -> Any:
         return PERIODS[int(self.random.integers(len(PERIODS)))]
 
-    def block(self, nodes: list[Node], signals: list[Signal], calm: bool) -> None:
+    def block(self, nodes: list[Node], signals: list[Signal], for_trigger: bool) -> None:
         """Add a random block with existing signals as inputs."""
         r = self.random
         for _ in range(20):
             draw = r.random()
             if draw < 0.12:
-                if not calm and self.add(nodes, signals, *self.source()):
+                if not for_trigger and self.add(nodes, signals, *self.source()):
                     return
                 continue
             pool = list(BLOCKS)
@@ -265,7 +266,7 @@ class Maker:
                 continue
             kind = BLOCKS[name]
             parameters = self.parameters(name)
-            if calm and kind.sampled:
+            if for_trigger and kind.sampled:
                 parameters["sample_time"] = -1.0
             node = Node("trial", name, parameters)
             try:
@@ -274,24 +275,29 @@ class Maker:
                 continue
             if not block.input_ports():
                 continue
-            inputs = self.feeds(block, signals)
+            inputs = self.input_signals(block, signals)
             if inputs is None or (
-                calm
+                for_trigger
                 and (
                     block.states({p: s.shape for p, s in inputs.items()})
                     or block.delay_lines({p: s.shape for p, s in inputs.items()})
                 )
             ):
                 continue
-            if kind.sampled and not calm and all(s.steady for s in inputs.values()) and r.random() < 0.3:
+            if (
+                kind.sampled
+                and not for_trigger
+                and all(s.steady for s in inputs.values())
+                and r.random() < 0.3
+            ):
                 parameters["sample_time"] = -1.0
             before = len(nodes)
             if self.add(nodes, signals, name, parameters, inputs):
-                if parameters.get("sample_time") == -1.0 and not calm and not _accepted(nodes):
+                if parameters.get("sample_time") == -1.0 and not for_trigger and not _accepted(nodes):
                     nodes[before] = replace(nodes[before], parameters={**parameters, "sample_time": 0.1})
                 return
 
-    def feeds(self, block: Block, signals: Sequence[Signal]) -> dict[str, Signal] | None:
+    def input_signals(self, block: Block, signals: Sequence[Signal]) -> dict[str, Signal] | None:
         """Return signals whose shapes the block accepts."""
         ports = block.input_ports()
         for attempt in range(6):
@@ -373,11 +379,11 @@ class Maker:
         )
         kind = str(r.choice(kinds))
         fed = [scalars[int(r.integers(len(scalars)))] for _ in range(int(r.integers(1, 3)))]
-        calm = "Triggered" in kind
+        for_trigger = "Triggered" in kind
         if kind == "branches":
             self.branches(nodes, signals, scalars, fed, depth)
             return
-        inside = self.inside(fed, depth, calm)
+        inside = self.inside(fed, depth, for_trigger)
         if inside is None:
             return
         parameters: dict[str, Any] = {}
@@ -397,20 +403,20 @@ class Maker:
             ports[port] = control
             control = scalars[int(r.integers(len(scalars)))]
         if self.add(nodes, signals, kind, parameters, ports, inside):
-            self.watch(nodes, signals)
+            self.add_event_block(nodes, signals)
 
-    def watch(self, nodes: list[Node], signals: list[Signal]) -> None:
+    def add_event_block(self, nodes: list[Node], signals: list[Signal]) -> None:
         """Add a block with an event after the latest signal, which must not react to intermediate values."""
-        r, watched = self.random, signals[-1]
-        if watched.shape == () and r.random() < 0.7:
+        r, latest_signal = self.random, signals[-1]
+        if latest_signal.shape == () and r.random() < 0.7:
             kind, limit = (("HitCrossing", "offset"), ("Relay", "on_point"))[int(r.integers(2))]
-            self.add(nodes, signals, kind, {limit: float(r.uniform(-1.0, 1.5))}, {"u": watched})
+            self.add(nodes, signals, kind, {limit: float(r.uniform(-1.0, 1.5))}, {"u": latest_signal})
 
-    def inside(self, fed: Sequence[Signal], depth: int, calm: bool) -> tuple[Node, ...] | None:
+    def inside(self, fed: Sequence[Signal], depth: int, for_trigger: bool) -> tuple[Node, ...] | None:
         """Return In blocks, some other blocks, and one or two Out blocks."""
         entries = [Node(f"in{k}", "Inport") for k in range(len(fed))]
         sources = [Signal(f"in{k}/y", s.shape, False) for k, s in enumerate(fed)]
-        inner = self.level(int(self.random.integers(1, 4)), depth + 1, sources, calm)
+        inner = self.level(int(self.random.integers(1, 4)), depth + 1, sources, for_trigger)
         if not inner:
             return None
         ends: list[Node] = []
@@ -456,7 +462,7 @@ class Maker:
                 return
             merged[f"u{number}"] = signals.pop()
         if self.add(nodes, signals, "Merge", {"initial": limit}, merged):
-            self.watch(nodes, signals)
+            self.add_event_block(nodes, signals)
 
     def ball(self, nodes: list[Node], signals: list[Signal]) -> None:
         """Add a ball that falls from a height, at once or later, and bounces until it rests."""
@@ -551,7 +557,7 @@ def random_recipe(seed: int, size: int = 10) -> Recipe:
     """Generate the diagram of a seed; a refused diagram is replaced by that of the next number."""
     for number in range(100):
         try:
-            recipe = Maker(1000 * seed + number, size).recipe()
+            recipe = RecipeGenerator(1000 * seed + number, size).recipe()
             recipe.diagram()
         except ArmblocksError:
             continue

@@ -126,8 +126,8 @@ class ReferenceRun:
         h = end - self.t
         h = h if h < 1.5 * self.longest else self.longest
         self.longest = min(self.step, 2.0 * self.longest)
-        calm = self.stepped(x, h, latest)
-        if not calm:
+        modes_hold = self.stepped(x, h, latest)
+        if not modes_hold:
             low, high = 0.0, h
             while (
                 high - low > 1e-14 * max(1.0, self.t)
@@ -143,7 +143,7 @@ class ReferenceRun:
             network.record_delays(self.thirds(x, h), self.t, h)
         target = end if h >= end - self.t else self.t + h
         self.t = target
-        if calm:
+        if modes_hold:
             network.evaluate(min(self.t, latest), frozen=True, flowing=True)
             network.take_signs()
             return
@@ -162,28 +162,28 @@ class ReferenceRun:
         Unless the ``whole`` step is needed, it ends at the first stage with inconsistent modes.
         """
         network, t = self.network, self.t
-        calm = True
+        modes_hold = True
 
         def rate(offset: float, change: np.ndarray | float) -> np.ndarray:
-            nonlocal calm
+            nonlocal modes_hold
             network.x[:] = start + change
             derivative = network.derivative(min(t + offset, latest))
-            calm = calm and (offset == 0.0 or not network.modes_differ())
+            modes_hold = modes_hold and (offset == 0.0 or not network.modes_differ())
             return derivative
 
         # The right limit: a signal may differ at the instant itself, as the height does at a bounce.
         a = rate(0.0, min(h, RIGHT_LIMIT) * rate(0.0, 0.0))
         b = rate(h / 2, h / 2 * a)
-        if not (calm or whole):
+        if not (modes_hold or whole):
             return False
         c = rate(h / 2, h / 2 * b)
         d = rate(h, h * c)
-        if not (calm or whole):
+        if not (modes_hold or whole):
             return False
         network.x[:] = start + h / 6 * (a + 2 * b + 2 * c + d)
         self.slopes = a, d
         network.evaluate(min(t + h, latest), frozen=True, flowing=True)
-        return calm and not network.modes_differ() and not network.fired()
+        return modes_hold and not network.modes_differ() and not network.fired()
 
     def thirds(self, start: np.ndarray, h: float) -> dict[float, np.ndarray]:
         """Return the states at 0, 1/3, 2/3 and 1 of the last step by cubic Hermite interpolation."""

@@ -147,4 +147,4 @@ def print_files(files: ReportFiles, console: Console) -> None:
     ]
     if absent:
         kinds, extras = " and ".join(kind for kind, _ in absent), ",".join(extra for _, extra in absent)
-        console.print(f'for {kinds}, too: pip install "armblocks[{extras}]"', soft_wrap=True)
+        console.print(f'To write {kinds} as well: pip install "armblocks[{extras}]"', soft_wrap=True)

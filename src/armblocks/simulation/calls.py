@@ -120,15 +120,15 @@ class Calls:
     def _call(self, function: CalledFunction, time: float, inputs: Mapping[str, Any]) -> Mapping[str, Array]:
         """The flat results of one function. Raises ``SimulationError`` if it fails."""
         where = f"block '{function.block}' at t = {time:.9g} s"
-        began = perf_counter()
+        start = perf_counter()
         try:
-            given = function.call(time, inputs)
+            results = function.call(time, inputs)
         except ArmblocksError as error:
             raise SimulationError(error.what, where=where, allowed=error.allowed, fix=error.fix) from error
-        self.seconds += perf_counter() - began
+        self.seconds += perf_counter() - start
         self.count += 1
-        found: dict[str, Array] = {}
-        for port, value in given.items():
+        flat_results: dict[str, Array] = {}
+        for port, value in results.items():
             shape = function.outputs[port][1]
             array = np.asarray(value, dtype=np.float64)
             if array.shape != shape or not np.isfinite(array).all():
@@ -138,8 +138,8 @@ class Calls:
                     allowed=f"finite numbers of shape {shape}",
                     fix="correct the function, or declare the shapes of its results",
                 )
-            found[port] = array.ravel()
-        return found
+            flat_results[port] = array.ravel()
+        return flat_results
 
 
 def _input_value(values: Array, shape: Shape) -> Any:

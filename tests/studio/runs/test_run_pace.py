@@ -90,7 +90,9 @@ def lag() -> ab.Diagram:
     return builder.build()
 
 
-def ran(monkeypatch: pytest.MonkeyPatch, speed: float, *commands: tuple[float, run_messages.Message]) -> Pipe:
+def completed_run(
+    monkeypatch: pytest.MonkeyPatch, speed: float, *commands: tuple[float, run_messages.Message]
+) -> Pipe:
     clock = Clock()
     monkeypatch.setattr(run_worker, "perf_counter", clock)
     monkeypatch.setattr(run_worker, "Pace", partial(Pace, clock=clock))
@@ -105,7 +107,7 @@ def ran(monkeypatch: pytest.MonkeyPatch, speed: float, *commands: tuple[float, r
 def test_a_slow_run_is_never_ahead_of_the_clock(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    pipe = ran(monkeypatch, 0.5)
+    pipe = completed_run(monkeypatch, 0.5)
     shown = [event["real_time_factor"] for event in pipe.events if event["kind"] == "run_progress"]
     assert len(shown) > 1000
     assert max(shown) <= 0.5 + 1e-12
@@ -119,7 +121,7 @@ def test_a_tuned_value_applies_from_the_displayed_instant(
 ) -> None:
     tune = run_messages.Tune(run="r", values={"gain.gain": 2.0})
     pause, resume = (run_messages.Control(run="r", action=action) for action in ("pause", "resume"))
-    pipe = ran(monkeypatch, 1.0, (12.005, tune), (15.005, pause), (15.005, resume))
+    pipe = completed_run(monkeypatch, 1.0, (12.005, tune), (15.005, pause), (15.005, resume))
     (tuned,) = (event for event in pipe.events if event["kind"] == "run_tuned")
     (paused,) = (event for event in pipe.events if event.get("state") == "paused")
     assert 12.005 <= tuned["time"] < 12.03

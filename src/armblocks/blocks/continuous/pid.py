@@ -125,9 +125,9 @@ class PID(ContinuousPidBlock):
 
     This is the parallel form of Simulink's PID Controller; in the ideal form y = P (1 + I/s + D N s/(s + N))
     u. States: ``integral`` and ``filter`` (filter' = N (D u - filter)). With ``limit_output`` the output
-    stays between two limits; ``clamping`` then stops the integral while it would drive the output further
-    beyond a limit, and ``back_calculation`` adds Kb (y - unlimited y) to its rate. ``tracking`` adds Kt
-    (tracking - y) to it, for a bumpless transfer from another controller.
+    stays between two limits. ``clamping`` then stops an integral that would drive the output further beyond a
+    limit. ``back_calculation`` adds Kb (y - unlimited y) to the rate of the integral. ``tracking`` adds Kt
+    (tracking - y) to this rate, for a bumpless transfer from another controller.
     """
 
     title: ClassVar[str] = "PID Controller"

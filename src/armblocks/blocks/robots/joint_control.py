@@ -129,7 +129,7 @@ class ComputedTorque(Block):
 
     title: ClassVar[str] = "Computed Torque Controller"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows=("The arm starts with errors of 0.2 rad, which decay like a critically damped oscillation."),
+        shows=("The arm starts with errors of 0.2 rad, which decay with critical damping."),
         inputs={
             "qr": driver("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("q"),
             "qdr": driver("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("qd"),
