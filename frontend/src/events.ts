@@ -43,6 +43,7 @@ function withChange(document: OpenDocument, state: DocumentState, change: Change
     lines,
     notes: sheet.notes ?? document.notes,
     description: sheet.description ?? document.description,
+    outerComment: change.outer_comment,
     logged: sheet.logged ?? document.logged,
   }
 }
@@ -126,6 +127,7 @@ function diagramOpened({ state, in_front }: EventOf<'opened'>, content: ContentO
     inside,
     settings,
     ...sheet,
+    outerComment: content.outer_comment,
     findings: isShown ? document.findings : [],
     wireKinds: isShown ? document.wireKinds : {},
   }

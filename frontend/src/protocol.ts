@@ -885,6 +885,7 @@ export interface DiagramChange {
   settings: {
     [k: string]: boolean | number | string | null;
   };
+  outer_comment: OuterComment | null;
 }
 /**
  * The difference between two versions of a sheet.
@@ -970,6 +971,13 @@ export interface WireLines {
   label: string;
   name?: string;
   name_at?: [number, number, "start" | "middle"] | null;
+}
+/**
+ * The outermost commented subsystem that contains a sheet: its path, and its comment.
+ */
+export interface OuterComment {
+  path: string[];
+  comment: "out" | "through";
 }
 /**
  * A robot after a change: the complete content, because one cell may affect many others.
@@ -1101,6 +1109,7 @@ export interface DiagramContent {
     [k: string]: boolean | number | string | null;
   };
   run: string | null;
+  outer_comment: OuterComment | null;
 }
 /**
  * The complete drawing of a sheet.

@@ -10,6 +10,7 @@ import type {
   DocumentState,
   Fault,
   Finding,
+  OuterComment,
   Recovery,
   SheetBlock,
   SheetNote,
@@ -37,6 +38,8 @@ export interface OpenDocument {
   notes: Record<string, SheetNote>
   /** Path of the library block that contains the sheet; empty if the sheet is not in a library block. */
   linked: string[]
+  /** The commented subsystem that contains the sheet. */
+  outerComment: OuterComment | null
   link: string
   logged: string[]
   findings: Finding[]

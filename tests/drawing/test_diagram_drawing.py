@@ -304,3 +304,21 @@ def test_notes_are_drawn_line_by_line() -> None:
     builder.note("/1", Note(x=0, y=120, text="what it shows\nand why"))
     texts = {mark.text: mark for mark in text_marks(diagram_picture(builder.draft()))}
     assert texts["and why"].y - texts["what it shows"].y == 17
+
+
+def test_sheets_inside_commented_subsystems_are_grey() -> None:
+    builder = DiagramBuilder("outer")
+    builder.add("sub", Subsystem(diagram=feedback_loop()))
+    plain = builder.build()
+
+    def strokes(marks: Iterable[Mark]) -> Iterator[Tone | None]:
+        for mark in marks:
+            if isinstance(mark, Group):
+                yield from strokes(mark.marks)
+            elif isinstance(mark, Polyline | Curve):
+                yield mark.stroke
+
+    assert Tone.WIRE in set(strokes(diagram_picture(plain, sheet="sub").marks))
+    commented = ab.with_comments(plain, {"sub": "out"})
+    assert set(strokes(diagram_picture(commented, sheet="sub").marks)) <= {Tone.HAIRLINE, None}
+    assert "sheet sub, commented out" in diagram_picture(commented, sheet="sub").title

@@ -14,9 +14,11 @@ import {
 } from '@xyflow/react'
 import { useRef, useState } from 'react'
 import { showDialog } from '../dialogs'
+import type { Edit } from '../messages'
 import type { Places } from '../model/wires'
+import type { OuterComment } from '../protocol'
 import { WireValues } from '../run/wire_values'
-import { ask, change, openSheet, useStudio } from '../store'
+import { alteration, ask, change, openSheet, useStudio } from '../store'
 import { sheetKey } from '../documents/document_views'
 import { ArrangeBar } from './arrange_bar'
 import { BlockNode } from './block_node'
@@ -64,6 +66,7 @@ export function Canvas() {
         </Breadcrumbs>
       )}
       {document.linked.length > 0 && <LibraryNote link={document.link} linked={document.linked} />}
+      {document.outerComment && <CommentNote {...document.outerComment} />}
       <ReactFlowProvider key={sheetKey(state.document, inside)}>
         <Sheet sheetKey={sheetKey(state.document, inside)} />
       </ReactFlowProvider>
@@ -84,6 +87,27 @@ function LibraryNote({ link, linked }: { link: string; linked: string[] }) {
       </Anchor>
     </div>
   )
+}
+
+/** Notice that a sheet is inside a commented subsystem, with a button that removes the comment. */
+function CommentNote({ path, comment }: OuterComment) {
+  return (
+    <div className="library-note comment-note">
+      <span>
+        <b>{path.join(' › ')}</b> is commented {comment}: this sheet takes no part in the model.
+      </span>
+      <Anchor component="button" size="sm" onClick={() => void uncomment(path)}>
+        Uncomment
+      </Anchor>
+    </div>
+  )
+}
+
+async function uncomment(path: string[]): Promise<void> {
+  const { document } = useStudio.getState()
+  if (!document) return
+  const edit: Edit = { kind: 'comment', blocks: path.slice(-1), comment: '' }
+  await ask({ kind: 'change', ...alteration(document.state), inside: path.slice(0, -1), edit })
 }
 
 /** Break the library link of the block at this path, and reload the sheet. */

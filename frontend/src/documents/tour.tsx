@@ -24,6 +24,13 @@ const STOPS: Stop[] = [
       'it. A right click lists the commands, Ctrl+Shift+X comments blocks out.',
   },
   {
+    at: '.sheet',
+    title: 'A sheet that reads well',
+    text:
+      'A right click on a block chooses its colour and the side of its name; a double click on a wire ' +
+      'names its signal. While you drag a block, thin lines show its alignment with others.',
+  },
+  {
     at: '.palette',
     title: 'The library',
     text:
@@ -58,8 +65,8 @@ const STOPS: Stop[] = [
     at: '[aria-label="Menu"]',
     title: 'Next steps',
     text:
-      'New diagrams, files and examples are in this menu. Ctrl+K finds every command, Ctrl+F every ' +
-      'block, ? lists all keys.',
+      'New diagrams, files and examples are in this menu; Alt+PageDown shows the next open document. ' +
+      'Ctrl+K finds every command, Ctrl+F every block, ? lists all keys.',
   },
 ]
 

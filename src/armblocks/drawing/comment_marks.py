@@ -21,7 +21,7 @@ def commented_marks(marks: Sequence[Mark], box: Box, comment: str) -> list[Mark]
     A percent sign marks a block that is commented out. A block that is commented through shows the wires that
     replace it.
     """
-    grey = [_greyed(mark) for mark in marks]
+    grey = [greyed(mark) for mark in marks]
     if comment == "out":
         return [*grey, Text(box.x, box.y - 3, "%", NAME_SIZE, Tone.MUTED, bold=True)]
     inputs, outputs = ({port.name: port for port in ports} for ports in (box.inputs, box.outputs))
@@ -44,12 +44,13 @@ def _line(tone: Tone | None) -> Tone | None:
     return None if tone is None else Tone.HAIRLINE
 
 
-def _greyed(mark: Mark) -> Mark:
+def greyed(mark: Mark) -> Mark:
+    """A mark in the greys of commented blocks."""
     match mark:
         case Text():
             return replace(mark, tone=Tone.MUTED)
         case Group():
-            return replace(mark, marks=tuple(_greyed(inner) for inner in mark.marks))
+            return replace(mark, marks=tuple(greyed(inner) for inner in mark.marks))
         case Polyline() | Curve() | Rectangle() | Disc():
             return replace(mark, stroke=_line(mark.stroke), fill=_ground(mark.fill))
         case Raster():

@@ -31,7 +31,7 @@ from armblocks.drawing.block_boxes import (
     sized_box,
 )
 from armblocks.drawing.block_colours import coloured_marks
-from armblocks.drawing.comment_marks import COMMENT_WORDS, commented_marks
+from armblocks.drawing.comment_marks import COMMENT_WORDS, commented_marks, greyed
 from armblocks.drawing.diagram_layout import boxes
 from armblocks.drawing.face_marks import Room
 from armblocks.drawing.rates import Rates
@@ -62,9 +62,10 @@ def diagram_picture(
 ) -> Picture:
     """The drawing of a sheet; with a result, sinks show its data.
 
-    ``sheet``: the path of a subsystem to draw instead of the top level. An incomplete diagram, which cannot
-    be traced, has thin lines only. ``rates``: sampled blocks and their wires show their clocks, which a
-    legend names. Raises UnknownNameError for an unknown sheet, DiagramError for unknown rates.
+    ``sheet``: the path of a subsystem to draw instead of the top level. A sheet inside a commented subsystem
+    is grey. An incomplete diagram, which cannot be traced, has thin lines only. ``rates``: sampled blocks and
+    their wires show their clocks, which a legend names. Raises UnknownNameError for an unknown sheet,
+    DiagramError for unknown rates.
     """
     carried = _Carried.of(diagram)
     clocks = Rates.of(diagram) if rates else Rates()
@@ -84,27 +85,40 @@ def diagram_picture(
         marks += wire_marks(net, kind, _wire_title(source, wires[source]), tone)
     for name, box in placed.items():
         trend = _trend(path + name, carried.views.get(path + name), result)
-        comment = level.commented.get(name, "")
-        block = _block(box, trend, comment)
+        own_comment = level.commented.get(name, "")
+        block = _block(box, trend, own_comment)
         if (mark := clocks.mark(path + name)) is not None:
             corner = box.x + box.width, box.y - 4
             block.append(Text(*corner, mark[0], NAME_SIZE - 1.5, mark[1], "end", bold=True))
-        marks.append(Group(tuple(block), title=_block_title(name, box, comment)))
+        marks.append(Group(tuple(block), title=_block_title(name, box, own_comment)))
     for (source, _), wire_net, net in zip(wires.items(), nets, routed):
         marks += label_marks(wire_net, net, wire_label(level, source))
         marks += name_marks(level.signal_names.get(source, ""), net.paths, obstacles)
+    comment = _outer_comment(carried.levels, sheet)
+    if comment:
+        marks = [greyed(mark) for mark in marks]
     marks += _notes(level)
     left, top, right, bottom = _extent(placed, routed, level)
     picture = Picture(
         width=right - left + 2 * _MARGIN,
         height=bottom - top + 2 * _MARGIN,
-        title=f"Diagram {diagram.name}" + (f", sheet {sheet}" if sheet else ""),
+        title=", ".join(filter(None, (f"Diagram {diagram.name}", sheet and f"sheet {sheet}", comment))),
         description=_text_alternative(level),
     )
     drawn = Picture(width=0, height=0, title="", marks=marks)
     picture.place(drawn, _MARGIN - left, _MARGIN - top)
     clocks.add_legend(picture)
     return picture
+
+
+def _outer_comment(levels: Mapping[str, Diagram], sheet: str) -> str:
+    """The words for the outermost commented subsystem that contains a sheet; empty if there is none."""
+    level = ""
+    for name in sheet.split("/") if sheet else ():
+        if comment := levels[level].commented.get(name):
+            return COMMENT_WORDS[comment]
+        level = f"{level}/{name}" if level else name
+    return ""
 
 
 def sheets(diagram: Diagram) -> dict[str, tuple[str, ...]]:

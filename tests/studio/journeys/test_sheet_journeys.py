@@ -79,6 +79,22 @@ def test_a_user_drawn_route_follows_its_block_and_can_be_reset(sheet: Page) -> N
     expect(line).to_have_attribute("d", before or "")
 
 
+def test_the_sheet_inside_a_commented_subsystem_is_grey(sheet: Page) -> None:
+    select_block(sheet, "PID")
+    sheet.keyboard.press("Control+g")
+    select_block(sheet, "Subsystem")
+    sheet.keyboard.press("Control+Shift+X")
+    expect(block(sheet, "Subsystem")).to_have_accessible_name(re.compile("commented out$"))
+    sheet.keyboard.press("Enter")
+    notice = sheet.get_by_text("this sheet takes no part in the model")
+    expect(notice).to_contain_text("Subsystem is commented out")
+    outline = block(sheet, "PID").locator(".face .s-ink, .face .s-wire").first
+    grey = outline.evaluate("element => getComputedStyle(element).stroke")
+    sheet.get_by_role("button", name="Uncomment").click()
+    expect(notice).to_be_hidden()
+    assert outline.evaluate("element => getComputedStyle(element).stroke") != grey
+
+
 def test_blocks_are_commented_out_and_through_by_key(sheet: Page) -> None:
     select_block(sheet, "PID")
     sheet.keyboard.press("Control+Shift+X")

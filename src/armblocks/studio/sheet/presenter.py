@@ -21,7 +21,7 @@ from armblocks.studio.protocol.page import Page, Pages
 from armblocks.studio.sheet.lines import LinesOfSheets, changed_lines
 from armblocks.studio.sheet.nesting import inside, linked_part
 from armblocks.studio.sheet.open_documents import OpenDocument, OpenDocuments
-from armblocks.studio.sheet.shown import sheet, sheet_change
+from armblocks.studio.sheet.shown import outer_comment, sheet, sheet_change
 
 CHECK_DELAY_SECONDS = 0.15
 """Delay of the background check after the last edit, s."""
@@ -88,6 +88,7 @@ class DiagramPresenter(Presenter[OpenDocument]):
             sheet=drawn,
             settings=dataclasses.asdict(diagram.settings),
             run=self._runs.of(open_file.key),
+            outer_comment=outer_comment(diagram, place),
         )
 
     def change(self, open_file: OpenDocument, before: Diagram, place: Place) -> DiagramChange:
@@ -97,6 +98,7 @@ class DiagramPresenter(Presenter[OpenDocument]):
         return DiagramChange(
             sheet=sheet_change(old, new, changed_lines(lines.of(old), lines.of(new))),
             settings=dataclasses.asdict(diagram.settings),
+            outer_comment=outer_comment(diagram, place),
         )
 
     def shown(self, page: Page, open_file: OpenDocument, *, known: bool) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from types import MappingProxyType
 from typing import Any, Literal, cast
@@ -22,6 +22,7 @@ from armblocks.pictures.svg import svg_marks
 from armblocks.studio.protocol.messages.sheet_edits import Place, SheetNote, Wire
 from armblocks.studio.protocol.messages.sheets import (
     BlockType,
+    OuterComment,
     ParameterRule,
     Sheet,
     SheetBlock,
@@ -30,6 +31,7 @@ from armblocks.studio.protocol.messages.sheets import (
     WireLines,
 )
 from armblocks.studio.sheet.edits import DEFAULT_ROBOT
+from armblocks.studio.sheet.nesting import inside
 from armblocks.studio.sheet.parameter_values import parameter_json
 
 
@@ -74,6 +76,15 @@ def sheet_change(
         description=after.description if after.description != before.description else None,
         logged=[str(ref) for ref in after.logged] if after.logged != before.logged else None,
     )
+
+
+def outer_comment(diagram: Diagram, path: Sequence[str]) -> OuterComment | None:
+    """Return the outermost commented subsystem on the path of a sheet."""
+    for depth, name in enumerate(path):
+        comment = inside(diagram, path[:depth]).commented.get(name)
+        if comment == "out" or comment == "through":
+            return OuterComment(path=list(path[: depth + 1]), comment=comment)
+    return None
 
 
 @lru_cache(maxsize=1)

@@ -168,6 +168,13 @@ class BlockType(Message):
     parameters: list[ParameterRule]
 
 
+class OuterComment(Message):
+    """The outermost commented subsystem that contains a sheet: its path, and its comment."""
+
+    path: list[str]
+    comment: Literal["out", "through"]
+
+
 class DiagramContent(Content):
     """The displayed sheet of a diagram, and the run settings.
 
@@ -180,6 +187,7 @@ class DiagramContent(Content):
     sheet: Sheet
     settings: dict[str, bool | float | str | None]
     run: str | None
+    outer_comment: OuterComment | None
 
 
 class DiagramChange(ContentChange):
@@ -188,6 +196,7 @@ class DiagramChange(ContentChange):
     kind: Literal["diagram"] = "diagram"
     sheet: SheetChange
     settings: dict[str, bool | float | str | None]
+    outer_comment: OuterComment | None
 
 
 class ShowSheet(Request[None]):
