@@ -146,6 +146,11 @@ const COMMANDS: Command[] = [
   { title: 'Export the sheet as PNG', run: () => exportDrawing('png') },
   { title: 'Export the sheet as PDF', run: () => exportDrawing('pdf') },
   { title: 'Configuration parameters', keys: 'Ctrl+E', run: openConfiguration },
+  {
+    title: 'Trigger of the scopes, on or off',
+    enabled: hasRun,
+    run: () => void import('./scopes/trigger').then(({ toggleTrigger }) => toggleTrigger()),
+  },
   { title: 'Parameter sets: save, apply and compare', run: openParameterSets },
   { title: 'Take the tour', run: openTour },
   { title: 'All commands by name', keys: 'Ctrl+K', run: () => showDialog('commands') },

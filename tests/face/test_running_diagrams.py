@@ -116,6 +116,22 @@ def test_a_run_is_paused_tuned_and_continued() -> None:
     assert run.samples(run.recorded - 5)["x1"].shape == (5,)
 
 
+def test_parameters_that_limit_each_other_are_changed_together() -> None:
+    builder = ab.DiagramBuilder("limited", settings=SimulationOptions(stop_time=1.0))
+    source = builder.add("source", ab.blocks.Constant(value=10.0))
+    builder.add("limit", ab.blocks.Saturation(lower=0.0, upper=2.0), source)
+    run = ab.begin(builder.build())
+    run.advance(0.5, exactly=True)
+    with pytest.raises(DiagramError):
+        run.set("limit.lower", 3.0)
+    with pytest.raises(UnknownNameError):
+        run.set_all({"limit.lower": -1.0, "limit.uper": 4.0})
+    assert run.parameters["limit.lower"] == 0.0
+    run.set_all({"limit.lower": 3.0, "limit.upper": 4.0})
+    run.advance()
+    assert run.result()["limit"][-1] == 4.0
+
+
 def test_a_run_refuses_parameters_that_are_not_tunable() -> None:
     run = ab.begin("van_der_pol_pid", parameters={"PID.P": 3.0})
     assert run.parameters["PID.P"] == 3.0

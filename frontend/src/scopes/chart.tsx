@@ -11,6 +11,7 @@ import { Plot, type PlotHandle } from './plot'
 import type { Values } from './plot_gestures'
 import { useUnits } from './quantity'
 import type { Trace } from '../model/trace'
+import { toggleTrigger, useTrigger } from './trigger'
 import { toggleCursors, useWindow, visibleTimes } from './window'
 import { equalAxes, XyPlot } from './xy_plot'
 
@@ -277,6 +278,7 @@ function plotEntries(): Entries {
       enabled: range !== null,
       run: () => useWindow.setState({ range: null }),
     },
+    { title: 'Trigger', checked: useTrigger.getState().on, run: toggleTrigger },
     { title: 'Measuring cursors', checked: cursors !== null, run: toggleCursors },
     {
       title: 'Measures of the visible range',

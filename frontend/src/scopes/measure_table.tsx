@@ -115,12 +115,17 @@ function Row({
     0,
   )
   const { factor, unit } = displayUnit(trace.unit, largest)
+  // A long name is cut off before the entry, which distinguishes the rows of a vector.
+  const hasEntry = trace.entry !== '' && trace.label === `${trace.stem} ${trace.entry}`
   return (
     <tr>
       <th scope="row" title={trace.label}>
-        <i style={{ background: `var(--${trace.tone})` }} />
-        {trace.label}
-        {unit && <span className="unit"> {unit}</span>}
+        <span className="measured-trace">
+          <i style={{ background: `var(--${trace.tone})` }} />
+          <span className="name">{hasEntry ? trace.stem : trace.label}</span>
+          {hasEntry && <span>&nbsp;{trace.entry}</span>}
+          {unit && <span className="unit">&nbsp;{unit}</span>}
+        </span>
       </th>
       {(cursors ? [a, b, b - a] : [a]).map((value, k) => (
         <td key={k} data-label={cursors ? 'ABΔ'[k] : ''}>
