@@ -59,7 +59,7 @@ FIRST_AND_LAST = """() => new Promise((done) => {
     const from = performance.now()
     heard.length = 0
     let first = 0
-    const look = () => {
+    const check = () => {
         if (!first && heard.some((one) => one.kind === 'samples')) first = performance.now()
         const ended = heard.some(({ state }) => state === 'done' || state === 'failed')
         const came = () => heard.find((one) => one.kind === 'samples').at - from
@@ -382,7 +382,7 @@ def studio_part(repeats: int) -> list[str]:
     good = ended.count("done")
     rows.append(
         [
-            f"{SESSIONS} sessions on one server, each running: runs that ended well",
+            f"{SESSIONS} sessions on one server, each running: runs that ended without an error",
             f"{good}",
             "",
             f"{SESSIONS}",

@@ -41,8 +41,8 @@ def test_dc_motor_sampled_pid_equals_the_exact_recurrence() -> None:
         error = (100.0 if tick >= 20 else 0.0) - x[1]
         free = 0.6 * error + integral + 50.0 * (0.004 * error - filtered)
         v = min(max(free, -48.0), 48.0)
-        wound = free != v and (free - v) * error > 0
-        integral += 0.0 if wound else T * 4.0 * error
+        saturated = free != v and (free - v) * error > 0
+        integral += 0.0 if saturated else T * 4.0 * error
         filtered += T * 50.0 * (0.004 * error - filtered)
         x = (step @ [*x, v, 0.5 if tick >= 200 else 0.0])[:2]
     np.testing.assert_allclose(simulated["motor/w"][::5], speeds, rtol=0, atol=1e-7)
@@ -96,8 +96,8 @@ def surface_points(robot: Robot, gap: float) -> dict[int, np.ndarray]:
             short = sides.max(axis=1) <= longest
             rows.setdefault(body.row, []).append(np.round(corners[short].reshape(-1, 3) / CELL))
             # the others are halved at the middle of their longest side
-            turn = sides[~short].argmax(axis=1)
-            a, b, c = (corners[~short][np.arange(len(turn)), (turn + k) % 3] for k in range(3))
+            shifts = sides[~short].argmax(axis=1)
+            a, b, c = (corners[~short][np.arange(len(shifts)), (shifts + k) % 3] for k in range(3))
             middle = (a + b) / 2
             corners = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
     return {row: np.unique(np.concatenate(cubes), axis=0) * CELL for row, cubes in rows.items()}
@@ -131,24 +131,24 @@ def test_kr180_pick_and_place_has_no_collisions() -> None:
     x, y, z = (np.linspace(-half[0], half[0], 9), np.linspace(-half[1], half[1], 9), np.linspace(0, 0.4, 9))
     load = np.array(np.meshgrid(x, y, z)).reshape(3, -1).T
     carried = (t >= 2.7 - 1e-9) & (t <= 10.7 + 1e-9)
-    least = {}
+    minimum = {}
     for name, row, body, when in (
         *((cell.links[row - 1].name, row, body, np.full(len(t), True)) for row, body in arm.items()),
         ("load", len(cell.links) + 1, load, carried),
     ):
         R, p = poses[when][:, row, :3, :3], poses[when][:, row, :3, 3]
-        places = np.einsum("tij,kj->tki", R, body) + p[:, None]
-        moved = np.linalg.norm(np.diff(places, axis=0), axis=-1).max()
+        positions = np.einsum("tij,kj->tki", R, body) + p[:, None]
+        moved = np.linalg.norm(np.diff(positions, axis=0), axis=-1).max()
         margin = gap + moved / 2
         for obstacle, (centre, size) in boxes.items():
             if (name, obstacle) == ("link1", "pedestal") or (name == "load" and "pallet" in obstacle):
                 continue
-            clear = distance_to_box(places, centre, size).min()
-            least[name, obstacle] = clear
+            clear = distance_to_box(positions, centre, size).min()
+            minimum[name, obstacle] = clear
             assert clear > margin, f"{name} comes within {clear:.3f} m of the {obstacle}"
         if name != "load":
-            assert places[..., 2].min() > margin, f"{name} comes near the floor"
-    assert least["load", "wall"] < 1.0, "the wall is in the way of a straight path"
+            assert positions[..., 2].min() > margin, f"{name} comes near the floor"
+    assert minimum["load", "wall"] < 1.0, "the wall blocks the straight path"
 
 
 def test_kr180_pick_and_place_puts_the_load_on_the_pallet() -> None:
@@ -157,14 +157,14 @@ def test_kr180_pick_and_place_puts_the_load_on_the_pallet() -> None:
     cell, t = ab.load_robot("kr180_cell").robot, simulated.time
     tool = simulated["plot/poses"][:, -1]
     corners = np.array([[x, y, 0.4, 1.0] for x in (-0.25, 0.25) for y in (-0.25, 0.25)])
-    places = np.einsum("tij,kj->tki", tool, corners)
+    positions = np.einsum("tij,kj->tki", tool, corners)
     carried = (t >= 2.7 - 1e-9) & (t <= 10.7 + 1e-9)
-    assert places[carried][..., 2].min() == pytest.approx(0.15, abs=1e-9)
+    assert positions[carried][..., 2].min() == pytest.approx(0.15, abs=1e-9)
     for instant, name in ((2.7, "pick pallet"), (10.7, "place pallet")):
         (k,) = np.flatnonzero(np.isclose(t, instant))
         (box,) = cell.link(name).geometry
         centre = np.array(box.pose)[:2, 3]
-        assert (np.abs(places[k, :, :2] - centre) < np.array(box.size[:2]) / 2).all()
+        assert (np.abs(positions[k, :, :2] - centre) < np.array(box.size[:2]) / 2).all()
         assert not simulated["path/qd"][k].any(), "the arm is at rest at grip and release"
         np.testing.assert_allclose(tool[k, :3, 2], (0, 0, -1), atol=1e-12)
         # the edges of the load are parallel to those of the pallet
@@ -204,10 +204,10 @@ def test_puma560_multirate_equals_a_separate_simulation_of_its_loops() -> None:
         q, qd, i = np.split(x, 3)
         if tick % 10 == 0:
             s, T = t / 4.0, 4.0
-            way = np.array(path.parameter_value("qf"))
-            qr = way * (10 * s**3 - 15 * s**4 + 6 * s**5)
-            qdr = way * (30 * s**2 - 60 * s**3 + 30 * s**4) / T
-            qddr = way * (60 * s - 180 * s**2 + 120 * s**3) / T**2
+            displacement = np.array(path.parameter_value("qf"))
+            qr = displacement * (10 * s**3 - 15 * s**4 + 6 * s**5)
+            qdr = displacement * (30 * s**2 - 60 * s**3 + 30 * s**4) / T
+            qddr = displacement * (60 * s - 180 * s**2 + 120 * s**3) / T**2
             tau = arm.rne(q, qd, qddr + 60.0 * (qdr - qd) + 900.0 * (qr - q))
         error = tau / (G * k) - i
         free = 3000.0 * L * error + integral

@@ -105,7 +105,7 @@ def test_a_relay_keeps_its_mode_while_disabled(settings: dict[str, Any]) -> None
 
 @pytest.mark.parametrize("settings", RUNS, ids=lambda run: run["solver"])
 def test_the_motion_of_a_sliding_mass_is_suspended_while_disabled(settings: dict[str, Any]) -> None:
-    """3 m/s with 2 N on 1 kg last 1.5 s; the mass is disabled from 0.5 s to 1.5 s and rests after 2.5 s."""
+    """2 N stop 1 kg from 3 m/s within 1.5 s. It is disabled from 0.5 s to 1.5 s, so it rests after 2.5 s."""
     block = bl.StickSlipFriction(coulomb=2.0, static=2.5, initial_speed=3.0)
     control = bl.FromTable(times=(0.0, 0.5, 1.5), values=(1.0, 0.0, 1.0), method="flat")
     diagram = enabled(block, bl.Constant(value=0.0), control, end="v")
@@ -126,7 +126,7 @@ def test_a_limited_integrator_that_is_reset_leaves_its_limit(settings: dict[str,
     np.testing.assert_allclose(result["sub/o"], np.minimum(since, 0.2), atol=1e-9)
 
 
-def test_no_event_sees_the_old_states_of_a_subsystem_when_it_is_enabled() -> None:
+def test_no_event_is_computed_from_the_old_states_of_a_subsystem_when_it_is_enabled() -> None:
     """-1 while disabled, rising from 0 to 0.2 while enabled: 0.1 is crossed twice per period."""
     inner = ab.DiagramBuilder("inside")
     climb = inner.add("climb", bl.IntegratorLimited(upper=0.2), inner.input("u"))

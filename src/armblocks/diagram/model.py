@@ -46,7 +46,7 @@ def diagram_model(diagram: Diagram) -> Model:
     sampling = resolve_sampling(diagram, equations)
     moving = moving_blocks(diagram, equations)
     for name in free:
-        # Conditions that change at instants only need no events.
+        # Conditions that change only at instants need no events.
         constant = name not in moving and name not in diagram.gates
         features = equations[name].features
         if constant and features.conditions and not features.states:

@@ -138,9 +138,9 @@ class VariableTimeDelay(Block):
 class VariableTransportDelay(Block):
     """A transport delay in a pipe: y(t) = u(t - d), where ``T(t)`` is the transit time at the inlet.
 
-    The flow between t - d and t fills the pipe, so the integral of 1/T over that time is 1. Therefore d' = 1
-    - T(t - d) / T(t). This is Simulink's Variable Transport Delay; the input of a Variable Time Delay is d
-    itself. A transit time of 0 or below ends the run with an error.
+    The flow between t - d and t fills the pipe, so the integral of 1/T over that time is 1. Therefore
+    d' = 1 - T(t - d) / T(t). This is Simulink's Variable Transport Delay; the input of a Variable Time Delay
+    is d itself. A transit time of 0 or below ends the run with an error.
     """
 
     title: ClassVar[str] = "Variable Transport Delay"
@@ -162,7 +162,7 @@ class VariableTransportDelay(Block):
 
     def input_ports(self) -> tuple[Port, ...]:
         return (
-            Port("u", "the signal that enters"),
+            Port("u", "the signal at the inlet"),
             Port("T", "the transit time at the inlet, above 0", "s", shape=()),
         )
 

@@ -106,7 +106,7 @@ class MotorWinding(Block):
     k: ArrayLike = parameter(
         0.1, kind=ParameterKind.ARRAY, above=0.0, doc="torque constant and back-EMF constant", unit="N m/A"
     )
-    gear_ratio: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="G, negative where it reverses")
+    gear_ratio: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="G, negative for a reversing gear")
     initial_current: ArrayLike = parameter(
         0.0, kind=ParameterKind.ARRAY, doc="the current at t = 0", unit="A"
     )

@@ -126,7 +126,7 @@ class ToFile(Block):
 
     file: str = parameter("simout.csv", doc="path of the file, relative to the folder of the report")
     variable: str = parameter("simout", doc="the name of the variable in the file")
-    decimation: int = parameter(1, minimum=1, doc="one of this many recorded sample times is stored")
+    decimation: int = parameter(1, minimum=1, doc="every n-th recorded sample time is stored")
     limit: int = parameter(
         1_000_000, minimum=1, maximum=10_000_000, doc="maximum number of rows; the last ones are stored"
     )
