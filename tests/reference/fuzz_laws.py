@@ -70,7 +70,7 @@ class Case:
                     raise InconclusiveError(f"the state of '{name}' may have moved before it is held")
 
     def signals(self, diagram: Diagram, **settings: Any) -> dict[str, np.ndarray]:
-        """Simulate and return the compared signals by path."""
+        """Simulate and return the compared signals by path, without those inside conditional subsystems."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             result = ab.simulate(diagram, **{**self.settings, "rtol": 1e-9, "atol": 1e-12, **settings})
@@ -79,12 +79,12 @@ class Case:
 
     @staticmethod
     def compared(diagram: Diagram) -> list[str]:
-        """Return the paths of all outputs except those of the controls of conditional subsystems."""
+        """Return the paths of all outputs outside conditional subsystems."""
         flat = flat_diagram(diagram)
         return [
             f"{name}/{port.name}"
             for name, block in flat.blocks.items()
-            if not isinstance(block, EnableControl | TriggerControl)
+            if name not in flat.gates and not isinstance(block, EnableControl | TriggerControl)
             for port in block.output_ports()
         ]
 

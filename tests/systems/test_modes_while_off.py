@@ -171,3 +171,26 @@ def test_events_in_a_disabled_subsystem_do_not_change_the_result() -> None:
     low = [(edges[k], edges[k + 1]) for k in range(1, 19, 2)]
     exact = sum(max(0.0, min(b, 1.0) - max(a, 0.7)) for a, b in low)
     assert located["total"][-1] == pytest.approx(exact, abs=1e-9)
+
+
+@pytest.mark.parametrize("settings", RUNS)
+@pytest.mark.parametrize("source", [bl.Constant(value=1.0), bl.Step(time=1.0)])
+def test_a_hysteresis_after_a_rate_limiter_sees_only_its_consistent_output(
+    source: Block, settings: dict[str, Any]
+) -> None:
+    """Enabled at 1 s with the input 1, the limiter rises from 0 at 1/s. Its old mode would give 1 at once,
+    which must not become the previous mode of the relay or of the backlash behind it."""
+    inner = ab.DiagramBuilder("inside")
+    limited = inner.add("limited", bl.RateLimiterContinuous(), inner.input("u"))
+    inner.output("relay", inner.add("switch", bl.Relay(), limited))
+    inner.output("play", inner.add("gap", bl.Backlash(), limited))
+    builder = ab.DiagramBuilder("enabled")
+    enable = builder.add("enable", bl.Step(time=1.0))
+    builder.add(
+        "sub", bl.EnabledSubsystem(diagram=inner.build()), builder.add("source", source), enable=enable
+    )
+    result = ab.simulate(builder.build(), stop_time=2.5, sample_time=0.1, **settings)
+    y = np.clip(result.time - 1.0, 0.0, 1.0)
+    np.testing.assert_allclose(result["sub/gap/y"], np.maximum(y - 0.5, 0.0), atol=1e-9)
+    apart = np.abs(y - 0.5) > 1e-6
+    np.testing.assert_array_equal(result["sub/switch/y"][apart], (y > 0.5)[apart])

@@ -164,8 +164,12 @@ def restarted(features: Features, *, clocked: bool) -> Features:
 
 
 def with_consistent_modes(features: Features) -> Features:
-    """With modes that become consistent when the control turns on, before any guard is evaluated."""
+    """With modes that become consistent when the control turns on, before any guard is evaluated.
+
+    Until then previous modes, and the values captured with them, are those from before the instant.
+    """
     equations = features.equations
+    captured_with_modes = {state.name for state in features.discrete if state.hysteresis}
 
     def modes(at: Arguments) -> Signals:
         return {**equations[SlotKind.MODE](at), _WORKS: at.u[ON] != 0.0}
@@ -189,9 +193,16 @@ def with_consistent_modes(features: Features) -> Features:
         after[_WORKS] = at.u[ON] != 0.0
         return after
 
+    def captures(at: Arguments) -> Signals:
+        return {
+            name: if_else(at.x[_WORKS] != 0.0, value, at.x[name]) if name in captured_with_modes else value
+            for name, value in equations[SlotKind.CAPTURE](at).items()
+        }
+
     changed = features.with_equations(
         {
             SlotKind.MODE: modes,
+            SlotKind.CAPTURE: captures,
             SlotKind.CONTRADICTION: contradictions,
             SlotKind.GUARD: guards,
             SlotKind.RESET: reset,
@@ -199,7 +210,13 @@ def with_consistent_modes(features: Features) -> Features:
     )
     return dataclasses.replace(
         changed,
-        modes=(*features.modes, State(_WORKS, (), "whether the modes are consistent")),
+        modes=(
+            *(
+                dataclasses.replace(mode, stored_while=_WORKS) if mode.hysteresis else mode
+                for mode in features.modes
+            ),
+            State(_WORKS, (), "whether the modes are consistent"),
+        ),
         guards=(*features.guards, Guard(_TURNED, (), "the control")),
     )
 

@@ -32,7 +32,9 @@ class State:
     modes are made consistent before any event (an edge, a trigger, a reset) is processed. Other modes are
     stateful. ``hysteresis``: whether a following mode also depends on its previous value: the value before
     the instant, or before the latest event at it. A discrete state with ``hysteresis`` is captured at the
-    same times. ``momentary``: whether a discrete state becomes 0 at the end of every instant."""
+    same times. ``stored_while``: the mode of the same block without which the previous value is kept.
+    ``momentary``: whether a discrete state becomes 0 at the end of every instant.
+    """
 
     name: str
     shape: Shape
@@ -40,6 +42,7 @@ class State:
     unit: str = ""
     follows: bool = False
     hysteresis: bool = False
+    stored_while: str = ""
     momentary: bool = False
 
     @property

@@ -269,15 +269,18 @@ def _contradictions(
     return tuple(indices), tuple(follows), contradictions
 
 
-def _remembered(model: Model, symbols: Symbols) -> tuple[tuple[int, int], ...]:
-    """The indices in ``z`` of all hysteresis modes, each with the index of its previous value."""
+def _remembered(model: Model, symbols: Symbols) -> tuple[tuple[int, int, int], ...]:
+    """The indices in ``z`` of all hysteresis modes, each with the index of its previous value and of the mode
+    without which that value is kept, -1 for none."""
     ranges = signature(*symbols.discrete_slots).ranges
     return tuple(
-        pair
+        (own, before, ranges[f"{name}/{mode.stored_while}"].start if mode.stored_while else -1)
         for name, equations in model.flow.equations.items()
         for mode in equations.modes
         if mode.hysteresis
-        for pair in zip(_indices(ranges[f"{name}/{mode.name}"]), _indices(ranges[f"{name}/{mode.before}"]))
+        for own, before in zip(
+            _indices(ranges[f"{name}/{mode.name}"]), _indices(ranges[f"{name}/{mode.before}"])
+        )
     )
 
 

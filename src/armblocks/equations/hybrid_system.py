@@ -133,9 +133,9 @@ class HybridSystem:
     followers: tuple[bool, ...] = ()
     """For each mode, whether it is a following mode: a function of the present signals, possibly with
     hysteresis."""
-    remembered: tuple[tuple[int, int], ...] = ()
-    """Pairs of indices in ``z``: a hysteresis mode, and its previous value, which is the value before the
-    instant or before the latest event at it."""
+    remembered: tuple[tuple[int, int, int], ...] = ()
+    """Indices in ``z``: a hysteresis mode; its previous value, which is the value before the instant or
+    before the latest event at it; and the mode without which the previous value is kept, -1 for none."""
     recaptured: tuple[int, ...] = ()
     """The indices in ``z`` of the captured values of hysteresis modes, which are captured again at events."""
     momentary: tuple[int, ...] = ()

@@ -197,15 +197,26 @@ class Events:
             z[recaptured[i]] = new_z[recaptured[i]]
 
     def _store_previous_modes(self) -> None:
-        """Store the present values of hysteresis modes as their previous values."""
-        f = self.frame
-        if not f.sizes.remembered:
-            return
-        z, (modes, before) = f.vector(f.workspace.z), zip(*f.sizes.remembered)
-        of_modes = f.r.integers("mode.remembering", modes)
-        of_before = f.r.integers("mode.before", before)
-        for i in f.r.each(len(modes)):
-            z[of_before[i]] = z[of_modes[i]]
+        """Store the present values of hysteresis modes as their previous values.
+
+        Those of a subsystem that is being enabled keep the values from before the instant.
+        """
+        f, r = self.frame, self.frame.r
+        z = f.vector(f.workspace.z)
+        always = [places for places in f.sizes.remembered if places[2] < 0]
+        gated = [places for places in f.sizes.remembered if places[2] >= 0]
+        for kind, entries in (("always", always), ("gated", gated)):
+            if not entries:
+                continue
+            modes, before, working = (
+                r.integers(f"mode.{role}.{kind}", indices)
+                for role, indices in zip(("remembering", "before", "working"), zip(*entries))
+            )
+            for i in r.each(len(entries)):
+                value = z[modes[i]]
+                if kind == "gated":
+                    value = select(z[working[i]] != 0.0, value, z[before[i]])
+                z[before[i]] = value
 
     def _end_instant(self) -> None:
         """Give silenced guards their present signs, and set the momentary values to 0."""

@@ -121,7 +121,9 @@ class CompiledSystem:
             captures=bool(description["captures"]),
             modes=tuple(int(place) for place in description["modes"]),
             followers=tuple(bool(follows) for follows in description["followers"]),
-            remembered=tuple((int(mode), int(before)) for mode, before in description["remembered"]),
+            remembered=tuple(
+                (int(mode), int(before), int(working)) for mode, before, working in description["remembered"]
+            ),
             recaptured=tuple(int(place) for place in description["recaptured"]),
             momentary=tuple(int(place) for place in description["momentary"]),
             silenced=tuple((int(guard), int(place)) for guard, place in description["silenced"]),

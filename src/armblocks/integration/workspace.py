@@ -150,7 +150,8 @@ class LoopSizes:
     - ``captures``: whether ``update`` is also called just before every instant.
     - ``modes``: the indices of the modes in ``z``. ``followers``: for each mode, whether it is a following
       mode.
-    - ``remembered``: the indices in ``z`` of the hysteresis modes, each with the index of its previous value.
+    - ``remembered``: the indices in ``z`` of the hysteresis modes, each with the index of its previous value
+      and of the mode without which that value is kept, -1 for none.
     - ``recaptured``: the indices in ``z`` of the captured values that belong to hysteresis modes.
     - ``momentary``: the indices in ``z`` that are set to 0 at the end of every instant.
     - ``silenced``: guards, each with an index of ``momentary``; the guard does not fire while that value is
@@ -170,7 +171,7 @@ class LoopSizes:
     captures: bool = False
     modes: tuple[int, ...] = ()
     followers: tuple[bool, ...] = ()
-    remembered: tuple[tuple[int, int], ...] = ()
+    remembered: tuple[tuple[int, int, int], ...] = ()
     recaptured: tuple[int, ...] = ()
     momentary: tuple[int, ...] = ()
     silenced: tuple[tuple[int, int], ...] = ()
