@@ -194,3 +194,23 @@ def test_a_hysteresis_after_a_rate_limiter_sees_only_its_consistent_output(
     np.testing.assert_allclose(result["sub/gap/y"], np.maximum(y - 0.5, 0.0), atol=1e-9)
     apart = np.abs(y - 0.5) > 1e-6
     np.testing.assert_array_equal(result["sub/switch/y"][apart], (y > 0.5)[apart])
+
+
+@pytest.mark.parametrize("settings", RUNS)
+@pytest.mark.parametrize("block", [bl.Relay(), bl.Backlash()])
+def test_a_hysteresis_ignores_a_jump_at_the_instant_at_which_it_is_disabled(
+    block: Block, settings: dict[str, Any]
+) -> None:
+    """The input jumps from 0 to 2 when the subsystem is disabled, through two blocks with modes, and returns
+    before it is enabled again: the block has never seen the 2."""
+    builder = ab.DiagramBuilder("disabled")
+    jump = builder.add("jump", bl.Step(time=1.0, final=2.0))
+    back = builder.add("back", bl.Step(time=2.0, final=2.0))
+    pulse = builder.add("pulse", bl.Sum(signs="+-"), jump, back)
+    high = builder.add("high", bl.Relay(on_point=1.5, off_point=0.5), pulse)
+    low = builder.add("low", bl.CompareToConstant(relation="<", constant=0.5), high)
+    builder.add("sub", bl.EnabledSubsystem(diagram=inside(block)), pulse, enable=low)
+    result = ab.simulate(builder.build(), stop_time=3.0, sample_time=0.25, **settings)
+    np.testing.assert_array_equal(result["pulse/y"], 2.0 * ((result.time >= 1.0) & (result.time < 2.0)))
+    np.testing.assert_array_equal(result["sub/block/y"], 0.0)
+    np.testing.assert_array_equal(result["sub"], 0.0)

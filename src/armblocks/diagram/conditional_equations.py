@@ -68,17 +68,27 @@ def with_hidden_inputs(features: Features, gate: Collection[str]) -> Features:
 
 
 def while_on(features: Features, kinds: Iterable[SlotKind]) -> Features:
-    """With equations of these roles that hold while the control is on; see ``SlotKind.while_off``."""
+    """With equations of these roles that hold while the control is on; see ``SlotKind.while_off``.
 
-    def gated(equation: Equation, keeps_state: bool) -> Equation:
+    Where the control turns off at an instant, a hysteresis mode may have changed in an iteration in which the
+    control was still on. It returns to its previous value.
+    """
+    previous = {mode.name: mode.before for mode in features.modes if mode.hysteresis}
+
+    def off_value(kind: SlotKind, name: str, at: Arguments) -> SX | float:
+        if kind is SlotKind.CONTRADICTION and name in previous:
+            return at.x[name] != at.x[previous[name]]
+        return at.x[previous.get(name, name)] if kind.while_off is WhileOff.KEPT else 0.0
+
+    def gated(kind: SlotKind, equation: Equation) -> Equation:
         return lambda at: {
-            name: if_else(at.u[ON] != 0.0, value, at.x[name] if keeps_state else 0.0)
+            name: if_else(at.u[ON] != 0.0, value, off_value(kind, name, at))
             for name, value in equation(at).items()
         }
 
     return features.with_equations(
         {
-            kind: gated(features.equations[kind], kind.while_off is WhileOff.KEPT)
+            kind: gated(kind, features.equations[kind])
             for kind in kinds
             if kind.while_off is not WhileOff.EVALUATED
         }
