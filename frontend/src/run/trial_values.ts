@@ -31,11 +31,12 @@ export function tryValue(path: string, value: unknown): void {
   unsentValues.set(path, value)
 }
 
-/** The parameter sets of the model, with its values of their parameters and of the trial values. */
-export async function parameterSets(): Promise<ParameterSetTable | undefined> {
+/** The parameter sets of the model, with its values of their parameters and of other ones: the tried ones. */
+export async function parameterSets(
+  also = Object.keys(useRuns.getState().trialValues),
+): Promise<ParameterSetTable | undefined> {
   const document = useStudio.getState().document?.state.document
   if (document === undefined) return undefined
-  const also = Object.keys(useRuns.getState().trialValues)
   const table = await ask({ kind: 'parameter_sets', document, also })
   if (!table) return undefined
   useKnownParameters.setState({
@@ -44,15 +45,20 @@ export async function parameterSets(): Promise<ParameterSetTable | undefined> {
   return table
 }
 
-/** Try exactly these values; a run in progress gets the model's values of all others. */
+/**
+ * Try exactly these values: a run that begins now has them. A run in progress gets the model's values of all
+ * others from the server.
+ */
 export async function tryExactly(next: Values): Promise<void> {
   const before = useRuns.getState().trialValues
-  const table = await parameterSets()
-  if (!table) return
-  const modelValues = new Map(table.parameters.map(({ path, value }) => [path, value ?? undefined]))
+  const document = useStudio.getState().document?.state.document
   unsentValues.clear()
   useRuns.setState({ trialValues: next })
-  send(changedTrials(before, next, (path) => modelValues.get(path)))
+  const table = await parameterSets(Object.keys(before))
+  if (!table || useStudio.getState().document?.state.document !== document) return
+  const modelValues = new Map(table.parameters.map(({ path, value }) => [path, value ?? undefined]))
+  // The user may have tried other values meanwhile.
+  send(changedTrials(before, useRuns.getState().trialValues, (path) => modelValues.get(path)))
 }
 
 export async function dropTrialValues(paths: string[]): Promise<void> {
